@@ -1,0 +1,46 @@
+# Everything sets itself up: a virtual environment with pinned wheels, on x86-64 Linux with
+# Python 3.11 to 3.13. On a ROS 2 installation use colcon instead; see README.md.
+
+PYTHON ?= python3
+CONFIG ?= config/paper.yaml
+CLOCK ?= sim
+OUTPUT ?= demo_output/$(basename $(notdir $(CONFIG)))-$(CLOCK)-$(shell date +%Y%m%d-%H%M%S)
+VENV := .venv
+BIN := $(VENV)/bin
+SET_UP := $(VENV)/set-up
+
+.PHONY: demo test lint unit colcon clean
+
+demo: $(SET_UP)
+	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT)
+	@$(BIN)/analyze_bag $(OUTPUT)/bag --figures $(OUTPUT)/figures
+
+test: lint unit colcon
+
+lint: $(SET_UP)
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/mypy
+
+unit: $(SET_UP)
+	$(BIN)/python -m pytest -m "not soak"
+
+# As in a ROS workspace, the tests of the mathematics and of what was installed
+colcon: $(SET_UP)
+	rm -rf build install log
+	. $(BIN)/activate && colcon build --packages-select climber_uk \
+		--event-handlers console_cohesion+
+	. $(BIN)/activate && . install/setup.sh && colcon test --packages-select climber_uk \
+		--event-handlers console_cohesion+ --return-code-on-test-failure \
+		--pytest-args -m "installed or not (soak or nodes)"
+	. $(BIN)/activate && colcon test-result --all
+	rm -rf build install log
+
+$(SET_UP): requirements.txt setup.py
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --requirement requirements.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	touch $(SET_UP)
+
+clean:
+	rm -rf $(VENV) build install log demo_output

@@ -1,0 +1,1 @@
+"""Udwadia-Kalaba torque control of a wheeled wall-climbing robot."""

@@ -1,0 +1,1 @@
+"""From a recorded bag to tables and figures."""

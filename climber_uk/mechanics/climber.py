@@ -1,0 +1,162 @@
+"""The wheeled suction climber as M q̈ = Q + E(θ) τ under the no-slip row (11), (15), (17).
+
+q = (x, y, θ): the centre of mass in a frame fixed to the wall, x horizontal, y up, θ anticlockwise
+from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (right, left).
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from climber_uk.mechanics import Array, pack, unpack
+from climber_uk.mechanics.parameter import check, parameter
+
+GRAVITY = 9.81  # [m/s²]
+
+
+@dataclass(frozen=True)
+class State:
+    """Where the climber is and how it moves, both in the wall's frame."""
+
+    pose: Array  # (..., 3) x [m], y [m], θ [rad]
+    velocity: Array  # (..., 3) ẋ [m/s], ẏ [m/s], θ̇ [rad/s]
+
+    @classmethod
+    def rolling(cls, pose: Array, speed: Array | float, yaw_rate: Array | float) -> "State":
+        """State at `pose` (..., 3) that moves along its heading (17)."""
+        heading = unpack(pose)[2]
+        return cls(pose, pack(speed * np.cos(heading), speed * np.sin(heading), yaw_rate))
+
+    @cached_property
+    def heading(self) -> Array:
+        """θ (...) [rad]."""
+        return unpack(self.pose)[2]
+
+    @cached_property
+    def forward_speed(self) -> Array:
+        """v = ẋ cosθ + ẏ sinθ (12), (...) [m/s]."""
+        return along(self.heading, self.velocity)
+
+    @cached_property
+    def side_slip(self) -> Array:
+        """Velocity to the left, 0 where (17) holds, (...) [m/s]."""
+        return across(self.heading, self.velocity)
+
+    @cached_property
+    def yaw_rate(self) -> Array:
+        """ω = θ̇ (...) [rad/s]."""
+        return unpack(self.velocity)[2]
+
+
+@dataclass(frozen=True)
+class Climber:
+    """Parameters of a two-wheel suction climber; the defaults are the paper's.
+
+    Raises `ValueError` naming field, value and bound.
+    """
+
+    mass: float = parameter(5.0, "kg", "mass m", above=0)
+    yaw_inertia: float = parameter(0.33, "kg m²", "inertia J about the centre of mass", above=0)
+    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0)
+    half_track: float = parameter(0.3, "m", "distance d of a wheel from the centre", above=0)
+    seal_friction_coefficient: float = parameter(
+        0.8, "", "friction coefficient μ of the seal ring on the wall", at_least=0
+    )
+    wheel_load_share: float = parameter(
+        0.53, "", "share k of the suction force that the wheels carry", at_least=0, at_most=1
+    )
+    suction_pressure: float = parameter(
+        2500.0, "Pa", "pressure difference P", at_least=0, runtime=True
+    )
+    suction_area: float = parameter(0.06, "m²", "effective suction area S", at_least=0)
+    inclination: float = parameter(
+        90.0, "deg", "of the wall: 0 floor, 90 vertical, 180 ceiling", at_least=0, at_most=180
+    )
+    max_wheel_torque: float = parameter(20.0, "N m", "limit of each wheel's torque", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @cached_property
+    def mass_matrix(self) -> Array:
+        """M = diag(m, m, J), (3, 3)."""
+        return np.diag([self.mass, self.mass, self.yaw_inertia])
+
+    @cached_property
+    def seal_friction(self) -> float:
+        """Sliding friction of the seal f = (1 - k) μ P S [N]."""
+        suction_force = self.suction_pressure * self.suction_area
+        return (1 - self.wheel_load_share) * self.seal_friction_coefficient * suction_force
+
+    @cached_property
+    def weight_along_wall(self) -> float:
+        """m g_t, the part of the weight that pulls along -y [N]."""
+        return self.mass * GRAVITY * math.sin(math.radians(self.inclination))
+
+    def applied_force(self, heading: Array, direction: Array | float) -> Array:
+        """Q without the motors: seal friction against the motion, and gravity, (..., 3) [N, N m].
+
+        `direction` (...) is 1 forwards, -1 backwards, 0 where no friction acts.
+        """
+        friction, weight = -self.seal_friction * direction, self.weight_along_wall
+        return pack(friction * np.cos(heading), friction * np.sin(heading) - weight, 0 * heading)
+
+    def wheel_force(self, heading: Array, torques: Array) -> Array:
+        """E(θ) τ: what the wheel torques (right, left) do to the climber, (..., 3) [N, N m]."""
+        drive, turn = self.drive_and_turn(torques)
+        return pack(drive * np.cos(heading), drive * np.sin(heading), turn)
+
+    def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:
+        """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
+        right, left = unpack(torques)
+        drive, turn = right + left, self.half_track * (right - left)
+        return drive / self.wheel_radius, turn / self.wheel_radius
+
+    def wheel_torques(self, drive: Array, turn: Array) -> Array:
+        """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N, (..., 2) [N m]."""
+        half_drive = self.wheel_radius / 2 * drive
+        half_turn = self.wheel_radius / 2 * turn / self.half_track
+        return pack(half_drive + half_turn, half_drive - half_turn)
+
+    def wheel_rates(self, state: State) -> Array:
+        """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
+        v, turning = state.forward_speed, self.half_track * state.yaw_rate
+        return pack((v + turning) / self.wheel_radius, (v - turning) / self.wheel_radius)
+
+    def rolling_acceleration(self, state: State, torques: Array, direction: Array | float) -> Array:
+        """q̈ of the climber that rolls without side slip under `torques`, (..., 3).
+
+        (10) with the no-slip row A in closed form: A has unit length and M weighs x and y alike,
+        so that the wheels' reaction takes just the lateral part away. Left are (11) and (15).
+        """
+        heading, v, omega = state.heading, state.forward_speed, state.yaw_rate
+        drive, turn = self.drive_and_turn(torques)
+        cosine, sine = np.cos(heading), np.sin(heading)
+        force = drive - self.seal_friction * direction - self.weight_along_wall * sine
+        v_1 = force / self.mass
+        return pack(
+            v_1 * cosine - v * omega * sine,
+            v_1 * sine + v * omega * cosine,
+            turn / self.yaw_inertia,
+        )
+
+
+def along(heading: Array, vector: Array) -> Array:
+    """Forward component, (...), of a vector (..., 2 or 3) given in the wall's frame."""
+    x, y, *_ = unpack(vector)
+    return x * np.cos(heading) + y * np.sin(heading)
+
+
+def across(heading: Array, vector: Array) -> Array:
+    """Component to the left, (...), of a vector (..., 2 or 3) given in the wall's frame."""
+    x, y, *_ = unpack(vector)
+    return y * np.cos(heading) - x * np.sin(heading)
+
+
+def no_slip(state: State) -> tuple[Array, Array]:
+    """Row A = [sinθ -cosθ 0] (..., 3) and b = -ω (ẋ cosθ + ẏ sinθ) (...) of (18)."""
+    heading = state.heading
+    row = pack(np.sin(heading), -np.cos(heading), 0 * heading)
+    return row, -state.yaw_rate * state.forward_speed

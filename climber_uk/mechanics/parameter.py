@@ -1,0 +1,64 @@
+"""Dataclass fields that know their unit, bounds and meaning, and are checked at construction."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+
+def parameter(
+    default: Any,
+    unit: str,
+    description: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    choices: Sequence[str] | None = None,
+    runtime: bool = False,
+) -> Any:
+    """Declare a dataclass field together with all that a user may ask about it.
+
+    `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; `runtime` marks
+    what a running node may change. Pass the dataclass's instance to `check` in `__post_init__`.
+    """
+    return dataclasses.field(
+        default=default,
+        metadata={
+            "unit": unit,
+            "description": description,
+            "above": above,
+            "at_least": at_least,
+            "at_most": at_most,
+            "choices": choices,
+            "runtime": runtime,
+        },
+    )
+
+
+def check(instance: Any) -> None:
+    """Raise `ValueError` naming field, value and bound unless every `parameter` field holds."""
+    for field in dataclasses.fields(instance):
+        if field.metadata:
+            check_value(field, getattr(instance, field.name))
+
+
+def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
+    """Raise `ValueError` if `value` is not one that `field`, made by `parameter`, allows."""
+    rule = field.metadata
+    said = f"{field.name}={value!r} must be"
+    unit = f" [{rule['unit']}]" if rule["unit"] else ""
+    if rule["choices"] is not None and value not in rule["choices"]:
+        raise ValueError(f"{said} one of {', '.join(rule['choices'])}")
+    if isinstance(field.default, bool | str):
+        if type(value) is not type(field.default):
+            raise ValueError(f"{said} a {type(field.default).__name__}")
+        return
+    if isinstance(value, bool | str) or not math.isfinite(value):
+        raise ValueError(f"{said} a finite number{unit}")
+    if rule["above"] is not None and not value > rule["above"]:
+        raise ValueError(f"{said} > {rule['above']}{unit}")
+    if rule["at_least"] is not None and not value >= rule["at_least"]:
+        raise ValueError(f"{said} >= {rule['at_least']}{unit}")
+    if rule["at_most"] is not None and not value <= rule["at_most"]:
+        raise ValueError(f"{said} <= {rule['at_most']}{unit}")

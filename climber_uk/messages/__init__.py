@@ -1,0 +1,1 @@
+"""Between the topics of the contract and the data of the mathematics."""

@@ -1,0 +1,103 @@
+"""Messages to data; no ROS needed: an object with a message's fields will do, whoever read it.
+
+Checked at this boundary, trusted inside: whatever is unfit raises `ValueError` with what and which
+value. Stamps are integers in nanoseconds.
+"""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.preview import Preview
+
+if TYPE_CHECKING:
+    from builtin_interfaces.msg import Duration, Time
+    from geometry_msgs.msg import Quaternion, Twist
+    from nav_msgs.msg import Odometry
+    from sensor_msgs.msg import FluidPressure, JointState
+    from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+SECOND = 1_000_000_000  # [ns]
+
+
+def nanoseconds(time: "Time | Duration") -> int:
+    """Nanoseconds of a stamp or a duration."""
+    return int(time.sec) * SECOND + int(time.nanosec)
+
+
+def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
+    """State of the climber: pose in `odom_frame`, and twist turned from the body into it."""
+    for name, frame, wanted in (
+        ("frame_id", message.header.frame_id, odom_frame),
+        ("child_frame_id", message.child_frame_id, base_frame),
+    ):
+        if frame != wanted:
+            raise ValueError(f"{name}={frame!r} must be {wanted!r}")
+    position, twist = message.pose.pose.position, message.twist.twist
+    heading = _heading(message.pose.pose.orientation)
+    v_x, v_y, omega = twist.linear.x, twist.linear.y, twist.angular.z
+    cosine, sine = math.cos(heading), math.sin(heading)
+    pose = np.array([position.x, position.y, heading])
+    velocity = np.array([v_x * cosine - v_y * sine, v_x * sine + v_y * cosine, omega])
+    if not (np.isfinite(pose).all() and np.isfinite(velocity).all()):
+        raise ValueError(f"pose {pose} or velocity {velocity} is not finite")
+    return State(pose, velocity)
+
+
+def wheel_torques(message: "JointState", left_joint: str, right_joint: str) -> Array:
+    """Torques (2,) right, left [N m]."""
+    if sorted(message.name) != sorted([left_joint, right_joint]):
+        raise ValueError(f"names {list(message.name)} must be {left_joint!r} and {right_joint!r}")
+    if len(message.effort) != 2:
+        raise ValueError(f"{len(message.effort)} efforts must be 2")
+    efforts = dict(zip(message.name, message.effort, strict=True))
+    torques = np.array([efforts[right_joint], efforts[left_joint]])
+    if not np.isfinite(torques).all():
+        raise ValueError(f"efforts {list(message.effort)} must be finite")
+    return torques
+
+
+def preview(message: "MultiDOFJointTrajectory", odom_frame: str) -> Preview:
+    """Preview of the one joint of a trajectory."""
+    if message.header.frame_id != odom_frame:
+        raise ValueError(f"frame_id={message.header.frame_id!r} must be {odom_frame!r}")
+    poses, velocities, accelerations = [], [], []
+    for number, point in enumerate(message.points, start=1):
+        if not len(point.transforms) == len(point.velocities) == len(point.accelerations) == 1:
+            raise ValueError(f"point {number} must have one transform, velocity and acceleration")
+        place = point.transforms[0].translation
+        poses.append([place.x, place.y, _heading(point.transforms[0].rotation)])
+        velocities.append(_planar(point.velocities[0]))
+        accelerations.append(_planar(point.accelerations[0]))
+    start = nanoseconds(message.header.stamp)
+    return Preview(
+        times=np.array(
+            [start + nanoseconds(point.time_from_start) for point in message.points], np.int64
+        ),
+        pose=np.array(poses),
+        velocity=np.array(velocities),
+        acceleration=np.array(accelerations),
+    )
+
+
+def pressure(message: "FluidPressure") -> float:
+    """Pressure difference [Pa]."""
+    pressure = float(message.fluid_pressure)
+    if not (math.isfinite(pressure) and pressure >= 0):
+        raise ValueError(f"fluid_pressure={pressure} must be finite and >= 0 [Pa]")
+    return pressure
+
+
+def _heading(orientation: "Quaternion") -> float:
+    """Heading, in (-π, π]; climbers turn about z only, so x and y must be (nearly) zero."""
+    x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
+    if not (abs(math.hypot(z, w) - 1) < 1e-3 and math.hypot(x, y) < 0.1):
+        raise ValueError(f"orientation ({x}, {y}, {z}, {w}) must be a unit turn about z")
+    return math.atan2(2 * w * z, w * w - z * z)
+
+
+def _planar(twist: "Twist") -> list[float]:
+    return [twist.linear.x, twist.linear.y, twist.angular.z]

@@ -1,0 +1,140 @@
+"""Data to messages: pure functions. Stamps are integers in nanoseconds."""
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from builtin_interfaces.msg import Duration, Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import (
+    PoseStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    Vector3,
+    Vector3Stamped,
+    WrenchStamped,
+)
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.trajectory import Reference
+from climber_uk.messages.reading import SECOND
+
+
+def time(nanoseconds: int) -> Time:
+    """Stamp of `nanoseconds`."""
+    return Time(sec=nanoseconds // SECOND, nanosec=nanoseconds % SECOND)
+
+
+def odometry(state: State, stamp: int, odom_frame: str, base_frame: str) -> Odometry:
+    """Odometry of a state that is known exactly, but for rounding: covariances 1e-12."""
+    message = Odometry(child_frame_id=base_frame)
+    message.header.stamp = time(stamp)
+    message.header.frame_id = odom_frame
+    message.pose.pose.position.x = float(state.pose[0])
+    message.pose.pose.position.y = float(state.pose[1])
+    message.pose.pose.orientation = _quaternion(float(state.heading))
+    message.twist.twist.linear.x = float(state.forward_speed)
+    message.twist.twist.linear.y = float(state.side_slip)
+    message.twist.twist.angular.z = float(state.velocity[2])
+    message.pose.covariance = np.diag([1e-12] * 6).ravel().tolist()
+    message.twist.covariance = np.diag([1e-12] * 6).ravel().tolist()
+    return message
+
+
+def transform(odometry: Odometry) -> TransformStamped:
+    """The same pose as a transform."""
+    message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
+    position = odometry.pose.pose.position
+    message.transform.translation = Vector3(x=position.x, y=position.y)
+    message.transform.rotation = odometry.pose.pose.orientation
+    return message
+
+
+def wheel_torques(torques: Array, stamp: int, left_joint: str, right_joint: str) -> JointState:
+    """Message of torques (2,) right, left; `stamp` is that of the odometry they answer."""
+    message = JointState(name=[left_joint, right_joint])
+    message.effort = [float(torques[1]), float(torques[0])]
+    message.header.stamp = time(stamp)
+    return message
+
+
+def reference_point(reference: Reference, time: float) -> MultiDOFJointTrajectoryPoint:
+    """Point of a trajectory: one reference, `time` [s] after its start."""
+    x, y, heading = reference.pose.tolist()
+    point = MultiDOFJointTrajectoryPoint()
+    point.transforms = [Transform(translation=Vector3(x=x, y=y), rotation=_quaternion(heading))]
+    point.velocities = [_twist(reference.velocity)]
+    point.accelerations = [_twist(reference.acceleration)]
+    since = round(time * SECOND)
+    point.time_from_start = Duration(sec=since // SECOND, nanosec=since % SECOND)
+    return point
+
+
+def reference(
+    points: Iterable[MultiDOFJointTrajectoryPoint], start: int, odom_frame: str, base_frame: str
+) -> MultiDOFJointTrajectory:
+    """Preview message of some points of the trajectory that started at `start` [ns]."""
+    message = MultiDOFJointTrajectory(joint_names=[base_frame], points=list(points))
+    message.header.stamp = time(start)
+    message.header.frame_id = odom_frame
+    return message
+
+
+def path(poses: Array, stamp: int, odom_frame: str) -> Path:
+    """Path through poses (n, 3)."""
+    path = Path()
+    path.header.stamp = time(stamp)
+    path.header.frame_id = odom_frame
+    for x, y, heading in poses.tolist():
+        pose = PoseStamped(header=path.header)
+        pose.pose.position.x, pose.pose.position.y = x, y
+        pose.pose.orientation = _quaternion(heading)
+        path.poses.append(pose)
+    return path
+
+
+def vector(vector: Iterable[Array], stamp: int, frame: str) -> Vector3Stamped:
+    """Three numbers with a stamp."""
+    x, y, z = (float(component) for component in vector)
+    message = Vector3Stamped(vector=Vector3(x=x, y=y, z=z))
+    message.header.stamp = time(stamp)
+    message.header.frame_id = frame
+    return message
+
+
+def wrench(planar: Array, stamp: int, frame: str) -> WrenchStamped:
+    """Wrench of (force.x, force.y, torque.z)."""
+    message = WrenchStamped()
+    message.wrench.force.x, message.wrench.force.y = float(planar[0]), float(planar[1])
+    message.wrench.torque.z = float(planar[2])
+    message.header.stamp = time(stamp)
+    message.header.frame_id = frame
+    return message
+
+
+def diagnostics(name: str, fault: str, values: Mapping[str, object], stamp: int) -> DiagnosticArray:
+    """One status: OK, or an ERROR that says `fault`."""
+    status = DiagnosticStatus(
+        name=name,
+        level=DiagnosticStatus.ERROR if fault else DiagnosticStatus.OK,
+        message=fault or "ok",
+        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+    )
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = time(stamp)
+    return message
+
+
+def _quaternion(heading: float) -> Quaternion:
+    return Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
+
+
+def _twist(planar: Array) -> Twist:
+    x, y, yaw = planar.tolist()
+    return Twist(linear=Vector3(x=x, y=y), angular=Vector3(z=yaw))

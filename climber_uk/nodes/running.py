@@ -1,0 +1,128 @@
+"""What every node of this package shares: how it starts, talks and ends."""
+
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+
+from climber_uk.mechanics.parameter import parameter
+from climber_uk.messages import writing
+from climber_uk.nodes.parameters import Parameters
+
+RELIABLE = QoSProfile(depth=10)
+BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+SIGNAL_PERIOD = 0.1  # [s]
+WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@dataclass(frozen=True)
+class Names:
+    """Frames and joints as the robot's description calls them."""
+
+    odom_frame: str = parameter("odom", "", "frame fixed to the wall")
+    base_frame: str = parameter("base_link", "", "frame fixed to the climber")
+    left_wheel_joint: str = parameter("left_wheel_joint", "", "joint of the left wheel")
+    right_wheel_joint: str = parameter("right_wheel_joint", "", "joint of the right wheel")
+
+
+class ClimberNode(Node):
+    """A node with checked parameters, and topics whose QoS parameters can override."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.parameters = Parameters(self, self.on_parameters)
+        self.parameters.declare(Names)
+        self.names = self.parameters.read(Names)
+        self._troubles: dict[str, str] = {}
+        self._values: Callable[[], Mapping[str, object]] = dict
+        self._diagnostics: Publisher | None = None
+
+    def on_parameters(self) -> None:
+        """Take up changed parameters."""
+
+    def publisher(self, kind: type, topic: str, qos: QoSProfile = RELIABLE) -> Publisher:
+        """Publisher whose QoS the parameters `qos_overrides.<topic>.publisher.*` override."""
+        options = QoSOverridingOptions.with_default_policies()
+        return self.create_publisher(kind, topic, qos, qos_overriding_options=options)
+
+    def subscription(
+        self, kind: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile = RELIABLE
+    ) -> Subscription:
+        """Subscription whose QoS the parameters `qos_overrides.<topic>.subscription.*` override."""
+        options = QoSOverridingOptions.with_default_policies()
+        return self.create_subscription(kind, topic, callback, qos, qos_overriding_options=options)
+
+    def say(self, subject: str, trouble: str, detail: str = "") -> None:
+        """Log a trouble, or that it is over (''), once each time the trouble changes."""
+        if trouble == self._troubles.get(subject, ""):
+            return
+        self._troubles[subject] = trouble
+        if trouble:
+            self.get_logger().warning(f"{subject}: {trouble}{detail and f' ({detail})'}")
+        else:
+            self.get_logger().info(f"{subject}: ok again")
+        self.diagnose()
+
+    def start_diagnostics(self, values: Callable[[], Mapping[str, object]]) -> None:
+        """Publish troubles and `values` on /diagnostics, every second and when troubles change."""
+        self._values = values
+        self._diagnostics = self.publisher(DiagnosticArray, "/diagnostics")
+        self.create_timer(1.0, self.diagnose, clock=WALL_CLOCK)
+
+    def diagnose(self) -> None:
+        """Publish troubles and values."""
+        if self._diagnostics is not None:
+            troubles = [
+                f"{about}: {trouble}" for about, trouble in self._troubles.items() if trouble
+            ]
+            now = self.get_clock().now().nanoseconds
+            name = self.get_fully_qualified_name()
+            message = writing.diagnostics(name, "; ".join(troubles), self._values(), now)
+            self._diagnostics.publish(message)
+
+
+def run(make_node: Callable[[], Node]) -> None:
+    """Spin a node until SIGINT or SIGTERM; exit with one line and status 1 if it cannot start.
+
+    rclpy's own signal handling takes the publishers away from under a running callback. Here the
+    callback is finished first. The executor is the one that takes half the CPU; its `spin` never
+    ends in rclpy 7.1, and it sees signals only between callbacks, hence the idle timer.
+    """
+    node = None
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = make_node()
+        node.create_timer(SIGNAL_PERIOD, lambda: None, clock=WALL_CLOCK)
+        end = Future()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: end.set_result(None))
+        executor = EventsExecutor()
+        executor.add_node(node)
+        while not end.done():
+            executor.spin_until_future_complete(end, timeout_sec=3600.0)
+    except KeyboardInterrupt:
+        pass
+    except (ValueError, RCLError) as error:
+        if node is not None:
+            raise
+        sys.exit(f"{Path(sys.argv[0]).name}: {error}")
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()

@@ -1,0 +1,135 @@
+"""Publishes where the climber should be: a short preview of a trajectory, again and again."""
+
+from collections import deque
+from dataclasses import dataclass
+
+from nav_msgs.msg import Odometry, Path
+from rclpy.subscription import Subscription
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.shapes import SHAPES
+from climber_uk.mechanics.time_laws import TIME_LAWS, Stopping
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.messages import reading, writing
+from climber_uk.messages.reading import SECOND
+from climber_uk.nodes.running import BEST_EFFORT, LATCHED, ClimberNode, run
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to follow, and how it is told."""
+
+    shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
+    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=tuple(TIME_LAWS))
+    reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
+    autostart: bool = parameter(True, "", "start at the first odometry, not at ~/start")
+    start_delay: float = parameter(0.0, "s", "from that odometry to the start", at_least=0)
+    preview: float = parameter(1.0, "s", "how far ahead is published", above=0)
+    point_period: float = parameter(0.05, "s", "time between two points of it", above=0)
+    publish_period: float = parameter(0.1, "s", "time between two previews", above=0)
+    stop_time: float = parameter(1.0, "s", "from the full rate to rest at ~/stop", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.preview < 2 * self.publish_period:
+            raise ValueError(
+                f"preview={self.preview} must be >= 2 publish_period={self.publish_period} [s]"
+            )
+
+
+class TrajectoryPublisher(ClimberNode):
+    """Starts a trajectory at the stamp of an odometry; from then on the clock leads."""
+
+    def __init__(self) -> None:
+        super().__init__("trajectory_publisher")
+        self.parameters.declare(Options)
+        for name, kind in {**SHAPES, **TIME_LAWS}.items():
+            self.parameters.declare(kind, f"{name}.")
+        self.parameters.refuse_unknown()
+        self.options = self.parameters.read(Options)
+        shape, law = self.options.shape, self.options.time_law
+        self.planned = Trajectory(
+            shape=self.parameters.read(SHAPES[shape], f"{shape}."),
+            law=self.parameters.read(TIME_LAWS[law], f"{law}."),
+            reverse_gear=self.options.reverse_gear,
+        )
+        self.trajectory = self.planned
+        self.start: int | None = None  # [ns] stamp of the trajectory's time 0
+        self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
+        self.next_point = 0  # every point is computed once: previews agree to the last bit
+
+        self.reference = self.publisher(MultiDOFJointTrajectory, "reference")
+        self.path = self.publisher(Path, "reference_path", LATCHED)
+        self.create_service(Trigger, "~/start", self.on_start)
+        self.create_service(Trigger, "~/stop", self.on_stop)
+        self.create_timer(self.options.publish_period, self.publish)
+        self.odometry: Subscription | None = None  # only while a start is waited for
+        if self.options.autostart:
+            self.wait_for_odometry()
+
+    def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Start, or start again from the beginning, at the next odometry."""
+        self.wait_for_odometry()
+        response.success, response.message = True, "starts at the next odometry"
+        return response
+
+    def on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Come to rest on the path, from the end of what has been published on."""
+        if self.start is None:
+            response.message = "not started"
+            return response
+        start = self.next_point * self.options.point_period
+        law = Stopping(self.trajectory.law, start, self.options.stop_time)
+        self.trajectory = Trajectory(self.planned.shape, law, self.planned.reverse_gear)
+        response.success, response.message = True, f"comes to rest from {start:.2f} s on"
+        self.get_logger().info(response.message)
+        return response
+
+    def wait_for_odometry(self) -> None:
+        """Start at the next odometry."""
+        if self.odometry is None:
+            self.odometry = self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
+
+    def on_odometry(self, message: Odometry) -> None:
+        """Start the trajectory `start_delay` after the stamp of `message`."""
+        if self.odometry is None:
+            return
+        self.destroy_subscription(self.odometry)
+        self.odometry = None
+        self.trajectory, self.next_point = self.planned, 0
+        self.points.clear()
+        stamp = reading.nanoseconds(message.header.stamp)
+        self.start = stamp + round(self.options.start_delay * SECOND)
+        self.publish_around(self.start)
+        self.get_logger().info(f"{self.options.shape} starts at {self.start / SECOND:.3f} s")
+        path = writing.path(self.planned.path(points=400), self.start, self.names.odom_frame)
+        self.path.publish(path)
+
+    def publish(self) -> None:
+        """Publish the preview at the clock's time."""
+        if self.start is not None:
+            self.publish_around(max(self.start, self.get_clock().now().nanoseconds))
+
+    def publish_around(self, now: int) -> None:
+        """Publish points from before the last preview to the end of the next one."""
+        assert self.start is not None
+        options, time = self.options, (now - self.start) / SECOND
+        oldest = time - options.publish_period - 2 * options.point_period
+        self.next_point = max(self.next_point, int(oldest / options.point_period))
+        while self.next_point * options.point_period < time + options.preview:
+            at = self.next_point * options.point_period
+            self.points.append(writing.reference_point(self.trajectory.at(at), at))
+            self.next_point += 1
+        while reading.nanoseconds(self.points[0].time_from_start) < oldest * SECOND:
+            self.points.popleft()
+        names = self.names
+        self.reference.publish(
+            writing.reference(self.points, self.start, names.odom_frame, names.base_frame)
+        )
+
+
+def main() -> None:
+    """Run the node."""
+    run(TrajectoryPublisher)

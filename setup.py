@@ -1,0 +1,44 @@
+from glob import glob
+
+from setuptools import find_packages, setup
+
+package_name = "climber_uk"
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    packages=find_packages(include=[package_name, f"{package_name}.*"]),
+    package_data={package_name: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
+        (f"share/{package_name}", ["package.xml"]),
+        (f"share/{package_name}/config", glob("config/*")),
+    ],
+    python_requires=">=3.11",
+    install_requires=["setuptools", "numpy", "scipy", "pyyaml"],
+    extras_require={
+        # rclpy and the messages, where no ROS installation brings them
+        "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
+        # bags and figures; never needed by the three nodes
+        "analysis": ["rosbags>=0.11", "mcap>=1.2", "matplotlib"],
+        "test": ["pytest<9", "pytest-timeout", "hypothesis"],
+    },
+    zip_safe=False,
+    maintainer="The climber_uk maintainers",
+    maintainer_email="maintainers@climber-uk.org",
+    description="Udwadia-Kalaba torque control of a wheeled wall-climbing robot for ROS 2 Jazzy",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            f"{executable} = {package_name}.{module}:main"
+            for executable, module in {
+                "trajectory_publisher": "nodes.trajectory_publisher",
+                "uk_torque_controller": "nodes.uk_torque_controller",
+                "plant_simulator": "nodes.plant_simulator",
+                "record_bag": "nodes.record_bag",
+                "run_demo": "nodes.run_demo",
+                "analyze_bag": "analysis.analyze_bag",
+            }.items()
+        ]
+    },
+)

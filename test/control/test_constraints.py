@@ -1,0 +1,142 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from climber_uk.control.constraints import CONSTRAINTS, Exact, Guidance, rows, tracking_error
+from climber_uk.mechanics.climber import Climber, State, across
+from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.udwadia_kalaba import constrained_acceleration
+
+TRAJECTORIES = [
+    Trajectory(Ellipse(3, 2), RestToRest(rate=0.4, ramp_time=2)),
+    Trajectory(Lemniscate(), RestToRest(rate=0.5, ramp_time=2), reverse_gear=True),
+]
+H = 1e-4  # [s] step of the finite differences
+
+offsets = st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(-1, 1)).map(np.array)
+speeds = st.floats(-2, 2)
+cases = st.tuples(st.sampled_from(TRAJECTORIES), st.floats(0.1, 12), offsets, speeds, speeds)
+
+
+def state_of(case):
+    trajectory, time, offset, v, omega = case
+    return State.rolling(trajectory.at(time).pose + offset, v, omega)
+
+
+def rolled(state, demand, h):
+    """State after h [s] of rolling with constant v̇ and θ̈, by the midpoint of speed and heading."""
+    v_1, turning = demand
+    x, y, heading = state.pose
+    v, omega = state.forward_speed, state.yaw_rate
+    s = np.linspace(0, h, 9)  # Simpson's rule is exact here to far below the tolerances
+    headings = heading + omega * s + turning * s**2 / 2
+    weights = np.array([1, 4, 2, 4, 2, 4, 2, 4, 1]) * h / 24
+    way = (v + v_1 * s) * weights
+    pose = np.array([x + way @ np.cos(headings), y + way @ np.sin(headings), headings[-1]])
+    return State.rolling(pose, v + v_1 * h, omega + turning * h)
+
+
+def differences(function, state, demand, time):
+    """Value, first and second time derivative of function(state, time) along the motion."""
+    before, here, after = (function(rolled(state, demand, h), time + h) for h in (-H, 0.0, H))
+    return here, (after - before) / (2 * H), (after - 2 * here + before) / H**2
+
+
+@settings(deadline=None)
+@given(cases)
+def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
+    trajectory, time, *_ = case
+    gains = Guidance(2.0, 1.3, 7.0, 6.0, 0.4)
+    state = state_of(case)
+    demand = gains.demand(state, trajectory.at(time))
+
+    def speed_error(state, time):
+        reference = trajectory.at(time)
+        e_x, _, _ = tracking_error(state.pose, reference)
+        return state.forward_speed - reference.speed + 2.0 * e_x
+
+    def heading_error(state, time):
+        reference = trajectory.at(time)
+        _, e_y, turned = tracking_error(state.pose, reference)
+        return turned + np.arctan(1.3 * reference.speed / np.hypot(reference.speed, 0.4) * e_y)
+
+    value, rate, _ = differences(speed_error, state, demand, time)
+    assert rate == pytest.approx(-7.0 * value, abs=1e-5 * (1 + abs(value)))
+    value, rate, second = differences(heading_error, state, demand, time)
+    assert second == pytest.approx(-12.0 * rate - 36.0 * value, abs=1e-4 * (1 + abs(second)))
+
+
+@settings(deadline=None)
+@given(cases)
+def test_the_hidden_constraint_decays_at_its_rate(case):
+    trajectory, time, _, v, _ = case
+    if abs(v) < 0.05:
+        return  # singular at rest: see below
+    constraints = Exact(natural_frequency=3.0, hidden_rate=8.0)
+    state = state_of(case)
+    demand = constraints.demand(state, trajectory.at(time))
+
+    def hidden(state, time):
+        reference = trajectory.at(time)
+        u = reference.acceleration + 6 * (reference.velocity - state.velocity)
+        u = u + 9 * (reference.pose - state.pose)
+        return state.forward_speed * state.yaw_rate - across(state.heading, u)
+
+    value, rate, _ = differences(hidden, state, demand, time)
+    assert rate == pytest.approx(-8.0 * value, abs=1e-4 * (1 + abs(rate) + abs(demand[1])))
+
+
+@pytest.mark.parametrize("constraints", CONSTRAINTS.values(), ids=CONSTRAINTS)
+@given(case=cases)
+@settings(deadline=None)
+def test_the_rows_solved_by_udwadia_kalaba_give_the_demand(constraints, case):
+    trajectory, time, _, v, omega = case
+    state, climber = state_of(case), Climber()
+    v_1, turning = demand = constraints().demand(state, trajectory.at(time))
+    A, b = rows(state, demand)
+    np.testing.assert_allclose(A @ A.T, np.eye(3), atol=1e-15)
+    q_2 = constrained_acceleration(climber.mass_matrix, np.array([1.0, -2.0, 3.0]), A, b)
+    cosine, sine = np.cos(state.heading), np.sin(state.heading)
+    expected = [v_1 * cosine - v * omega * sine, v_1 * sine + v * omega * cosine, turning]
+    np.testing.assert_allclose(q_2, expected, rtol=1e-12, atol=1e-12 * (1 + np.abs(b).max()))
+
+
+@pytest.mark.parametrize("constraints", CONSTRAINTS.values(), ids=CONSTRAINTS)
+def test_on_the_path_the_demand_is_that_of_the_path(constraints):
+    trajectory = Trajectory(Circle(radius=2.0), ConstantRate(rate=0.7))
+    reference = trajectory.at(1.0)
+    state = State(reference.pose, reference.velocity)
+    np.testing.assert_allclose(constraints().demand(state, reference), [0, 0], atol=1e-12)
+    assert constraints().speed(state, reference) == pytest.approx(1.4)
+
+
+def test_the_exact_set_asks_no_turn_of_a_climber_at_rest():
+    reference = Trajectory(Circle(), ConstantRate()).at(0.0)
+    v_1, turning = Exact().demand(State.rolling(reference.pose, 0.0, 0.5), reference)
+    assert np.isfinite(v_1)
+    assert turning == 0
+
+
+def test_tracking_error_is_ahead_left_and_anticlockwise():
+    reference = Trajectory(Circle(), ConstantRate()).at(0.0)  # at (1, 0), heading up
+    error = tracking_error(np.array([0.7, 0.2, np.pi / 2 + 0.1 - 4 * np.pi]), reference)
+    np.testing.assert_allclose(error, [0.2, 0.3, 0.1], atol=1e-12)
+
+
+@pytest.mark.parametrize("constraints", CONSTRAINTS.values(), ids=CONSTRAINTS)
+def test_one_call_serves_many_climbers(constraints):
+    random = np.random.default_rng(5)
+    reference = TRAJECTORIES[0].at(random.uniform(0, 10, size=6))
+    state = State.rolling(
+        reference.pose + random.normal(size=(6, 3)), random.normal(size=6), random.normal(size=6)
+    )
+    together = np.array(constraints().demand(state, reference))
+    for i in range(6):
+        one = type(reference)(
+            *(getattr(reference, name)[i] for name in ("pose", "velocity", "acceleration", "jerk"))
+        )
+        alone = constraints().demand(State(state.pose[i], state.velocity[i]), one)
+        np.testing.assert_allclose(together[:, i], alone, rtol=1e-11)

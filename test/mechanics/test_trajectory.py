@@ -1,0 +1,147 @@
+import math
+
+import numpy as np
+import pytest
+
+from climber_uk.mechanics.shapes import SHAPES, Circle, Ellipse, Line, Waypoints
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest, Stopping
+from climber_uk.mechanics.trajectory import Trajectory
+
+CORNERS = [[0, 0], [1, 0], [1.5, 1], [0, 2]]
+
+
+@pytest.fixture
+def waypoints(tmp_path):
+    def make(points):
+        file = tmp_path / "points.txt"
+        np.savetxt(file, points)
+        return Waypoints(str(file))
+
+    return make
+
+
+@pytest.fixture(params=[*SHAPES, "closed waypoints"])
+def shape(request, waypoints):
+    if request.param == "waypoints":
+        return waypoints(CORNERS)
+    if request.param == "closed waypoints":
+        return waypoints([*CORNERS, CORNERS[0]])
+    return SHAPES[request.param]()
+
+
+LAWS = {
+    "once": RestToRest(rate=0.8, ramp_time=1.5),
+    "repeated": RestToRest(rate=0.8, ramp_time=1.5, runs=3, laps=2, pause=0.4),
+    "too short for its ramps": RestToRest(rate=50.0, ramp_time=1.5),
+    "stopped": Stopping(RestToRest(rate=0.8, ramp_time=1.5), start=1.3, ramp_time=0.7),
+}
+
+
+@pytest.mark.parametrize("reverse_gear", [False, True])
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_every_derivative_is_the_difference_of_the_one_below(shape, law, reverse_gear):
+    trajectory = Trajectory(shape, law, reverse_gear)
+    h = 1e-5
+    time = np.linspace(-0.3, min(trajectory.duration, 40) + 0.3, 1001) + 1e-4
+    before, here, after = (trajectory.at(time + shift) for shift in (-h, 0, h))
+    turned = np.unwrap(np.stack([before.pose[:, 2], after.pose[:, 2]]), axis=0)
+    for low, high, rate in (
+        (before.pose[:, :2], after.pose[:, :2], here.velocity[:, :2]),
+        (*turned, here.velocity[:, 2]),
+        (before.velocity, after.velocity, here.acceleration),
+        (before.acceleration[:, :2], after.acceleration[:, :2], here.jerk),
+        (before.speed, after.speed, here.speed_rate),
+        (before.speed_rate, after.speed_rate, here.speed_second_rate),
+    ):
+        difference = (high - low) / (2 * h)
+        assert np.abs(difference - rate).max() <= 1e-6 * max(1.0, np.abs(rate).max())
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_spline_meets_its_points_and_is_smooth_to_the_third_derivative(waypoints, closed):
+    points = np.array([*CORNERS, CORNERS[0]] if closed else CORNERS, float)
+    shape = waypoints(points)
+    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    np.testing.assert_allclose(shape.derivatives(knots)[0], points, atol=1e-12)
+    inner = knots[:-1] if closed else knots[1:-1]
+    for low, high in zip(
+        shape.derivatives(inner - 1e-9), shape.derivatives(inner + 1e-9), strict=True
+    ):
+        np.testing.assert_allclose(low, high, atol=1e-6)
+
+
+def test_a_straight_line_of_two_waypoints_stays_straight(waypoints):
+    shape = waypoints([[1, 1], [4, 5]])
+    p, p_1, p_2, p_3 = shape.derivatives(np.array([0.0, 2.5, 5.0]))
+    np.testing.assert_allclose(p, [[1, 1], [2.5, 3], [4, 5]], atol=1e-12)
+    np.testing.assert_allclose(p_1, [[0.6, 0.8]] * 3, atol=1e-12)
+    np.testing.assert_allclose([p_2, p_3], 0, atol=1e-12)
+
+
+def test_the_paper_starts_as_printed():
+    start = Trajectory(Ellipse(), ConstantRate()).at(0.0)
+    np.testing.assert_allclose(start.pose, [0, 6, 0], atol=1e-15)
+    np.testing.assert_allclose(start.velocity, [10, 0, -0.6], atol=1e-15)
+
+
+def test_a_run_starts_and_ends_at_rest_and_takes_its_time():
+    trajectory = Trajectory(Circle(), RestToRest(rate=0.5, ramp_time=2.0, laps=2))
+    assert trajectory.duration == pytest.approx(4 * math.pi / 0.5 + 2.0)
+    for time in (0.0, trajectory.duration, trajectory.duration + 100):
+        reference = trajectory.at(time)
+        np.testing.assert_allclose(reference.pose[:2], [1, 0], atol=1e-12)
+        np.testing.assert_allclose(reference.velocity, 0, atol=1e-12)
+        np.testing.assert_allclose(reference.acceleration, 0, atol=1e-12)
+
+
+def test_the_second_run_along_an_open_shape_goes_back_in_reverse_gear():
+    trajectory = Trajectory(Line(length=3.0), RestToRest(ramp_time=1.0, runs=2, pause=0.0))
+    way, back = trajectory.at(2.0), trajectory.at(6.0)
+    np.testing.assert_allclose(way.pose, back.pose, atol=1e-12)
+    assert way.speed == pytest.approx(1.0)
+    assert back.speed == pytest.approx(-1.0)
+    assert trajectory.at(trajectory.duration).pose[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_reverse_gear_turns_the_climber_but_not_the_path():
+    law = RestToRest()
+    forwards = Trajectory(Ellipse(), law).at(2.0)
+    backwards = Trajectory(Ellipse(), law, reverse_gear=True).at(2.0)
+    np.testing.assert_allclose(forwards.velocity, backwards.velocity)
+    assert backwards.pose[2] - forwards.pose[2] == pytest.approx(math.pi)
+    assert backwards.speed == pytest.approx(-forwards.speed)
+
+
+def test_stopping_leaves_the_past_alone_and_rests_after_its_ramp():
+    law = RestToRest(rate=0.8, ramp_time=1.0)
+    going = Trajectory(Circle(), law)
+    stopped = Trajectory(Circle(), Stopping(law, start=2.0, ramp_time=1.0))
+    np.testing.assert_array_equal(stopped.at(1.9).pose, going.at(1.9).pose)
+    assert stopped.duration == 3.0
+    np.testing.assert_allclose(stopped.at(3.0).pose, stopped.at(50.0).pose)
+    np.testing.assert_allclose(stopped.at(3.0).velocity, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("content", "wrong"),
+    [
+        ("1 2\n", "1 point"),
+        ("1 2\n3 nan\n", "point 2 is not finite"),
+        ("1 2 3\n4 5 6\n", "two columns"),
+        ("1 2\n1 2\n3 4\n", "point 2 repeats"),
+        ("1 2\nthree four\n", "three"),
+        (None, "not found"),
+    ],
+)
+def test_a_bad_waypoint_file_is_named_with_what_is_wrong(tmp_path, content, wrong):
+    file = tmp_path / "bad.txt"
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(ValueError, match=wrong) as error:
+        Waypoints(str(file))
+    assert str(file) in str(error.value)
+
+
+def test_an_open_shape_refuses_a_law_that_would_run_off_it():
+    with pytest.raises(ValueError, match="rest_to_rest"):
+        Trajectory(Line(), ConstantRate())

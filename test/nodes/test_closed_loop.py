@@ -1,0 +1,107 @@
+"""The main job, as people run it: three nodes and a recorder in processes of their own."""
+
+import os
+import signal
+import subprocess
+
+import numpy as np
+import pytest
+
+from climber_uk.analysis.bag import read_messages
+from climber_uk.analysis.recorded_run import read_run
+from climber_uk.messages import reading
+
+pytestmark = pytest.mark.nodes
+
+
+def demo(world, output, config, *arguments, **how):
+    from conftest import CONFIG, executable
+
+    return subprocess.Popen(
+        [executable("run_demo"), "--config", CONFIG / config, "--output", output, *arguments],
+        env=world.environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        **how,
+    )
+
+
+def finished(process, timeout=150):
+    said, _ = process.communicate(timeout=timeout)
+    assert process.returncode == 0, said
+    return said
+
+
+def by_stamp(bag, topic, content):
+    return {
+        reading.nanoseconds(m.header.stamp): content(m) for _, _, m in read_messages(bag, [topic])
+    }
+
+
+def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(world, tmp_path):
+    bags = [tmp_path / "first" / "bag", tmp_path / "second" / "bag"]
+    for bag in bags:
+        finished(demo(world, bag.parent, "paper.yaml"))
+    run = read_run(bags[0])
+    assert run.time[-1] >= 20.0
+    assert len(run.time) == round(run.time[-1] * 200) + 1  # not one is missing
+    assert np.sqrt(np.mean(run.distance**2)) <= 0.05e-3
+    assert run.distance.max() <= 0.15e-3
+    assert np.abs(run.side_slip).max() < 1e-9
+
+    def pose_and_twist(m):
+        pose, twist = m.pose.pose, m.twist.twist
+        return pose.position.x, pose.position.y, pose.orientation.z, twist.linear.x, twist.angular.z
+
+    for topic, content in {
+        "/odom": pose_and_twist,
+        "/wheel_torques": lambda m: list(m.effort),
+    }.items():
+        first, second = (by_stamp(bag, topic, content) for bag in bags)
+        common = sorted(first.keys() & second.keys())
+        assert len(common) >= 4000
+        assert all(first[stamp] == second[stamp] for stamp in common)
+
+
+def test_a_realistic_climber_goes_from_rest_to_rest(world, tmp_path):
+    finished(demo(world, tmp_path / "run", "climber.yaml"))
+    run = read_run(tmp_path / "run" / "bag")
+    assert np.abs(run.error[:, 1]).max() < 2e-3
+    assert run.time[-1] > 56
+    assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
+    assert run.distance[-1] < 5e-3
+
+
+def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
+    # the machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`
+    finished(demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6"))
+    run = read_run(tmp_path / "run" / "bag")
+    assert 5 < run.time[-1] < 10
+    assert run.distance.max() < 0.05
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_path, number):
+    process = demo(world, tmp_path / "run", "paper.yaml", start_new_session=True)
+    bag = tmp_path / "run" / "bag"
+    world.wait(lambda: process.stdout.read(1) == "×", "progress")
+    children = subprocess.check_output(["ps", "-o", "pid=", "--ppid", str(process.pid)], text=True)
+    os.killpg(process.pid, number)  # as Ctrl-C in a terminal does
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert "interrupted" in said
+    assert "Traceback" not in said
+    assert len(children.split()) >= 4
+    for child in children.split():
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(child), 0)
+    assert len(read_run(bag).time) > 10
+
+
+def test_what_a_demo_cannot_start_with_is_said_in_one_line(world, tmp_path):
+    process = demo(world, tmp_path / "run", "nothing.yaml")
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert said.startswith("run_demo: there is no file")
+    assert len(said.splitlines()) == 1

@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+from nav_msgs.msg import Path
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from climber_uk.mechanics.preview import joined
+from climber_uk.mechanics.shapes import Circle
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.messages import reading
+
+pytestmark = pytest.mark.nodes
+
+
+def start(world, *parameters):
+    world.start_node(
+        "trajectory_publisher", "shape:=circle", "rest_to_rest.ramp_time:=0.5", *parameters
+    )
+    return world.listen(MultiDOFJointTrajectory, "reference")
+
+
+def test_the_reference_starts_at_the_stamp_of_the_first_odometry(world):
+    references = start(world)
+    world.start_node("plant_simulator")
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    paths = []
+    world.node.create_subscription(Path, "reference_path", paths.append, latched)
+    world.wait(lambda: len(references) > 5, "previews")
+    world.wait(lambda: paths, "path")
+    begin = reading.nanoseconds(references[0].header.stamp)
+    whole = joined(reading.preview(message, "odom") for message in references)
+    trajectory = Trajectory(Circle(), RestToRest(ramp_time=0.5))
+    for time in whole.times:
+        expected = trajectory.at((time - begin) * 1e-9)
+        got = whole.at(int(time))
+        np.testing.assert_allclose(got.pose[:2], expected.pose[:2], atol=1e-12)
+        np.testing.assert_allclose(np.sin(got.heading - expected.heading), 0, atol=1e-12)
+        np.testing.assert_allclose(got.velocity, expected.velocity, atol=1e-12)
+        np.testing.assert_allclose(got.acceleration, expected.acceleration, atol=1e-9)
+    assert len(paths[0].poses) == 400
+
+
+def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(world):
+    references = start(world, "autostart:=false", "stop_time:=0.3")
+    world.start_node("plant_simulator")
+    stop = world.call(Trigger, "trajectory_publisher/stop", Trigger.Request())
+    assert (stop.success, stop.message) == (False, "not started")
+    assert not references
+    assert world.call(Trigger, "trajectory_publisher/start", Trigger.Request()).success
+    world.wait(lambda: len(references) > 8, "previews")
+    assert world.call(Trigger, "trajectory_publisher/stop", Trigger.Request()).success
+
+    def at_rest():
+        last = references[-1].points
+        return all(
+            point.velocities[0].linear.x == 0 == point.velocities[0].linear.y for point in last
+        )
+
+    world.wait(at_rest, "rest")
+    # nothing that was published before was taken back
+    points = {}
+    for message in references:
+        for point in message.points:
+            time = reading.nanoseconds(point.time_from_start)
+            assert points.setdefault(time, point) == point

@@ -1,0 +1,197 @@
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.shapes import Circle
+from climber_uk.mechanics.time_laws import ConstantRate
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.messages import reading, writing
+
+pytestmark = pytest.mark.nodes
+
+NAME = "uk_torque_controller"
+CIRCLE = Trajectory(Circle(), ConstantRate(rate=0.5))
+
+
+class Loop:
+    """What a robot and a planner would say, a step at a time, and what the controller answers."""
+
+    def __init__(self, world, *parameters):
+        self.world = world
+        world.start_node(NAME, *parameters)
+        self.torques = world.listen(JointState, "wheel_torques")
+        self.odometry = world.speak(Odometry, "odom")
+        self.reference = world.speak(MultiDOFJointTrajectory, "reference")
+        self.begin = self.now()
+
+    def now(self):
+        return self.world.node.get_clock().now().nanoseconds
+
+    def plan(self, seconds=60.0):
+        times = np.arange(0.0, seconds, 0.25)
+        points = [writing.reference_point(CIRCLE.at(time), time) for time in times]
+        self.reference.publish(writing.reference(points, self.begin, "odom", "base_link"))
+
+    def tell(self, spoil=lambda message: None, age=0):
+        stamp = self.now() - age
+        here = CIRCLE.at((stamp - self.begin) * 1e-9)
+        message = writing.odometry(State(here.pose, here.velocity), stamp, "odom", "base_link")
+        spoil(message)
+        self.odometry.publish(message)
+        return stamp
+
+    def until(self, condition, what, **how):
+        """Tell odometry again and again, as a robot does, until torques meet a condition."""
+
+        seen = len(self.torques)
+
+        def met():
+            self.tell(**how)
+            return any(condition(list(m.effort)) for m in self.torques[seen + 1 :])
+
+        self.world.wait(met, what)
+
+    def follows(self):
+        self.until(any, "torque of a controller that follows")
+
+    def is_safe(self, **how):
+        self.until(lambda effort: effort == [0.0, 0.0], "safe output", **how)
+
+
+def spoil_nan(message):
+    message.pose.pose.position.x = float("nan")
+
+
+def spoil_frame(message):
+    message.header.frame_id = "map"
+
+
+def spoil_child_frame(message):
+    message.child_frame_id = "base_footprint"
+
+
+def spoil_orientation(message):
+    message.pose.pose.orientation.w = 0.0
+    message.pose.pose.orientation.z = 0.0
+
+
+@pytest.mark.parametrize(
+    ("how", "said"),
+    [
+        ({"spoil": spoil_nan}, "is not finite"),
+        ({"spoil": spoil_frame}, "frame_id='map' must be 'odom'"),
+        ({"spoil": spoil_child_frame}, "child_frame_id='base_footprint' must be 'base_link'"),
+        ({"spoil": spoil_orientation}, "must be a unit turn about z"),
+        ({"age": 2_000_000_000}, "stamp is too far from the clock"),
+    ],
+    ids=["not finite", "wrong frame", "wrong child frame", "no orientation", "stale stamp"],
+)
+def test_bad_odometry_gets_the_safe_output_and_good_one_is_followed_again(world, how, said):
+    loop = Loop(world, "odometry_timeout:=1.0")
+    loop.plan()
+    loop.follows()
+    loop.is_safe(**how)
+    loop.follows()
+    world.wait(lambda: "safe output: ok again" in world.log(NAME), "word of the recovery")
+    assert world.log(NAME).count(said) == 1
+
+
+def test_odometry_that_stops_is_noticed_and_followed_when_it_comes_back(world):
+    loop = Loop(world)
+    loop.plan()
+    loop.follows()
+    world.wait(lambda: list(loop.torques[-1].effort) == [0.0, 0.0], "safe output")
+    world.wait(lambda: "safe output: no odometry" in world.log(NAME), "word of it")
+    loop.follows()
+
+
+def test_a_reference_that_is_missing_or_ends_gets_the_safe_output(world):
+    loop = Loop(world, "odometry_timeout:=1.0")
+    loop.is_safe()
+    world.wait(lambda: "safe output: no reference" in world.log(NAME), "word of it")
+    loop.plan(seconds=(loop.now() - loop.begin) * 1e-9 + 2.0)
+    loop.follows()
+    loop.is_safe()
+    world.wait(lambda: world.log(NAME).count("safe output: no reference") == 2, "word of it")
+
+
+def test_hold_carries_the_weight_in_place_of_zero_torque(world):
+    loop = Loop(world, "safe_output:=hold", "odometry_timeout:=1.0", "braking_rate:=0.0")
+    # the circle is travelled upwards at first: about 49 N of weight on two wheels of 0.027 m
+    loop.until(lambda effort: 0.1 < effort[0] == effort[1] < 0.663, "holding torque")
+
+
+def test_disabled_it_gives_the_safe_output_until_it_is_enabled(world):
+    loop = Loop(world, "odometry_timeout:=1.0")
+    status = world.listen(DiagnosticArray, "/diagnostics")
+    loop.plan()
+    loop.follows()
+    assert world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=False)).success
+    loop.is_safe()
+    world.wait(
+        lambda: status and "disabled" in status[-1].status[0].message, "word of it in diagnostics"
+    )
+    assert status[-1].status[0].level == DiagnosticStatus.ERROR
+    assert world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=True)).success
+    loop.follows()
+    world.wait(lambda: status[-1].status[0].level == DiagnosticStatus.OK, "all well")
+
+
+def test_a_reference_without_accelerations_is_refused_and_the_last_one_kept(world):
+    loop = Loop(world, "odometry_timeout:=1.0")
+    loop.plan()
+    loop.follows()
+    points = [writing.reference_point(CIRCLE.at(time), time) for time in (0.0, 1.0)]
+    message = writing.reference(points, loop.begin, "odom", "base_link")
+    message.points[1].accelerations = []
+    loop.reference.publish(message)
+    world.wait(lambda: "point 2 must have one" in world.log(NAME), "warning")
+    loop.follows()
+
+
+def set_parameter(world, name, value):
+    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+    request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
+    return world.call(SetParameters, f"{NAME}/set_parameters", request).results[0]
+
+
+def test_gains_change_while_running_but_not_geometry_and_not_beyond_bounds(world):
+    world.start_node(NAME)
+    assert set_parameter(world, "guidance.speed_rate", 20.0).successful
+    refused = set_parameter(world, "guidance.speed_rate", -1.0)
+    assert not refused.successful
+    assert "speed_rate" in refused.reason
+    assert not set_parameter(world, "wheel_radius", 0.05).successful
+
+
+def test_the_torques_answer_the_odometry_and_effort_commands_say_the_same(world):
+    loop = Loop(world, "effort_commands:=true", "effort_order:=right_left", "odometry_timeout:=1.0")
+    efforts = world.listen(Float64MultiArray, "effort_controller/commands")
+    loop.plan()
+    loop.follows()
+    world.wait(lambda: efforts, "effort commands")
+    stamps = {reading.nanoseconds(m.header.stamp): m for m in loop.torques}
+    told = loop.tell()
+    world.wait(lambda: reading.nanoseconds(loop.torques[-1].header.stamp) == told, "answer")
+    assert told not in stamps
+    left, right = loop.torques[-1].effort
+    assert list(loop.torques[-1].name) == ["left_wheel_joint", "right_wheel_joint"]
+    assert not loop.torques[-1].position
+    assert not loop.torques[-1].velocity
+    world.wait(lambda: list(efforts[-1].data) == [right, left], "the same torques")
+
+
+def test_a_second_climber_keeps_to_its_namespace(world):
+    world.start(NAME, "--ros-args", "-r", "__ns:=/second")
+    world.wait(lambda: world.node.count_publishers("/second/wheel_torques"), "namespaced topic")
+    names = {name for name, _ in world.node.get_topic_names_and_types()}
+    assert {"/second/odom", "/second/reference", f"/second/{NAME}/tracking_error"} <= names
+    assert not names & {"/odom", "/reference", "/wheel_torques"}

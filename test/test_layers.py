@@ -1,0 +1,56 @@
+"""Imports run downwards only, and ROS stays where the nodes are."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "climber_uk"
+BELOW = {
+    "mechanics": set(),
+    "control": {"mechanics"},
+    "simulation": {"mechanics"},
+    "messages": {"mechanics"},
+    "analysis": {"mechanics", "control", "simulation", "messages"},
+    "nodes": {"mechanics", "control", "simulation", "messages", "analysis"},
+}
+ROS_ALLOWED = {"nodes", "messages"}
+
+
+def imported(file):
+    """Modules that `file` imports when it runs; what is for type checkers only does not count."""
+    tree = ast.parse(file.read_text())
+    checked = [
+        n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.dump(n.test)
+    ]
+    skipped = {inner for outer in checked for inner in ast.walk(outer)}
+    for node in ast.walk(tree):
+        if node in skipped:
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def is_ros(module):
+    root = module.split(".")[0]
+    return root == "rclpy" or root.endswith(("_msgs", "_interfaces", "_srvs"))
+
+
+@pytest.mark.parametrize("file", sorted(PACKAGE.rglob("*/*.py")), ids=lambda file: file.stem)
+def test_imports_run_downwards(file):
+    room = file.relative_to(PACKAGE).parts[0]
+    modules = set(imported(file))
+    used = {m.split(".")[1] for m in modules if m.startswith("climber_uk.")} - {room}
+    assert used <= BELOW[room]
+    if room not in ROS_ALLOWED or file.stem == "reading":
+        assert not [m for m in modules if is_ros(m)]
+
+
+@pytest.mark.parametrize("file", sorted((PACKAGE / "nodes").glob("*.py")), ids=lambda f: f.stem)
+def test_nodes_do_not_import_nodes(file):
+    shared = {"climber_uk.nodes.running", "climber_uk.nodes.parameters"}
+    nodes = {m for m in imported(file) if m.startswith("climber_uk.nodes.")}
+    assert {m for m in nodes if m.count(".") == 2} <= shared
