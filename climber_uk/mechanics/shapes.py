@@ -31,19 +31,12 @@ class Shape(Protocol):
         """p, p', p'', p''' at s (...), each (..., 2); p' is never zero."""
 
 
-def _centre(axis: str) -> float:
-    centre: float = parameter(0.0, "m", f"{axis} of the shape's centre or start")
-    return centre
-
-
 @dataclass(frozen=True)
 class Ellipse:
     """p = (a sin s, b cos s): from the top, clockwise; the paper's path (21)."""
 
     semi_axis_x: float = parameter(10.0, "m", "semi-axis a along x", above=0)
     semi_axis_y: float = parameter(6.0, "m", "semi-axis b along y", above=0)
-    centre_x: float = _centre("x")
-    centre_y: float = _centre("y")
 
     closed: ClassVar[bool] = True
     length: ClassVar[float] = 2 * math.pi
@@ -56,7 +49,7 @@ class Ellipse:
         a, b = self.semi_axis_x, self.semi_axis_y
         p_1 = _points(a * np.cos(s), -b * np.sin(s))
         p_2 = _points(-a * np.sin(s), -b * np.cos(s))
-        return _points(self.centre_x, self.centre_y) - p_2, p_1, p_2, -p_1
+        return -p_2, p_1, p_2, -p_1
 
 
 @dataclass(frozen=True)
@@ -64,8 +57,6 @@ class Circle:
     """p = r (cos s, sin s): anticlockwise."""
 
     radius: float = parameter(1.0, "m", "radius", above=0)
-    centre_x: float = _centre("x")
-    centre_y: float = _centre("y")
 
     closed: ClassVar[bool] = True
     length: ClassVar[float] = 2 * math.pi
@@ -77,7 +68,7 @@ class Circle:
         """See `Shape`."""
         p = self.radius * _points(np.cos(s), np.sin(s))
         p_1 = self.radius * _points(-np.sin(s), np.cos(s))
-        return _points(self.centre_x, self.centre_y) + p, p_1, -p, -p_1
+        return p, p_1, -p, -p_1
 
 
 @dataclass(frozen=True)
@@ -86,8 +77,6 @@ class Lemniscate:
 
     half_width: float = parameter(1.0, "m", "extent a along x", above=0)
     half_height: float = parameter(0.5, "m", "extent b along y", above=0)
-    centre_x: float = _centre("x")
-    centre_y: float = _centre("y")
 
     closed: ClassVar[bool] = True
     length: ClassVar[float] = 2 * math.pi
@@ -99,7 +88,7 @@ class Lemniscate:
         """See `Shape`."""
         a, b = self.half_width, self.half_height
         return (
-            _points(self.centre_x + a * np.sin(s), self.centre_y + b * np.sin(2 * s)),
+            _points(a * np.sin(s), b * np.sin(2 * s)),
             _points(a * np.cos(s), 2 * b * np.cos(2 * s)),
             _points(-a * np.sin(s), -4 * b * np.sin(2 * s)),
             _points(-a * np.cos(s), -8 * b * np.cos(2 * s)),
@@ -112,8 +101,6 @@ class Line:
 
     length: float = parameter(1.0, "m", "length", above=0)
     direction: float = parameter(0.0, "rad", "angle α from x")
-    centre_x: float = _centre("x")
-    centre_y: float = _centre("y")
 
     closed: ClassVar[bool] = False
 
@@ -123,7 +110,7 @@ class Line:
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
         unit = np.array([math.cos(self.direction), math.sin(self.direction)])
-        p = _points(self.centre_x, self.centre_y) + s[..., None] * unit
+        p = s[..., None] * unit
         return p, unit + 0 * p, 0 * p, 0 * p
 
 
@@ -134,8 +121,6 @@ class SineWave:
     length: float = parameter(2.0, "m", "extent along x", above=0)
     amplitude: float = parameter(0.2, "m", "amplitude A")
     wavelength: float = parameter(1.0, "m", "wavelength λ", above=0)
-    centre_x: float = _centre("x")
-    centre_y: float = _centre("y")
 
     closed: ClassVar[bool] = False
 
@@ -146,7 +131,7 @@ class SineWave:
         """See `Shape`."""
         A, n = self.amplitude, 2 * math.pi / self.wavelength
         return (
-            _points(self.centre_x + s, self.centre_y + A * np.sin(n * s)),
+            _points(s, A * np.sin(n * s)),
             _points(1 + 0 * s, A * n * np.cos(n * s)),
             _points(0 * s, -A * n**2 * np.sin(n * s)),
             _points(0 * s, -A * n**3 * np.cos(n * s)),

@@ -61,6 +61,7 @@ class Trajectory:
     shape: Shape
     law: TimeLaw
     reverse_gear: bool = False
+    origin: tuple[float, float] = (0.0, 0.0)  # [m] of the shape, in the wall's frame
 
     def __post_init__(self) -> None:
         if not self.shape.closed and isinstance(self.law, ConstantRate):
@@ -96,7 +97,7 @@ class Trajectory:
         yaw_rate = turning * s_1
         yaw_acceleration = turning_rate * s_1**2 + turning * s_2
         return Reference(
-            pose=np.concatenate([position, heading], axis=-1),
+            pose=np.concatenate([position + self.origin, heading], axis=-1),
             velocity=np.concatenate([velocity, yaw_rate], axis=-1),
             acceleration=np.concatenate([acceleration, yaw_acceleration], axis=-1),
             jerk=jerk,

@@ -1,7 +1,7 @@
 """Publishes where the climber should be: a short preview of a trajectory, again and again."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from nav_msgs.msg import Odometry, Path
 from rclpy.subscription import Subscription
@@ -24,6 +24,8 @@ class Options:
     shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
     time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=tuple(TIME_LAWS))
     reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
+    origin_x: float = parameter(0.0, "m", "x of the shape's origin")
+    origin_y: float = parameter(0.0, "m", "y of the shape's origin")
     autostart: bool = parameter(True, "", "start at the first odometry, not at ~/start")
     start_delay: float = parameter(0.0, "s", "from that odometry to the start", at_least=0)
     preview: float = parameter(1.0, "s", "how far ahead is published", above=0)
@@ -54,6 +56,7 @@ class TrajectoryPublisher(ClimberNode):
             shape=self.parameters.read(SHAPES[shape], f"{shape}."),
             law=self.parameters.read(TIME_LAWS[law], f"{law}."),
             reverse_gear=self.options.reverse_gear,
+            origin=(self.options.origin_x, self.options.origin_y),
         )
         self.trajectory = self.planned
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
@@ -82,7 +85,7 @@ class TrajectoryPublisher(ClimberNode):
             return response
         start = self.next_point * self.options.point_period
         law = Stopping(self.trajectory.law, start, self.options.stop_time)
-        self.trajectory = Trajectory(self.planned.shape, law, self.planned.reverse_gear)
+        self.trajectory = replace(self.planned, law=law)
         response.success, response.message = True, f"comes to rest from {start:.2f} s on"
         self.get_logger().info(response.message)
         return response

@@ -145,3 +145,11 @@ def test_a_bad_waypoint_file_is_named_with_what_is_wrong(tmp_path, content, wron
 def test_an_open_shape_refuses_a_law_that_would_run_off_it():
     with pytest.raises(ValueError, match="rest_to_rest"):
         Trajectory(Line(), ConstantRate())
+
+
+def test_the_origin_moves_the_path_and_nothing_else():
+    law = RestToRest()
+    here, there = Trajectory(Circle(), law), Trajectory(Circle(), law, origin=(2.0, -3.0))
+    np.testing.assert_allclose(there.at(1.0).pose - here.at(1.0).pose, [2, -3, 0])
+    np.testing.assert_array_equal(there.at(1.0).velocity, here.at(1.0).velocity)
+    np.testing.assert_allclose(there.path(5)[0], [3, -3, math.pi / 2])

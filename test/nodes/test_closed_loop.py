@@ -6,6 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from world import CONFIG, executable
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.recorded_run import read_run
@@ -15,8 +16,6 @@ pytestmark = pytest.mark.nodes
 
 
 def demo(world, output, config, *arguments, **how):
-    from conftest import CONFIG, executable
-
     return subprocess.Popen(
         [executable("run_demo"), "--config", CONFIG / config, "--output", output, *arguments],
         env=world.environment,

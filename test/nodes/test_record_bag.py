@@ -1,4 +1,3 @@
-import itertools
 import os
 import random
 import signal
@@ -24,6 +23,7 @@ from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, Int64, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from world import new_domain
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.nodes.record_bag import is_compatible, request_for
@@ -33,7 +33,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning"
 
 ROOT = Path(__file__).parents[2]
 STORAGES = ["mcap", "sqlite3"]
-DOMAINS = itertools.count(150)
 ENVIRONMENT = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     "ROS_PYTHON_CHECK_FIELDS": "1",
@@ -101,7 +100,7 @@ class Graph:
 
     def __init__(self, directory):
         self.directory = directory
-        self.domain = next(DOMAINS)
+        self.domain = new_domain()
         self.context = Context()
         rclpy.init(context=self.context, domain_id=self.domain)
         self.node = Node("test", context=self.context, enable_rosout=False)
@@ -340,7 +339,7 @@ def run_record_bag(*options):
     return subprocess.run(
         command,
         cwd=ROOT,
-        env=os.environ | ENVIRONMENT | {"ROS_DOMAIN_ID": str(next(DOMAINS))},
+        env=os.environ | ENVIRONMENT | {"ROS_DOMAIN_ID": str(new_domain())},
         capture_output=True,
         text=True,
         timeout=TIMEOUT,

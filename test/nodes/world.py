@@ -1,0 +1,118 @@
+"""Real nodes in processes of their own, each test in a ROS domain of its own."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import rclpy
+from ament_index_python import PackageNotFoundError, get_package_prefix
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+TIMEOUT = 60.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
+CONFIG = Path(__file__).parents[2] / "config"
+# above 101, ports may be taken by others; two test runs at a time should not meet
+DOMAINS = itertools.count(os.getpid())
+
+
+def new_domain():
+    """Return a ROS domain that no other test of this run has."""
+    return next(DOMAINS) % 100 + 1
+
+
+def executable(name):
+    """Where `ros2 run` finds an executable after colcon, else beside this Python."""
+    try:
+        return Path(get_package_prefix("climber_uk")) / "lib" / "climber_uk" / name
+    except (PackageNotFoundError, OSError):  # OSError: there is no installation at all
+        return Path(sys.executable).parent / name
+
+
+class World:
+    """One ROS domain with the processes started in it, and a node of the test's own."""
+
+    def __init__(self, directory):
+        self.domain = new_domain()
+        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain)}
+        self.directory = directory
+        self.processes = {}
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=self.domain)
+        self.node = Node("test", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def start(self, name, *arguments):
+        """Start an executable of the package; its output is `log(name)`."""
+        with (self.directory / f"{name}.log").open("wb") as log:
+            self.processes[name] = subprocess.Popen(
+                [executable(name), *arguments],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=self.environment,
+            )
+        return self.processes[name]
+
+    def start_node(self, name, *parameters, config=None):
+        """Start a node with parameters given as name:=value."""
+        file = ["--params-file", str(CONFIG / config)] if config else []
+        given = [part for parameter in parameters for part in ("-p", parameter)]
+        return self.start(name, "--ros-args", *file, *given)
+
+    def log(self, name):
+        return (self.directory / f"{name}.log").read_text()
+
+    def wait(self, condition, what):
+        """Spin until `condition()` holds, and return what it gave."""
+        deadline = time.monotonic() + TIMEOUT
+        while not (value := condition()):
+            self.executor.spin_once(timeout_sec=0.02)
+            for name, process in self.processes.items():
+                assert process.poll() in (None, 0), f"{name} failed:\n{self.log(name)}"
+            if time.monotonic() > deadline:
+                logs = "\n".join(f"{name}:\n{self.log(name)}" for name in self.processes)
+                raise AssertionError(f"no {what} within {TIMEOUT} s\n{logs}")
+        return value
+
+    def listen(self, kind, topic):
+        """List that fills with the messages of a topic, once there is a publisher."""
+        received = []
+        self.node.create_subscription(kind, topic, received.append, 100)
+        self.wait(lambda: self.node.count_publishers(topic), f"publisher of {topic}")
+        return received
+
+    def speak(self, kind, topic):
+        """Publisher of a topic that somebody listens to."""
+        publisher = self.node.create_publisher(kind, topic, 10)
+        self.wait(publisher.get_subscription_count, f"subscriber of {topic}")
+        return publisher
+
+    def call(self, kind, service, request):
+        """Response of a service."""
+        client = self.node.create_client(kind, service)
+        self.wait(client.service_is_ready, f"service {service}")
+        future = client.call_async(request)
+        self.wait(future.done, f"response of {service}")
+        return future.result()
+
+    def end(self, name, number=signal.SIGTERM):
+        """End a process and return its exit status."""
+        process = self.processes.pop(name)
+        if process.poll() is None:
+            process.send_signal(number)
+        try:
+            return process.wait(TIMEOUT)
+        finally:
+            process.kill()
+
+    def close(self):
+        for name in list(self.processes):
+            self.end(name)
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
