@@ -105,19 +105,17 @@ def run(make_node: Callable[[], Node]) -> None:
     ends in rclpy 7.1, and it sees signals only between callbacks, hence the idle timer.
     """
     node = None
+    end = Future()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: end.set_result(None))
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
         node.create_timer(SIGNAL_PERIOD, lambda: None, clock=WALL_CLOCK)
-        end = Future()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: end.set_result(None))
         executor = EventsExecutor()
         executor.add_node(node)
         while not end.done():
             executor.spin_until_future_complete(end, timeout_sec=3600.0)
-    except KeyboardInterrupt:
-        pass
     except (ValueError, RCLError) as error:
         if node is not None:
             raise
