@@ -7,6 +7,7 @@ trajectory agree to the last bit.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,31 +35,39 @@ class Preview:
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} of a point is not finite")
 
+    @cached_property
+    def _pieces(self) -> tuple[Array, Array]:
+        """Lengths h (n-1,) [s] and coefficients (n-1, 6, 3) of 1, u … u⁵, u from 0 to 1."""
+        h = np.diff(self.times)[:, None] * 1e-9
+        way = np.diff(self.pose, axis=0)
+        way[:, 2] = np.mod(way[:, 2] + np.pi, 2 * np.pi) - np.pi
+        v, v_end = self.velocity[:-1] * h, self.velocity[1:] * h
+        a, a_end = self.acceleration[:-1] * h**2, self.acceleration[1:] * h**2
+        # what is left to reach at the end by u³, u⁴ and u⁵
+        p_left, v_left, a_left = way - v - a / 2, v_end - v - a, a_end - a
+        c_3 = 10 * p_left - 4 * v_left + a_left / 2
+        c_4 = -15 * p_left + 7 * v_left - a_left
+        c_5 = 6 * p_left - 3 * v_left + a_left / 2
+        return h[:, 0], np.stack([self.pose[:-1], v, a / 2, c_3, c_4, c_5], axis=1)
+
     def at(self, time: int) -> Reference | None:
         """Reference at `time` [ns]; None outside of the points."""
         if not self.times[0] <= time <= self.times[-1]:
             return None
         i = min(int(np.searchsorted(self.times, time, side="right")), len(self.times) - 1) - 1
-        h = float(self.times[i + 1] - self.times[i]) * 1e-9
+        lengths, coefficients = self._pieces
+        h = float(lengths[i])
         u = float(time - self.times[i]) * 1e-9 / h
-
-        p, p_end = self.pose[i], self.pose[i + 1]
-        v, a = self.velocity[i] * h, self.acceleration[i] * h**2
-        way = p_end - p
-        way[2] = np.mod(way[2] + np.pi, 2 * np.pi) - np.pi
-        p_left = way - v - a / 2
-        v_left = self.velocity[i + 1] * h - v - a
-        a_left = self.acceleration[i + 1] * h**2 - a
-        c_3 = 10 * p_left - 4 * v_left + a_left / 2
-        c_4 = -15 * p_left + 7 * v_left - a_left
-        c_5 = 6 * p_left - 3 * v_left + a_left / 2
-        jerk = (6 * c_3 + u * (24 * c_4 + u * 60 * c_5)) / h**3
-        return Reference(
-            pose=p + u * (v + u * (a / 2 + u * (c_3 + u * (c_4 + u * c_5)))),
-            velocity=(v + u * (a + u * (3 * c_3 + u * (4 * c_4 + u * 5 * c_5)))) / h,
-            acceleration=(a + u * (6 * c_3 + u * (12 * c_4 + u * 20 * c_5))) / h**2,
-            jerk=jerk[:2],
+        basis = np.array(
+            [
+                [1, u, u**2, u**3, u**4, u**5],
+                [0, 1 / h, 2 * u / h, 3 * u**2 / h, 4 * u**3 / h, 5 * u**4 / h],
+                [0, 0, 2 / h**2, 6 * u / h**2, 12 * u**2 / h**2, 20 * u**3 / h**2],
+                [0, 0, 0, 6 / h**3, 24 * u / h**3, 60 * u**2 / h**3],
+            ]
         )
+        pose, velocity, acceleration, jerk = basis @ coefficients[i]
+        return Reference(pose, velocity, acceleration, jerk[:2])
 
 
 def joined(previews: Iterable[Preview]) -> Preview:
