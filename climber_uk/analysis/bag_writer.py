@@ -67,7 +67,12 @@ class BagWriter:
         # The metadata go first: rosbags does not read a topic they do not name, while a count
         # that is too high by the messages of one flush misleads nobody.
         self._write_metadata()
-        self._storage.write(messages)
+        try:
+            self._storage.write(messages)
+        except OSError:
+            for _, _, topic_id, _ in messages:
+                self._counts[topic_id] -= 1
+            raise
 
     def close(self) -> None:
         """Store all messages taken and finish the bag."""

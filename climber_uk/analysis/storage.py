@@ -134,6 +134,7 @@ class _EndedStream:
         DataEnd(0).write(builder)
         Footer(0, 0, 0).write(builder)
         self._ending = cast(bytes, builder.end()) + MCAP0_MAGIC  # type: ignore[no-untyped-call]
+        self._path = path
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         self._written = 0
         self._pending = bytearray()
@@ -161,9 +162,10 @@ class _EndedStream:
         try:
             while done < len(data):
                 done += os.pwrite(self._file, memoryview(data)[done:], self._written + done)
-        except OSError:  # the disk is full, but there is room where the last ending was
+        except OSError as error:  # a full disk, but there is room where the last ending was
             os.ftruncate(self._file, self._written)
             os.pwrite(self._file, self._ending, self._written)
+            error.filename = str(self._path)
             raise
 
 

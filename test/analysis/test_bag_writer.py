@@ -1,7 +1,10 @@
 import errno
 import os
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 import yaml
@@ -21,6 +24,7 @@ from rosbags.typesys import Stores, get_typestore
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.bag_writer import BagWriter
 
+ROOT = Path(__file__).parents[2]
 STORE = get_typestore(Stores.ROS2_JAZZY)
 STORAGES = ["mcap", "sqlite3"]
 STRING, PATH = "std_msgs/msg/String", "nav_msgs/msg/Path"
@@ -92,6 +96,7 @@ def test_metadata_equal_those_that_rosbags_writes(tmp_path, storage):
     ours, theirs = write_both(tmp_path, storage)
 
     assert metadata(ours) == metadata(theirs)
+    assert "&" not in (ours.parent / "metadata.yaml").read_text(), "equal parts are written out"
 
 
 def test_a_database_equals_the_one_that_rosbags_writes(tmp_path):
@@ -215,13 +220,35 @@ def test_a_full_disk_leaves_an_mcap_file_that_opens(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "pwrite", write_until_full)
     writer.write("/words", 2, 2, text("lost" * 2000))
 
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match=r"No space left on device: '.*/bag_0\.mcap'$"):
         writer.flush()
     with pytest.raises(OSError, match="No space left"):
         writer.close()
 
+    assert writer.message_count == 1
     with AnyReader([tmp_path / "bag"]) as reader:
         assert [time for _, time, _ in reader.messages()] == [1]
+        assert reader.message_count == 1
+
+
+def test_a_full_disk_leaves_a_database_that_opens(tmp_path):
+    script = """
+import resource, sys
+from pathlib import Path
+from climber_uk.analysis.bag_writer import BagWriter
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+with BagWriter(Path(sys.argv[1]), "sqlite3") as writer:
+    writer.add_topic("/words", "std_msgs/msg/String", [])
+    writer.write("/words", 1, 1, bytes.fromhex("00010000 02000000 6100"))
+    writer.flush()
+    writer.write("/words", 2, 2, bytes(200_000))
+"""
+    command = [sys.executable, "-c", script, str(tmp_path / "bag")]
+
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+    assert result.stderr.splitlines()[-1].startswith(f"OSError: {tmp_path}/bag/bag_0.db3: ")
+    assert [message.data for _, _, message in read_messages(tmp_path / "bag")] == ["a"]
 
 
 def test_an_existing_directory_is_refused(tmp_path):
