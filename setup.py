@@ -20,7 +20,7 @@ setup(
         # rclpy and the messages, where no ROS installation brings them
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
-        "analysis": ["rosbags>=0.11", "mcap>=1.2", "matplotlib"],
+        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib"],
         "test": ["pytest<9", "pytest-timeout", "hypothesis"],
     },
     zip_safe=False,
