@@ -12,6 +12,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import State, across, along, no_slip
+from climber_uk.mechanics.elementary import arctan, cos, select, sin, sqrt, wrapped
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.trajectory import Reference
 
@@ -42,8 +43,7 @@ def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Arr
     Along and across are those of the reference's heading; the heading error is in [-π, π).
     """
     heading, offset = reference.heading, pose - reference.pose
-    turned = np.mod(unpack(offset)[2] + np.pi, 2 * np.pi) - np.pi
-    return along(heading, offset), across(heading, offset), turned
+    return along(heading, offset), across(heading, offset), wrapped(unpack(offset)[2])
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Guidance:
         omega_d, omega_d1 = reference.yaw_rate, unpack(reference.acceleration)[2]
 
         e_x, e_y, turned = tracking_error(state.pose, reference)
-        cosine, sine = np.cos(turned), np.sin(turned)
+        cosine, sine = cos(turned), sin(turned)
         e_x1 = v * cosine - v_d + omega_d * e_y
         e_y1 = v * sine - omega_d * e_x
 
@@ -89,7 +89,7 @@ class Guidance:
         w_1 = g_1 * e_y + g * e_y1
         w_2 = g_2 * e_y + 2 * g_1 * e_y1 + g * e_y2
         slope = 1 / (1 + w**2)
-        led = turned + np.arctan(w)  # heading minus the one that leads back
+        led = turned + arctan(w)  # heading minus the one that leads back
         led_1 = omega - omega_d + slope * w_1
         led_2 = slope * w_2 - 2 * w * (slope * w_1) ** 2
 
@@ -99,7 +99,7 @@ class Guidance:
     def _steering_gain(self, v: Array, v_1: Array, v_2: Array) -> tuple[Array, Array, Array]:
         """g(v) = k_y v / √(v² + v_s²) and its first two derivatives by time."""
         square = self.fade_speed**2
-        root = np.sqrt(v**2 + square)
+        root = sqrt(v**2 + square)
         slope = square / root**3
         curvature = -3 * v * slope / root**2
         k_y = self.cross_track_gain
@@ -138,14 +138,14 @@ class Exact:
 
         # what p̈ will be: u along the heading, and the centripetal v ω across it
         v_1, centripetal = along(heading, u), v * omega
-        cosine, sine = np.cos(heading), np.sin(heading)
+        cosine, sine = cos(heading), sin(heading)
         p_2 = pack(v_1 * cosine - centripetal * sine, v_1 * sine + centripetal * cosine)
         u_1 = reference.jerk + K_d * (p_d2 - p_2) + K_p * e_1
 
         phi = centripetal - across(heading, u)
         turning = -2 * v_1 * omega + across(heading, u_1) - self.hidden_rate * phi
-        at_rest = np.abs(v) < REST_SPEED
-        return v_1, np.where(at_rest, 0.0, turning / np.where(at_rest, 1.0, v))
+        at_rest = abs(v) < REST_SPEED
+        return v_1, select(at_rest, 0.0, turning / select(at_rest, 1.0, v))
 
 
 CONSTRAINTS: dict[str, type[Guidance] | type[Exact]] = {"guidance": Guidance, "exact": Exact}

@@ -12,6 +12,7 @@ import numpy as np
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.elementary import clipped, cos, select, sign, sin, tanh
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.trajectory import Reference
 
@@ -86,12 +87,12 @@ class Controller:
 
     def _law(self, state: State, reference: Reference) -> Command:
         climber, heading = self.climber, state.heading
-        direction = np.tanh(self.constraints.speed(state, reference) / self.friction_speed)
+        direction = tanh(self.constraints.speed(state, reference) / self.friction_speed)
         v_1, turning = self.constraints.demand(state, reference)
         weight = climber.weight_along_wall
         # M Aᵀ b - Q in the climber's frame: forward, to the left, about z
-        drive = climber.mass * v_1 + climber.seal_friction * direction + weight * np.sin(heading)
-        lateral = climber.mass * state.forward_speed * state.yaw_rate + weight * np.cos(heading)
+        drive = climber.mass * v_1 + climber.seal_friction * direction + weight * sin(heading)
+        lateral = climber.mass * state.forward_speed * state.yaw_rate + weight * cos(heading)
         turn = climber.yaw_inertia * turning
         wanted = climber.wheel_torques(drive, turn)
         torques = limited(wanted, climber.max_wheel_torque)
@@ -106,10 +107,10 @@ class Controller:
         if h == 0:
             return state
         drive, _ = self.climber.drive_and_turn(torques)
-        push = drive - self.climber.weight_along_wall * np.sin(state.heading)
-        held = _clipped(push / max(self.climber.seal_friction, 1e-9), 1)
+        push = drive - self.climber.weight_along_wall * sin(state.heading)
+        held = clipped(push / max(self.climber.seal_friction, 1e-9), 1)
         speed = state.forward_speed
-        direction = np.where(np.abs(speed) > self.friction_speed, np.sign(speed), held)
+        direction = select(abs(speed) > self.friction_speed, sign(speed), held)
         acceleration = self.climber.rolling_acceleration(state, torques, direction)
         return State(
             state.pose + h * state.velocity + h**2 / 2 * acceleration,
@@ -119,7 +120,7 @@ class Controller:
     def holding(self, state: State, braking_rate: float) -> Array:
         """Torques (..., 2) that carry the weight and brake what moves, at `braking_rate` [1/s]."""
         climber = self.climber
-        weight = climber.weight_along_wall * np.sin(state.heading)
+        weight = climber.weight_along_wall * sin(state.heading)
         drive = weight - climber.mass * braking_rate * state.forward_speed
         turn = -climber.yaw_inertia * braking_rate * state.yaw_rate
         return limited(climber.wheel_torques(drive, turn), climber.max_wheel_torque)
@@ -128,10 +129,6 @@ class Controller:
 def limited(torques: Array, limit: float) -> Array:
     """Torques (..., 2) within ±`limit` [N m], turning served before driving."""
     right, left = unpack(torques)
-    turn = _clipped((right - left) / 2, limit)
-    drive = _clipped((right + left) / 2, limit - np.abs(turn))
+    turn = clipped((right - left) / 2, limit)
+    drive = clipped((right + left) / 2, limit - abs(turn))
     return pack(drive + turn, drive - turn)
-
-
-def _clipped(value: Array, limit: Array | float) -> Array:
-    return np.maximum(-limit, np.minimum(value, limit))

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
+from climber_uk.mechanics.elementary import cos, sin
 from climber_uk.mechanics.parameter import check, parameter
 
 GRAVITY = 9.81  # [m/s²]
@@ -27,7 +28,7 @@ class State:
     def rolling(cls, pose: Array, speed: Array | float, yaw_rate: Array | float) -> "State":
         """State at `pose` (..., 3) that moves along its heading (17)."""
         heading = unpack(pose)[2]
-        return cls(pose, pack(speed * np.cos(heading), speed * np.sin(heading), yaw_rate))
+        return cls(pose, pack(speed * cos(heading), speed * sin(heading), yaw_rate))
 
     @cached_property
     def heading(self) -> Array:
@@ -101,12 +102,12 @@ class Climber:
         `direction` (...) is 1 forwards, -1 backwards, 0 where no friction acts.
         """
         friction, weight = -self.seal_friction * direction, self.weight_along_wall
-        return pack(friction * np.cos(heading), friction * np.sin(heading) - weight, 0 * heading)
+        return pack(friction * cos(heading), friction * sin(heading) - weight, 0 * heading)
 
     def wheel_force(self, heading: Array, torques: Array) -> Array:
         """E(θ) τ: what the wheel torques (right, left) do to the climber, (..., 3) [N, N m]."""
         drive, turn = self.drive_and_turn(torques)
-        return pack(drive * np.cos(heading), drive * np.sin(heading), turn)
+        return pack(drive * cos(heading), drive * sin(heading), turn)
 
     def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:
         """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
@@ -133,7 +134,7 @@ class Climber:
         """
         heading, v, omega = state.heading, state.forward_speed, state.yaw_rate
         drive, turn = self.drive_and_turn(torques)
-        cosine, sine = np.cos(heading), np.sin(heading)
+        cosine, sine = cos(heading), sin(heading)
         force = drive - self.seal_friction * direction - self.weight_along_wall * sine
         v_1 = force / self.mass
         return pack(
@@ -146,17 +147,17 @@ class Climber:
 def along(heading: Array, vector: Array) -> Array:
     """Forward component, (...), of a vector (..., 2 or 3) given in the wall's frame."""
     x, y, *_ = unpack(vector)
-    return x * np.cos(heading) + y * np.sin(heading)
+    return x * cos(heading) + y * sin(heading)
 
 
 def across(heading: Array, vector: Array) -> Array:
     """Component to the left, (...), of a vector (..., 2 or 3) given in the wall's frame."""
     x, y, *_ = unpack(vector)
-    return y * np.cos(heading) - x * np.sin(heading)
+    return y * cos(heading) - x * sin(heading)
 
 
 def no_slip(state: State) -> tuple[Array, Array]:
     """Row A = [sinθ -cosθ 0] (..., 3) and b = -ω (ẋ cosθ + ẏ sinθ) (...) of (18)."""
     heading = state.heading
-    row = pack(np.sin(heading), -np.cos(heading), 0 * heading)
+    row = pack(sin(heading), -cos(heading), 0 * heading)
     return row, -state.yaw_rate * state.forward_speed

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, unpack
 from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.elementary import cos, sin
 
 # More changes between sticking and sliding than this within one step are not followed.
 MAX_CHANGES_IN_A_STEP = 8
@@ -71,7 +72,7 @@ class Plant:
     def _push(self, y: Array, torques: Array) -> float:
         """Force along the climber that friction is up against [N]."""
         drive, _ = self.climber.drive_and_turn(torques)
-        return float(drive - self.climber.weight_along_wall * np.sin(y[2]))
+        return float(drive - self.climber.weight_along_wall * sin(float(y[2])))
 
     def _until_change(
         self, y: Array, torques: Array, direction: float, step: float
@@ -103,8 +104,8 @@ class Plant:
         While friction holds the climber, [cosθ sinθ 0] is a second such row with b_q = b = 0.
         """
         climber = self.climber
-        _, _, heading, v_x, v_y, yaw_rate = y
-        cosine, sine = np.cos(heading), np.sin(heading)
+        _, _, heading, v_x, v_y, yaw_rate = unpack(y)
+        cosine, sine = cos(heading), sin(heading)
         drive, turn = climber.drive_and_turn(torques)
         yaw_acceleration = turn / climber.yaw_inertia
         if direction == 0:
@@ -127,4 +128,5 @@ class Plant:
 
 
 def _forward_speed(y: Array) -> float:
-    return float(y[3] * np.cos(y[2]) + y[4] * np.sin(y[2]))
+    _, _, heading, v_x, v_y, _ = unpack(y)
+    return float(v_x * cos(heading) + v_y * sin(heading))
