@@ -7,8 +7,6 @@ torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import Climber, State

@@ -103,8 +103,9 @@ class UkTorqueController(ClimberNode):
     def on_odometry(self, message: Odometry) -> None:
         """Answer an odometry, or keep it until there is a reference to answer it with."""
         stamp = reading.nanoseconds(message.header.stamp)
-        if stamp == self.stamp and self.answer is not None and not self.fault:
-            self.torques.publish(self.answer)  # asked again: the first answer was not received
+        asked_again = stamp == self.stamp and self.waiting_since is None and not self.fault
+        if asked_again and self.answer is not None:  # it was not received: the same once more
+            self.torques.publish(self.answer)
             return
         now, timeout = self.get_clock().now().nanoseconds, self.options.odometry_timeout * SECOND
         try:
