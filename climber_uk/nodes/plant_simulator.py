@@ -180,8 +180,10 @@ class PlantSimulator(ClimberNode):
         return np.zeros(2) if stale else self.commands[0][1]
 
     def publish_state(self) -> None:
-        """Publish all that a robot would tell, the odometry last."""
+        """Publish all that a robot would tell, the odometry first: it is waited for."""
         names, stamp = self.names, writing.time(self.stamp)
+        odometry = writing.odometry(self.state, self.stamp, names.odom_frame, names.base_frame)
+        self.odometry.publish(odometry)
         if self.options.simulated_time:
             self.clock.publish(ClockMessage(clock=stamp))
         joints = writing.wheel_torques(
@@ -190,14 +192,12 @@ class PlantSimulator(ClimberNode):
         joints.position = self.angles[::-1].tolist()
         joints.velocity = self.plant.climber.wheel_rates(self.state)[::-1].tolist()
         self.joints.publish(joints)
-        odometry = writing.odometry(self.state, self.stamp, names.odom_frame, names.base_frame)
         if self.transform is not None:
             self.transform.publish(TFMessage(transforms=[writing.transform(odometry)]))
         if self.stamp % PRESSURE_PERIOD < self.period:
             pressure = FluidPressure(fluid_pressure=self.plant.climber.suction_pressure)
             pressure.header.stamp = stamp
             self.pressure.publish(pressure)
-        self.odometry.publish(odometry)
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
