@@ -33,7 +33,7 @@ def test_in_simulated_time_it_steps_once_for_each_torque_that_answers_it(world):
         answers.publish(torques(1.0, 1.2, now))
     states = {stamp(m): m for m in odometry}
     assert len(states) >= 5
-    assert {reading.nanoseconds(m.clock) for m in clock} >= set(states)
+    world.wait(lambda: {reading.nanoseconds(m.clock) for m in clock} >= set(states), "clock")
     wrenched = states[1_000_000_000 + 4 * 5_000_000]
     # (τR - τL) d / (r J) for 20 ms
     turning = -0.2 * 0.3 / 0.027 / 0.33
