@@ -5,15 +5,19 @@ PYTHON ?= python3
 CONFIG ?= config/paper.yaml
 CLOCK ?= sim
 OUTPUT ?= demo_output/$(basename $(notdir $(CONFIG)))-$(CLOCK)-$(shell date +%Y%m%d-%H%M%S)
+PAPER_OUTPUT ?= demo_output/paper
 VENV := .venv
 BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 
-.PHONY: demo test lint unit colcon clean
+.PHONY: demo paper test lint unit colcon clean
 
 demo: $(SET_UP)
 	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT)
 	@$(BIN)/analyze_bag $(OUTPUT)/bag --figures $(OUTPUT)/figures
+
+paper: $(SET_UP)
+	@$(BIN)/reproduce_paper --output $(PAPER_OUTPUT)
 
 test: lint unit colcon
 

@@ -38,6 +38,7 @@ setup(
                 "record_bag": "nodes.record_bag",
                 "run_demo": "nodes.run_demo",
                 "analyze_bag": "analysis.analyze_bag",
+                "reproduce_paper": "analysis.reproduce_paper",
             }.items()
         ]
     },
