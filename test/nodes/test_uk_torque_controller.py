@@ -191,7 +191,10 @@ def test_the_torques_answer_the_odometry_and_effort_commands_say_the_same(world)
 
 def test_a_second_climber_keeps_to_its_namespace(world):
     world.start(NAME, "--ros-args", "-r", "__ns:=/second")
-    world.wait(lambda: world.node.count_publishers("/second/wheel_torques"), "namespaced topic")
-    names = {name for name, _ in world.node.get_topic_names_and_types()}
-    assert {"/second/odom", "/second/reference", f"/second/{NAME}/tracking_error"} <= names
-    assert not names & {"/odom", "/reference", "/wheel_torques"}
+    wanted = {"/second/odom", "/second/reference", f"/second/{NAME}/tracking_error"}
+
+    def names():
+        return {name for name, _ in world.node.get_topic_names_and_types()}
+
+    world.wait(lambda: wanted <= names(), "topics of the namespace")
+    assert not names() & {"/odom", "/reference", "/wheel_torques"}
