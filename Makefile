@@ -27,7 +27,7 @@ lint: $(SET_UP)
 	$(BIN)/mypy
 
 unit: $(SET_UP)
-	$(BIN)/python -m pytest -m "not soak"
+	$(BIN)/python -m pytest
 
 # As in a ROS workspace, the tests of the mathematics and of what was installed
 colcon: $(SET_UP)
@@ -36,7 +36,7 @@ colcon: $(SET_UP)
 		--event-handlers console_cohesion+
 	. $(BIN)/activate && . install/setup.sh && colcon test --packages-select climber_uk \
 		--event-handlers console_cohesion+ --return-code-on-test-failure \
-		--pytest-args -m "installed or not (soak or nodes)"
+		--pytest-args -m "installed or not nodes"
 	. $(BIN)/activate && colcon test-result --all
 	rm -rf build install log
 

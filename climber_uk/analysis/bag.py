@@ -108,7 +108,7 @@ def _mend_mcap(torn: Path, mended: Path) -> None:
                         record.publish_time,
                         record.sequence,
                     )
-        writer.finish()  # type: ignore[no-untyped-call]
+        writer.finish()
 
 
 def _whole_records(source: BinaryIO) -> Iterator[McapRecord]:

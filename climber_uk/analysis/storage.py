@@ -111,12 +111,12 @@ class Mcap:
         """Append the messages as chunks."""
         for log_time, publish_time, topic_id, data in messages:
             self._writer.add_message(topic_id, log_time, data, publish_time)
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._writer.flush()
 
     def close(self, metadata: str) -> None:
         """Append metadata and summary."""
         self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata})
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         self._stream.close()
 
 
@@ -133,7 +133,7 @@ class _EndedStream:
         builder = RecordBuilder()
         DataEnd(0).write(builder)
         Footer(0, 0, 0).write(builder)
-        self._ending = cast(bytes, builder.end()) + MCAP0_MAGIC  # type: ignore[no-untyped-call]
+        self._ending = cast(bytes, builder.end()) + MCAP0_MAGIC
         self._path = path
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         self._written = 0

@@ -21,3 +21,20 @@ def pack(*components: Array | float) -> Array:
     if any(isinstance(component, np.ndarray) for component in components):
         return np.stack(np.broadcast_arrays(*components), axis=-1)
     return np.array(components)
+
+
+def transpose(matrix: Array) -> Array:
+    """Matrices (..., m, n) as (..., n, m)."""
+    return matrix.swapaxes(-1, -2)
+
+
+def times(matrix: Array, vector: Array) -> Array:
+    """Matrices (..., m, n) times vectors (..., n)."""
+    product: Array = (matrix @ vector[..., None])[..., 0]
+    return product
+
+
+def solve(matrix: Array, vector: Array) -> Array:
+    """Solutions (..., n) of matrices (..., n, n) for right-hand sides (..., n)."""
+    solution: Array = np.linalg.solve(matrix, vector[..., None])[..., 0]
+    return solution

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import sqrtm
 
-from climber_uk.mechanics import Array, pack, unpack
+from climber_uk.mechanics import Array, pack, solve, times, transpose, unpack
 from climber_uk.mechanics.climber import GRAVITY, Climber
 
 PAPER_CLIMBER = Climber()
@@ -24,7 +24,7 @@ d = np.array([[1.0, 1.0], [1.0, -1.0], [0.0, 0.0]])  # Qc = d τ (19)
 def _through_root(M: Array) -> Array:
     """M^(1/2) B⁺ with B = A M^(-1/2), complex where the principal root is, (..., 3, 2)."""
     root = sqrtm(M)
-    B = _transpose(np.linalg.solve(_transpose(root), A.T))
+    B = transpose(np.linalg.solve(transpose(root), A.T))
     return root @ _pseudo_inverse(B)
 
 
@@ -41,7 +41,7 @@ def _modulus(M: Array) -> Array:
 
 
 def _without_root(M: Array) -> Array:
-    return np.linalg.pinv(_transpose(np.linalg.solve(_transpose(M), A.T)))
+    return np.linalg.pinv(transpose(np.linalg.solve(transpose(M), A.T)))
 
 
 def _least_force(M: Array) -> Array:
@@ -112,12 +112,12 @@ class PrintedSystem:
     def constraint_force(self, time: Array | float, q: Array, v: Array) -> Array:
         """Qc (..., 3) of (23)."""
         M = self.mass_matrix(q)
-        a = _solve(M, self.force(q, v))
-        return _times(GAINS[self.gain](M), self.b(time) - a[..., :2])
+        a = solve(M, self.force(q, v))
+        return times(GAINS[self.gain](M), self.b(time) - a[..., :2])
 
     def torques(self, Qc: Array) -> Array:
         """τ = d⁺ Qc (25), (..., 2) right and left: the third component is dropped."""
-        return _times(np.linalg.pinv(d), Qc)
+        return times(np.linalg.pinv(d), Qc)
 
     def uncorrected(self, time: Array | float, y: Array) -> Array:
         """Derivative of y by (26): q̇ = v, v̇ = M⁻¹ (Q + Qc)."""
@@ -133,27 +133,13 @@ class PrintedSystem:
         # M^(-1/2) B⁺ = M⁻¹ · M^(1/2) B⁺; solved for together with a = M⁻¹ Q
         solved = np.linalg.solve(M, np.concatenate([GAINS[self.gain](M), Q[..., None]], axis=-1))
         gain, a = solved[..., :2], solved[..., 2]
-        v_1 = a + _times(gain, self.b(time) - a[..., :2])
-        q_1 = v + _times(gain, self.b_q(time) - v[..., :2]) if corrected else v
+        v_1 = a + times(gain, self.b(time) - a[..., :2])
+        q_1 = v + times(gain, self.b_q(time) - v[..., :2]) if corrected else v
         return np.concatenate([q_1, v_1], axis=-1)
 
 
 def _pseudo_inverse(B: Array) -> Array:
     """B⁺ of a B of full row rank, which A M^(-1/2) is; `np.linalg.pinv` takes thrice as long."""
     left, singular, right = np.linalg.svd(B, full_matrices=False)
-    product: Array = _transpose(right.conj()) / singular[..., None, :] @ _transpose(left.conj())
+    product: Array = transpose(right.conj()) / singular[..., None, :] @ transpose(left.conj())
     return product
-
-
-def _transpose(matrix: Array) -> Array:
-    return matrix.swapaxes(-1, -2)
-
-
-def _times(matrix: Array, vector: Array) -> Array:
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product
-
-
-def _solve(matrix: Array, vector: Array) -> Array:
-    solution: Array = np.linalg.solve(matrix, vector[..., None])[..., 0]
-    return solution

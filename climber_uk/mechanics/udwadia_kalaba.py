@@ -6,7 +6,7 @@ positive definite, Q, v (..., n), A (..., p, n) of any rank, b (..., p). Knows n
 
 import numpy as np
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, solve, times, transpose
 
 # Singular values of B below this share of the largest count as zero: far above the rounding
 # (1e-16) that a dependent row leaves behind, far below any constraint that is meant.
@@ -21,7 +21,7 @@ def constraint_force(M: Array, Q: Array, A: Array, b: Array) -> Array:
     """
     _check_shapes(M, A, Q=Q, b=b)
     L, B, w = _whitened(M, A, Q)
-    return _times(L, _least(B, b - _times(B, w)))
+    return times(L, _least(B, b - times(B, w)))
 
 
 def constrained_acceleration(M: Array, Q: Array, A: Array, b: Array) -> Array:
@@ -31,7 +31,7 @@ def constrained_acceleration(M: Array, Q: Array, A: Array, b: Array) -> Array:
     """
     _check_shapes(M, A, Q=Q, b=b)
     L, B, w = _whitened(M, A, Q)
-    return _solve(_transpose(L), w + _least(B, b - _times(B, w)))
+    return solve(transpose(L), w + _least(B, b - times(B, w)))
 
 
 def velocity_correction(M: Array, A: Array, b_q: Array, v: Array) -> Array:
@@ -41,7 +41,7 @@ def velocity_correction(M: Array, A: Array, b_q: Array, v: Array) -> Array:
     """
     _check_shapes(M, A, v=v, b_q=b_q)
     L, B, _ = _whitened(M, A, v)
-    return v + _solve(_transpose(L), _least(B, b_q - _times(A, v)))
+    return v + solve(transpose(L), _least(B, b_q - times(A, v)))
 
 
 def _whitened(M: Array, A: Array, Q: Array) -> tuple[Array, Array, Array]:
@@ -50,7 +50,7 @@ def _whitened(M: Array, A: Array, Q: Array) -> tuple[Array, Array, Array]:
     Any such factor serves as well as the symmetric root M^(1/2): B changes by a rotation, which
     B⁺ undoes. So no square root of a matrix is taken. A a = B w, M^(1/2) B⁺ = L B⁺.
     """
-    if np.max(np.abs(M - _transpose(M))) > 1e-12 * np.max(np.abs(M)):
+    if np.max(np.abs(M - transpose(M))) > 1e-12 * np.max(np.abs(M)):
         raise ValueError("M must be symmetric")
     try:
         L: Array = np.linalg.cholesky(M)
@@ -64,7 +64,7 @@ def _whitened(M: Array, A: Array, Q: Array) -> tuple[Array, Array, Array]:
         ],
         axis=-2,
     )
-    whitened = _transpose(np.linalg.solve(L, _transpose(rows)))
+    whitened = transpose(np.linalg.solve(L, transpose(rows)))
     return L, whitened[..., :-1, :], whitened[..., -1, :]
 
 
@@ -73,23 +73,9 @@ def _least(B: Array, residual: Array) -> Array:
     left: Array
     left, singular, right = np.linalg.svd(B, full_matrices=False)
     kept = singular > RANK_TOLERANCE * np.max(singular, axis=-1, keepdims=True, initial=0)
-    coordinates = _times(_transpose(left), residual)
+    coordinates = times(transpose(left), residual)
     scaled = np.divide(coordinates, singular, out=np.zeros_like(coordinates), where=kept)
-    return _times(_transpose(right), scaled)
-
-
-def _transpose(matrix: Array) -> Array:
-    return matrix.swapaxes(-1, -2)
-
-
-def _times(matrix: Array, vector: Array) -> Array:
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product
-
-
-def _solve(matrix: Array, vector: Array) -> Array:
-    solution: Array = np.linalg.solve(matrix, vector[..., None])[..., 0]
-    return solution
+    return times(transpose(right), scaled)
 
 
 def _check_shapes(M: Array, A: Array, **vectors: Array) -> None:

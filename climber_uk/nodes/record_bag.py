@@ -43,7 +43,7 @@ GRACE = 0.1  # [s] for what was on its way when the stop came
 QUEUE_DEPTH = 5000  # messages of one topic that may wait: seconds, even at 1 kHz
 
 
-class BagRecorder(Node):  # type: ignore[misc]
+class BagRecorder(Node):
     """Subscribes topics as they appear and records what arrives, without decoding it.
 
     It takes what has arrived a hundred times a second and is not spun: an executor that is woken
