@@ -10,7 +10,7 @@ import numpy as np
 from climber_uk.analysis.bag import read_messages
 from climber_uk.control.constraints import tracking_error
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.preview import joined
+from climber_uk.mechanics.preview import SECOND, joined
 from climber_uk.messages import reading
 
 ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
@@ -84,9 +84,9 @@ def read_run(bag: str | Path, namespace: str = "") -> RecordedRun:
         latency=np.array(
             [arrival - found[ODOMETRY][stamp][0] for stamp, (arrival, _) in torques.items()]
         )
-        / reading.SECOND,
+        / SECOND,
     )
 
 
 def _seconds(stamps: Iterable[int], start: int) -> Array:
-    return np.array([stamp - start for stamp in stamps]) / reading.SECOND
+    return np.array([stamp - start for stamp in stamps]) / SECOND

@@ -12,7 +12,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import State, across, along, no_slip
-from climber_uk.mechanics.elementary import arctan, cos, select, sin, sqrt, wrapped
+from climber_uk.mechanics.elementary import arctan, cos, select, sin, sqrt, tanh, wrapped
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.trajectory import Reference
 
@@ -50,12 +50,15 @@ def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Arr
 class Guidance:
     """Speed and heading that lead back to the reference; never singular, and so good at rest.
 
-    v = v_d - k_x e_x, first order with rate λ;  θ = θ_d - atan(g e_y), second order with
-    frequency ω_n, critically damped;  g = k_y v_d / √(v_d² + v_s²) fades where steering cannot
-    help and changes sign in reverse gear. With the no-slip row, A is orthonormal.
+    v = v_d - v_c tanh(k_x e_x / v_c), first order with rate λ;  θ = θ_d - atan(g e_y), second
+    order with frequency ω_n, critically damped;  g = k_y v_d / √(v_d² + v_s²) fades where steering
+    cannot help and changes sign in reverse gear. With the no-slip row, A is orthonormal.
     """
 
     along_track_gain: float = parameter(3.0, "1/s", "k_x", above=0, runtime=True)
+    catch_up_speed: float = parameter(
+        2.0, "m/s", "v_c, most that is added to the reference's speed", above=0, runtime=True
+    )
     cross_track_gain: float = parameter(1.0, "1/m", "k_y", at_least=0, runtime=True)
     speed_rate: float = parameter(10.0, "1/s", "λ of the speed", above=0, runtime=True)
     heading_frequency: float = parameter(10.0, "rad/s", "ω_n of the heading", above=0, runtime=True)
@@ -67,7 +70,7 @@ class Guidance:
     def speed(self, state: State, reference: Reference) -> Array:
         """See `ConstraintSet`."""
         e_x, _, _ = tracking_error(state.pose, reference)
-        return reference.speed - self.along_track_gain * e_x
+        return reference.speed - self._catch_up(e_x)[0]
 
     def demand(self, state: State, reference: Reference) -> tuple[Array, Array]:
         """See `ConstraintSet`."""
@@ -80,8 +83,8 @@ class Guidance:
         e_x1 = v * cosine - v_d + omega_d * e_y
         e_y1 = v * sine - omega_d * e_x
 
-        k_x = self.along_track_gain
-        v_1 = v_d1 - k_x * e_x1 - self.speed_rate * (v - v_d + k_x * e_x)
+        catch_up, k_x = self._catch_up(e_x)
+        v_1 = v_d1 - k_x * e_x1 - self.speed_rate * (v - v_d + catch_up)
 
         e_y2 = v_1 * sine + v * cosine * (omega - omega_d) - omega_d1 * e_x - omega_d * e_x1
         g, g_1, g_2 = self._steering_gain(v_d, v_d1, v_d2)
@@ -95,6 +98,11 @@ class Guidance:
 
         omega_n = self.heading_frequency
         return v_1, omega_d1 - led_2 - 2 * omega_n * led_1 - omega_n**2 * led
+
+    def _catch_up(self, e_x: Array) -> tuple[Array, Array]:
+        """v_c tanh(k_x e_x / v_c) and its derivative by e_x."""
+        part = tanh(self.along_track_gain * e_x / self.catch_up_speed)
+        return self.catch_up_speed * part, self.along_track_gain * (1 - part**2)
 
     def _steering_gain(self, v: Array, v_1: Array, v_2: Array) -> tuple[Array, Array, Array]:
         """g(v) = k_y v / √(v² + v_s²) and its first two derivatives by time."""

@@ -7,14 +7,16 @@ from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (r
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.elementary import cos, sin
+from climber_uk.mechanics.elementary import clipped, cos, sin
 from climber_uk.mechanics.parameter import check, parameter
 
 GRAVITY = 9.81  # [m/s²]
+Bounds = tuple[Any, Any]  # lowest and highest torque of a wheel, each (...) [N m]
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,9 @@ class Climber:
         90.0, "deg", "of the wall: 0 floor, 90 vertical, 180 ceiling", at_least=0, at_most=180
     )
     max_wheel_torque: float = parameter(20.0, "N m", "limit of each wheel's torque", above=0)
+    no_load_wheel_rate: float = parameter(
+        0.0, "rad/s", "wheel rate at which a motor has no torque left; 0: none falls", at_least=0
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -125,6 +130,21 @@ class Climber:
         """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
         v, turning = state.forward_speed, self.half_track * state.yaw_rate
         return pack((v + turning) / self.wheel_radius, (v - turning) / self.wheel_radius)
+
+    def torque_bounds(self, state: State) -> tuple[Bounds, Bounds]:
+        """Lowest and highest torque [N m] of the right wheel, and of the left one, each (...).
+
+        That of a DC motor falls in a straight line with the rate at which it drives its wheel, and
+        not with the rate at which it brakes it.
+        """
+        limit, no_load = self.max_wheel_torque, self.no_load_wheel_rate
+        if no_load == 0:
+            return (-limit, limit), (-limit, limit)
+        right, left = (rate / no_load for rate in unpack(self.wheel_rates(state)))
+        return (
+            (-limit * clipped(1 + right, 0.0, 1.0), limit * clipped(1 - right, 0.0, 1.0)),
+            (-limit * clipped(1 + left, 0.0, 1.0), limit * clipped(1 - left, 0.0, 1.0)),
+        )
 
     def rolling_acceleration(self, state: State, torques: Array, direction: Array | float) -> Array:
         """q̈ of the climber that rolls without side slip under `torques`, (..., 3).

@@ -30,11 +30,11 @@ def wrapped(angle: Any) -> Any:
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
-def clipped(value: Any, limit: Any) -> Any:
-    """`value` within ±`limit`."""
+def clipped(value: Any, lowest: Any, highest: Any) -> Any:
+    """`value` within its bounds; `highest` if they contradict each other."""
     if isinstance(value, float):
-        return max(-limit, min(value, limit))
-    return np.clip(value, -limit, limit)
+        return min(max(value, lowest), highest)
+    return np.clip(value, lowest, highest)
 
 
 def select(condition: Any, this: Any, that: Any) -> Any:

@@ -13,7 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.trajectory import Reference
+
+SECOND = 1_000_000_000  # [ns]
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,25 @@ class Preview:
         )
         pose, velocity, acceleration, jerk = basis @ coefficients[i]
         return Reference(pose, velocity, acceleration, jerk[:2])
+
+    def goes_on_with(self, newer: "Preview", tolerance: float) -> bool:
+        """Whether `newer` begins within `tolerance` [m, rad] of where this one is by then."""
+        here = self.at(int(newer.times[0]))
+        if here is None:
+            return False
+        offset = newer.pose[0] - here.pose
+        offset[2] = wrapped(offset[2])
+        return bool(np.abs(offset).max() <= tolerance)
+
+    def continued(self, newer: "Preview", since: int) -> "Preview":
+        """`newer`, and before it what this one has from `since` [ns] on."""
+        old = slice(*np.searchsorted(self.times, [since, newer.times[0]]))
+        return Preview(
+            times=np.concatenate([self.times[old], newer.times]),
+            pose=np.concatenate([self.pose[old], newer.pose]),
+            velocity=np.concatenate([self.velocity[old], newer.velocity]),
+            acceleration=np.concatenate([self.acceleration[old], newer.acceleration]),
+        )
 
 
 def joined(previews: Iterable[Preview]) -> Preview:

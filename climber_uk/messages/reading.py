@@ -11,7 +11,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.preview import SECOND, Preview
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from sensor_msgs.msg import FluidPressure, JointState
     from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-SECOND = 1_000_000_000  # [ns]
+
+LARGEST = 1e6  # in SI units, of whatever a climber or its wall can be said to do
 
 
 def nanoseconds(time: "Time | Duration") -> int:
@@ -42,8 +43,7 @@ def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
     cosine, sine = math.cos(heading), math.sin(heading)
     pose = np.array([position.x, position.y, heading])
     velocity = np.array([v_x * cosine - v_y * sine, v_x * sine + v_y * cosine, omega])
-    if not (np.isfinite(pose).all() and np.isfinite(velocity).all()):
-        raise ValueError(f"pose {pose} or velocity {velocity} is not finite")
+    _check_size(pose=pose, velocity=velocity)
     return State(pose, velocity)
 
 
@@ -72,6 +72,7 @@ def preview(message: "MultiDOFJointTrajectory", odom_frame: str) -> Preview:
         poses.append([place.x, place.y, _heading(point.transforms[0].rotation)])
         velocities.append(_planar(point.velocities[0]))
         accelerations.append(_planar(point.accelerations[0]))
+    _check_size(pose=poses, velocity=velocities, acceleration=accelerations)
     start = nanoseconds(message.header.stamp)
     return Preview(
         times=np.array(
@@ -86,9 +87,15 @@ def preview(message: "MultiDOFJointTrajectory", odom_frame: str) -> Preview:
 def pressure(message: "FluidPressure") -> float:
     """Pressure difference [Pa]."""
     pressure = float(message.fluid_pressure)
-    if not (math.isfinite(pressure) and pressure >= 0):
-        raise ValueError(f"fluid_pressure={pressure} must be finite and >= 0 [Pa]")
+    if not 0 <= pressure <= LARGEST:
+        raise ValueError(f"fluid_pressure={pressure} must be from 0 to {LARGEST:g} [Pa]")
     return pressure
+
+
+def _check_size(**vectors: "Array | list[list[float]]") -> None:
+    for name, vector in vectors.items():
+        if not (np.abs(vector) <= LARGEST).all():
+            raise ValueError(f"{name} {vector} is not finite, or above {LARGEST:g} in SI units")
 
 
 def _heading(orientation: "Quaternion") -> float:

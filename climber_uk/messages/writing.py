@@ -1,7 +1,7 @@
 """Data to messages: pure functions. Stamps are integers in nanoseconds."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -22,8 +22,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.trajectory import Reference
-from climber_uk.messages.reading import SECOND
 
 
 def time(nanoseconds: int) -> Time:
@@ -108,7 +108,7 @@ def vector(vector: Iterable[Array], stamp: int, frame: str) -> Vector3Stamped:
     return message
 
 
-def wrench(planar: Array, stamp: int, frame: str) -> WrenchStamped:
+def wrench(planar: Sequence[float] | Array, stamp: int, frame: str) -> WrenchStamped:
     """Wrench of (force.x, force.y, torque.z)."""
     message = WrenchStamped()
     message.wrench.force.x, message.wrench.force.y = float(planar[0]), float(planar[1])

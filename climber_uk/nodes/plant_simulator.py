@@ -12,8 +12,8 @@ from std_srvs.srv import Trigger
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading, writing
-from climber_uk.messages.reading import SECOND
 from climber_uk.nodes.running import WALL_CLOCK, ClimberNode, run
 from climber_uk.simulation.plant import Plant
 

@@ -20,6 +20,7 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
 from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 from climber_uk.nodes.running import ClimberNode
 
@@ -53,7 +54,7 @@ class Demo(ClimberNode):
 
     def on_pressure(self, message: FluidPressure) -> None:
         """Keep the time of what is published least often."""
-        self.time = reading.nanoseconds(message.header.stamp) / reading.SECOND
+        self.time = reading.nanoseconds(message.header.stamp) / SECOND
 
     def recorder_has_found_all(self) -> bool:
         """Whether the recorder knows every node, and there is a start to ask for."""

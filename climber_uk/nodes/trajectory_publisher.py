@@ -9,11 +9,11 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.shapes import SHAPES
 from climber_uk.mechanics.time_laws import TIME_LAWS, Stopping
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.messages import reading, writing
-from climber_uk.messages.reading import SECOND
 from climber_uk.nodes.running import BEST_EFFORT, LATCHED, ClimberNode, run
 
 

@@ -49,14 +49,14 @@ def differences(function, state, demand, time):
 @given(cases)
 def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
     trajectory, time, *_ = case
-    gains = Guidance(2.0, 1.3, 7.0, 6.0, 0.4)
+    gains = Guidance(2.0, 1.5, 1.3, 7.0, 6.0, 0.4)
     state = state_of(case)
     demand = gains.demand(state, trajectory.at(time))
 
     def speed_error(state, time):
         reference = trajectory.at(time)
         e_x, _, _ = tracking_error(state.pose, reference)
-        return state.forward_speed - reference.speed + 2.0 * e_x
+        return state.forward_speed - reference.speed + 1.5 * np.tanh(2.0 * e_x / 1.5)
 
     def heading_error(state, time):
         reference = trajectory.at(time)

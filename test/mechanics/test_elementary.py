@@ -13,7 +13,7 @@ VALUES = [-4.0, -0.5, -0.0, 0.3, 2.0, 7.0]
     [
         *(elementary.cos, elementary.sin, elementary.arctan, elementary.tanh, elementary.sign),
         *(lambda x: elementary.sqrt(abs(x)), elementary.wrapped),
-        lambda x: elementary.clipped(x, 1.5),
+        lambda x: elementary.clipped(x, -1.5, 0.5),
         lambda x: elementary.select(x > 0.1, x, -2 * x),
     ],
 )

@@ -1,0 +1,124 @@
+"""Other controllers for the same climber, as the field does it, to be measured beside ours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from climber_uk.analysis.closed_loop import STEP
+from climber_uk.control.constraints import Guidance, tracking_error
+from climber_uk.control.controller import Command
+from climber_uk.control.follower import Answer
+from climber_uk.control.tracker import Tracker
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.elementary import arctan, cos, sin
+from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.trajectory import Reference
+
+
+@dataclass(frozen=True)
+class KanayamaGains:
+    """Of the kinematic law, and of the wheels' PI loops."""
+
+    along: float  # K_x [1/s]
+    across: float  # K_y [1/m²]
+    heading: float  # K_θ [1/m]
+    proportional: float  # [N m s]
+    integral: float  # [N m]
+
+
+class Kanayama:
+    """Kanayama et al. (1990): v = v_r cosθ_e + K_x x_e, ω = ω_r + v_r (K_y y_e + K_θ sinθ_e).
+
+    Errors are reference minus climber, in the climber's frame. A PI loop makes each wheel turn as
+    v and ω ask, on the motors' board: at every step of the plant, from the wheel's true rate, and
+    without integrating while it saturates. No model of the climber is used.
+    """
+
+    def __init__(self, climber: Climber, gains: KanayamaGains) -> None:
+        self.climber, self.gains = climber, gains
+        self.preview: Preview | None = None
+        self.integral: Array = np.zeros(2)  # [rad] of both wheels
+
+    def on_reference(self, now: int, preview: Preview) -> Answer | None:
+        """Keep a reference."""
+        self.preview = preview
+        return None
+
+    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+        """Answer an odometry."""
+        reference = self.preview.at(stamp) if self.preview else None
+        if reference is None:
+            return None
+        gains, heading = self.gains, state.heading
+        x, y, turned = reference.pose - state.pose
+        ahead = x * cos(heading) + y * sin(heading)
+        beside = y * cos(heading) - x * sin(heading)
+        v = reference.speed * cos(float(turned)) + gains.along * ahead
+        steer = gains.across * beside + gains.heading * sin(float(turned))
+        omega = reference.yaw_rate + reference.speed * steer
+        return Answer(stamp, self.climber.wheel_rates(State.rolling(state.pose, v, omega)), None)
+
+    def motors(self, state: State, rates: Array) -> Array:
+        """Torques (2,) of the wheels' PI loops on their way to `rates` (2,) [rad/s]."""
+        error = rates - self.climber.wheel_rates(state)
+        torques = self.gains.proportional * error + self.gains.integral * self.integral
+        inside = np.abs(torques) < self.climber.max_wheel_torque
+        self.integral = self.integral + error * STEP * inside
+        return torques
+
+
+@dataclass(frozen=True)
+class AdaptiveGains:
+    """Of one direction of the adaptive robust control: drive, or turn."""
+
+    growth: float  # k_1
+    leakage: float  # k_2 [1/s]
+    layer: float  # ε
+
+
+class AdaptiveRobust(Tracker):
+    """Adaptive robust UK control with leakage in the observer's place.
+
+    As Udwadia, Wanichanon & Cho (2014) and Zhen, Chen et al. do: the nominal UK force, and against
+    what is unknown p = -γ μ a with μ = β a and γ = 1/|μ| outside of a layer |μ| > ε, 1/ε inside;
+    the bound grows and leaks, ȧ = k_1 |β| - k_2 a. β is how far the constraints are from being
+    met: of the speed, and of the heading with its rate.
+    """
+
+    # found by `robustness.py --tune`
+    drive_gains = AdaptiveGains(2000.0, 5.0, 5.0)
+    turn_gains = AdaptiveGains(200.0, 5.0, 0.5)
+
+    def forget(self) -> None:
+        """Forget what was learnt."""
+        super().forget()
+        self.bounds = np.zeros(2)
+
+    def answer(self, preview: Preview, age: float) -> Command | None:
+        """Torques for the last odometry."""
+        reference = preview.at(self.stamp)
+        if reference is not None and self.state is not None:
+            errors = constraint_errors(self.controller.constraints, self.state, reference)
+            forces = []
+            for i, gains in enumerate((self.drive_gains, self.turn_gains)):
+                beta, bound = errors[i], self.bounds[i]
+                mu = beta * bound
+                gamma = 1 / max(abs(mu), gains.layer)
+                forces.append(-gamma * mu * bound)
+                growth = gains.growth * abs(beta) - gains.leakage * bound
+                self.bounds[i] = max(bound + self.period * growth, 0.0)
+            self.disturbance = -np.array(forces)
+        return super().answer(preview, age)
+
+
+def constraint_errors(gains: Guidance, state: State, reference: Reference) -> tuple[float, float]:
+    """How far speed [m/s] and heading rate [rad/s] are from what guidance wants, at this moment."""
+    e_x, e_y, turned = tracking_error(state.pose, reference)
+    v_d = reference.speed
+    g = gains.cross_track_gain * v_d / np.hypot(v_d, gains.fade_speed)
+    w = g * e_y
+    w_1 = g * (state.forward_speed * sin(turned) - reference.yaw_rate * e_x)
+    led_1 = state.yaw_rate - reference.yaw_rate + w_1 / (1 + w**2)
+    heading = led_1 + gains.heading_frequency * (turned + arctan(w))
+    return float(state.forward_speed - gains.speed(state, reference)), float(heading)

@@ -1,0 +1,268 @@
+"""`python bench/robustness.py`: how the controller copes, row by row, beside others.
+
+Lock-step at 200 Hz, controller and plant in one process: the classes that the nodes run.
+"""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from rivals import AdaptiveGains, AdaptiveRobust, Kanayama, KanayamaGains
+from scipy.optimize import minimize
+from scipy.spatial import cKDTree
+
+from climber_uk.analysis.closed_loop import Controlling, Link, Run, as_commanded, simulate
+from climber_uk.control.constraints import ConstraintSet, Exact, Guidance
+from climber_uk.control.controller import Controller, Law
+from climber_uk.control.follower import Follower
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.safety import Safety
+from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.shapes import Ellipse, Lemniscate
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+
+PAPER = Climber()
+BUILT = Climber(
+    seal_friction_coefficient=0.6,
+    wheel_load_share=0.8,
+    suction_pressure=8000.0,
+    max_wheel_torque=4.0,
+)
+ELLIPSE = Trajectory(Ellipse(), ConstantRate())
+IN_MOTION = State(np.array([0.0, 6.0, 0.0]), np.array([10.0, 0.0, -0.6]))
+RAMPED = Trajectory(Ellipse(), RestToRest(rate=1.0, ramp_time=3.0, laps=9))
+EIGHT = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))
+AT_REST = State(np.array([0.0, 3.0, np.pi / 4]), np.zeros(3))
+GUIDANCE, OBSERVER, IDEAL = Guidance(), Observer(), Link()
+SLOW_GUIDANCE = Guidance(cross_track_gain=3.0, fade_speed=0.1)
+NOISE = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
+
+
+# Found by `--tune`: Nelder-Mead on the sum of RMS over `tuning_cost`'s four scenarios.
+KANAYAMA = KanayamaGains(10.0, 3.0, 3.0, 0.1, 1.0)
+
+
+def ours(
+    climber: Climber,
+    gains: ConstraintSet = GUIDANCE,
+    delay: float = 0.0,
+    observer: Observer = OBSERVER,
+    tracker: type[Tracker] = Tracker,
+) -> Follower:
+    """The controller as the node runs it."""
+    controller = Controller(climber, gains, Law())
+    timing = Timing(transport_delay=delay)
+    return Follower(tracker(controller, observer, timing, Pacing()), Safety())
+
+
+def without_observer(climber: Climber, gains: Guidance = GUIDANCE, delay: float = 0.0) -> Follower:
+    """Ours, believing its model."""
+    return ours(climber, gains, delay, Observer(bandwidth=0.0))
+
+
+def exact(climber: Climber, gains: Guidance = GUIDANCE, delay: float = 0.0) -> Follower:
+    """Ours with the other constraint set."""
+    return ours(climber, Exact(), delay)
+
+
+def adaptive(climber: Climber, gains: Guidance = GUIDANCE, delay: float = 0.0) -> Follower:
+    """Adaptive robust control in the observer's place."""
+    return ours(climber, gains, delay, Observer(bandwidth=0.0), AdaptiveRobust)
+
+
+def kanayama(climber: Climber, gains: Guidance = GUIDANCE, delay: float = 0.0) -> Kanayama:
+    """A velocity-loop controller."""
+    return Kanayama(climber, KANAYAMA)
+
+
+KINDS = {
+    "UK": ours,
+    "UK, no observer": without_observer,
+    "UK, exact": exact,
+    "UK, adaptive": adaptive,
+    "Kanayama + PI": kanayama,
+}
+Make = Callable[..., Controlling]
+MILLIMETRE = 1e-3
+
+
+def run_of(
+    trajectory: Trajectory,
+    start: State,
+    duration: float,
+    controlling: Controlling,
+    climber: Climber | Callable[[float], Climber],
+    link: Link = IDEAL,
+) -> Run:
+    """Run with the motors that the controller is made for."""
+    motors = getattr(controlling, "motors", as_commanded)
+    return simulate(trajectory, start, duration, controlling, climber, link, motors)
+
+
+def lap(
+    make: Make,
+    climber: Climber = PAPER,
+    delay: float = 0.0,
+    after: float = 0.0,
+    link: Link = IDEAL,
+) -> float:
+    """RMS [mm] on the paper's ellipse of a controller that believes in the paper's climber."""
+    run = run_of(ELLIPSE, IN_MOTION, 20.0, make(PAPER, delay=delay), climber, link)
+    return run.rms(after) / MILLIMETRE
+
+
+def friction(make: Make) -> float:
+    """RMS [mm] after 2 s, the worse of half and one and a half times the friction."""
+    climbers = [replace(PAPER, seal_friction_coefficient=share * 0.8) for share in (0.5, 1.5)]
+    return max(lap(make, climber, after=2.0) for climber in climbers)
+
+
+def heavier(make: Make) -> float:
+    """RMS [mm] with a fifth more mass and inertia."""
+    return lap(make, replace(PAPER, mass=1.2 * PAPER.mass, yaw_inertia=1.2 * PAPER.yaw_inertia))
+
+
+def slow_odometry(make: Make) -> float:
+    """RMS [mm] on the figure of eight of climber.yaml, at 20 Hz."""
+    controlling = make(BUILT, SLOW_GUIDANCE)
+    return run_of(EIGHT, AT_REST, 57.0, controlling, BUILT, Link(period=0.05)).rms() / MILLIMETRE
+
+
+def at_the_end(make: Make) -> float:
+    """Distance [mm] from the end of that figure of eight at 200 Hz."""
+    controlling = make(BUILT, SLOW_GUIDANCE)
+    return run_of(EIGHT, AT_REST, 57.0, controlling, BUILT).distance[-1] / MILLIMETRE
+
+
+def from_anywhere(make: Make) -> tuple[float, float]:
+    """100 random starts: last time [s] further than 1 cm off, and largest heading error [deg]."""
+    climber = replace(PAPER, max_wheel_torque=4.0)
+    late, turned = [], []
+    for seed in range(100):
+        random = np.random.default_rng(seed)
+        offset = np.array([*random.uniform(-0.5, 0.5, 2), random.uniform(-1, 1)])
+        start = State(RAMPED.at(0.0).pose + offset, np.zeros(3))
+        run = run_of(RAMPED, start, 4.0, make(climber), climber)
+        late.append(max(run.time[run.distance > 0.01], default=0.0))
+        turned.append(np.abs(run.error[:, 2]).max())
+    return max(late), np.degrees(max(turned))
+
+
+def too_weak(make: Make) -> tuple[float, float, float]:
+    """Torque limit at 70 % of the peak from 5 to 7 s: off the path, lag and overshoot [m]."""
+    peak = np.abs(run_of(ELLIPSE, IN_MOTION, 20.0, make(PAPER), PAPER).torques).max()
+    weak = replace(PAPER, max_wheel_torque=0.7 * float(peak))
+    controlling = make(PAPER)
+
+    def climber(time: float) -> Climber:
+        now = weak if 5.0 <= time < 7.0 else PAPER
+        know_limit(controlling, now)
+        return now
+
+    run = run_of(ELLIPSE, IN_MOTION, 40.0, controlling, climber)
+    off, _ = cKDTree(ELLIPSE.path(400_000)[:, :2]).query(run.pose[:, :2])
+    behind, _ = run.error[:, 0], run.error[:, 1]
+    return off.max(), -behind[run.time < 7.5].min(), max(behind[run.time > 7.5].max(), 0.0)
+
+
+def know_limit(controlling: Controlling, climber: Climber) -> None:
+    """Tell a controller of a new torque limit."""
+    if isinstance(controlling, Follower):
+        tracker = controlling.tracker
+        if tracker.controller.climber is not climber:
+            tracker.controller = replace(tracker.controller, climber=climber)
+    else:
+        controlling.climber = climber
+
+
+def interrupted(make: Make) -> tuple[float, int]:
+    """30 % of odometry lost, the rest up to 20 ms late: RMS [mm], and steps not followed."""
+    controlling = make(PAPER)
+    stops = 0
+
+    def climber(_: float) -> Climber:
+        nonlocal stops
+        stops += isinstance(controlling, Follower) and controlling.mode.is_fault
+        return PAPER
+
+    run = run_of(ELLIPSE, IN_MOTION, 20.0, controlling, climber, Link(loss=0.3, jitter=0.02))
+    return run.rms() / MILLIMETRE, stops
+
+
+ROWS: dict[str, tuple[str, Callable[[Make], object]]] = {
+    "paper's ellipse": ("mm", lap),
+    "seal friction ±50 %, after 2 s": ("mm", friction),
+    "mass and inertia +20 %": ("mm", heavier),
+    "a sample of delay, known": ("mm", lambda make: lap(make, delay=0.005, link=Link(delay=0.005))),
+    "a sample of delay, unknown": ("mm", lambda make: lap(make, link=Link(delay=0.005))),
+    "noise 1 mm, 1 mrad, 10 mm/s": ("mm", lambda make: lap(make, link=NOISE)),
+    "climber.yaml with 20 Hz odometry": ("mm", slow_odometry),
+    "climber.yaml, at the end": ("mm", at_the_end),
+    "30 % lost, 20 ms jitter": ("mm, stops", interrupted),
+    "100 starts: last time off, turned": ("s, deg", from_anywhere),
+    "limit at 70 %: off, lag, overshoot": ("m", too_weak),
+}
+
+
+def tuning_cost(make: Make) -> float:
+    """Sum of RMS [mm] over what both rivals have to be good at."""
+    costs = [lap(make), friction(make), lap(make, link=Link(delay=0.005)), lap(make, link=NOISE)]
+    return float(np.nan_to_num(sum(min(cost, 1e4) for cost in costs), nan=1e5))
+
+
+def tune() -> None:
+    """Print gains for the rivals."""
+
+    def kanayama_cost(logs: np.ndarray) -> float:
+        return tuning_cost(lambda climber, **_: Kanayama(climber, KanayamaGains(*np.exp(logs))))
+
+    def adaptive_cost(logs: np.ndarray) -> float:
+        class Tuned(AdaptiveRobust):
+            drive_gains = AdaptiveGains(*np.exp(logs[:3]))
+            turn_gains = AdaptiveGains(*np.exp(logs[3:]))
+
+        off = Observer(bandwidth=0.0)
+        return tuning_cost(lambda climber, delay=0.0: ours(climber, Guidance(), delay, off, Tuned))
+
+    for cost, first in (
+        (kanayama_cost, [*vars(KANAYAMA).values()]),
+        (
+            adaptive_cost,
+            [*vars(AdaptiveRobust.drive_gains).values(), *vars(AdaptiveRobust.turn_gains).values()],
+        ),
+    ):
+        options = {"maxfev": 150, "xatol": 0.02, "fatol": 0.01}
+        best = minimize(cost, np.log(first), method="Nelder-Mead", options=options)
+        print(cost.__name__, np.exp(best.x).tolist(), best.fun, flush=True)
+
+
+def said(value: object) -> str:
+    """Return one or several figures, short."""
+    return " / ".join(f"{part:.3g}" for part in (value if isinstance(value, tuple) else (value,)))
+
+
+def main() -> None:
+    """Print the table, or tuned gains."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tune", action="store_true", help="tune the rivals' gains instead")
+    parser.add_argument("--only", default="", help="rows whose name contains this")
+    options = parser.parse_args()
+    np.seterr(all="ignore")  # a rival may diverge
+    if options.tune:
+        tune()
+        return
+    print(f"{'':<36}{'':<10}" + "".join(f"{name:>22}" for name in KINDS))
+    for name, (unit, row) in ROWS.items():
+        if options.only in name:
+            print(f"{name:<36}{unit:<10}", end="", flush=True)
+            for make in KINDS.values():
+                print(f"{said(row(make)):>22}", end="", flush=True)
+            print()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Online time scaling: where the motors give too little, the reference waits on its path.
+
+The reference is followed at its own time s(t): ṡ = σ is 1 until the drive that is left after
+turning falls short of the demand, then just small enough that it suffices (Dahl & Nielsen 1990,
+doi 10.1109/70.63270). So the climber stays on the path and lags along it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.preview import SECOND, Preview
+from climber_uk.mechanics.time_laws import compose
+from climber_uk.mechanics.trajectory import Reference
+
+SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
+
+
+@dataclass(frozen=True)
+class Pacing:
+    """How time that was lost is made up for; 0 for `catch_up` switches the time scaling off."""
+
+    catch_up: float = parameter(
+        0.25,
+        "",
+        "share by which a reference that waited is sped up; 0: it never waits",
+        at_least=0,
+        at_most=1,
+        runtime=True,
+    )
+    recovery_time: float = parameter(
+        1.0, "s", "in which lost time is made up for, at last", above=0, runtime=True
+    )
+    settling_time: float = parameter(
+        0.2, "s", "in which σ goes back to where it should be", above=0, runtime=True
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How far a reference is behind its time, and how fast it goes on."""
+
+    lag: float = 0.0  # [s] t - s
+    rate: float = 1.0  # σ
+    change: float = 0.0  # σ̇ [1/s]
+
+    def after(self, time: float, pacing: Pacing) -> "Pace":
+        """Pace `time` [s] later, on its way back to no lag."""
+        rate = max(self.rate + time * self.change, 0.0)
+        lag = max(self.lag + time * (1 - (self.rate + rate) / 2), 0.0)
+        wanted = 1 + min(lag / pacing.recovery_time, pacing.catch_up)
+        return Pace(lag, rate, (wanted - rate) / pacing.settling_time)
+
+    def slowed(self, missing: float, preview: Preview, time: int, step: float) -> "Pace":
+        """Pace that asks `missing` [m/s²] less along the climber, as far as `step` [s] can do."""
+        found = preview.at(time - round(self.lag * SECOND))
+        speed = float(found.speed) if found else 0.0
+        if missing * speed <= 0 or abs(speed) < SLOW:
+            return self
+        return replace(self, change=max(self.change - missing / speed, -self.rate / step))
+
+    def reference(self, preview: Preview, time: int) -> Reference | None:
+        """Reference for `time` [ns] at this pace; None outside of the preview."""
+        found = preview.at(time - round(self.lag * SECOND))
+        if found is None or (self.rate == 1 and self.change == 0):
+            return found
+        jerk = np.append(found.jerk, 0.0)  # of the heading it is not known, nor needed
+        derivatives = (found.pose, found.velocity, found.acceleration, jerk)
+        rates = (np.array(self.rate), np.array(self.change), np.array(0.0))
+        pose, velocity, acceleration, jerk = compose(derivatives, rates)
+        return Reference(pose, velocity, acceleration, jerk[:2])

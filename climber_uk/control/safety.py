@@ -1,0 +1,68 @@
+"""When the controller follows, and when it gives its safe output instead: a small state machine.
+
+Its state is a `Mode`; `Follower` asks after every odometry, reference and look at the clock which
+one it is now.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.parameter import check, parameter
+
+SPEED_TIME = 0.1  # [s] in which a jump of the speed would become one of the place
+
+
+class Mode(Enum):
+    """What the controller does; the value is what it says about it."""
+
+    FOLLOWING = "following"
+    WAITING = "waiting for a reference"  # the only one without any output: a simulation waits
+    NOT_BEGUN = "the reference begins later"
+    DISABLED = "disabled"
+    NO_CLOCK = "use_sim_time is true, but there is no clock"
+    NO_ODOMETRY = "no odometry"
+    BAD_ODOMETRY = "bad odometry"
+    JUMPED = "odometry jumped"
+    NO_TWIST = "the pose moves while the twist is zero"
+    NO_REFERENCE = "no reference"
+    NO_SOLUTION = "no torque can be computed"
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether it is an error, not something that was asked for."""
+        return self not in (Mode.FOLLOWING, Mode.WAITING, Mode.NOT_BEGUN, Mode.DISABLED)
+
+
+@dataclass(frozen=True)
+class Safety:
+    """What is too old or too far, and what is done then."""
+
+    safe_output: str = parameter(
+        "zero",
+        "",
+        "while not following: no torque, or weight held and motion braked",
+        choices=("zero", "hold"),
+    )
+    braking_rate: float = parameter(5.0, "1/s", "of the safe output 'hold'", at_least=0)
+    odometry_timeout: float = parameter(0.1, "s", "age at which odometry is stale", above=0)
+    reference_timeout: float = parameter(0.1, "s", "how long a reference is waited for", above=0)
+    max_jump: float = parameter(
+        0.2, "m", "by which a wheel may be elsewhere than the model expects", above=0
+    )
+    settling_messages: int = parameter(
+        5, "", "odometry messages without a jump until it is followed again", at_least=1
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def has_jumped(self, expected: State, found: State, half_track: float) -> bool:
+        """Whether a wheel is, or will soon be, further than `max_jump` from where expected."""
+        offset, faster = found.pose - expected.pose, found.velocity - expected.velocity
+        gone = np.hypot(*offset[:2]) + half_track * abs(wrapped(float(offset[2])))
+        going = np.hypot(*faster[:2]) + half_track * abs(float(faster[2]))
+        return not max(gone, going * SPEED_TIME) <= self.max_jump
