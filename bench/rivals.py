@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from climber_uk.analysis.closed_loop import STEP
+from climber_uk.analysis.closed_loop import Link
 from climber_uk.control.constraints import Guidance, tracking_error
 from climber_uk.control.controller import Command
 from climber_uk.control.follower import Answer
@@ -14,6 +14,8 @@ from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import arctan, cos, sin
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Reference
+
+IDEAL = Link()
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Kanayama:
         error = rates - self.climber.wheel_rates(state)
         torques = self.gains.proportional * error + self.gains.integral * self.integral
         inside = np.abs(torques) < self.climber.max_wheel_torque
-        self.integral = self.integral + error * STEP * inside
+        self.integral = self.integral + error * IDEAL.step * inside
         return torques
 
 
@@ -86,9 +88,9 @@ class AdaptiveRobust(Tracker):
     met: of the speed, and of the heading with its rate.
     """
 
-    # found by `robustness.py --tune`
-    drive_gains = AdaptiveGains(2000.0, 5.0, 5.0)
-    turn_gains = AdaptiveGains(200.0, 5.0, 0.5)
+    # found by `robustness.py --tune adaptive`
+    drive_gains = AdaptiveGains(23_800.0, 4.12, 5.14)
+    turn_gains = AdaptiveGains(442.0, 4.12, 0.583)
 
     def forget(self) -> None:
         """Forget what was learnt."""

@@ -19,12 +19,12 @@ from climber_uk.mechanics.preview import SECOND, Preview
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.plant import Plant
 
-STEP = 0.0025  # [s] of the plant
-
 
 @dataclass(frozen=True)
 class Link:
-    """What lies between a climber and its controller; times are multiples of `STEP`."""
+    """What lies between a climber and its controller; times are multiples of `step`."""
+
+    step: float = 0.0025  # [s] of the plant
 
     period: float = 0.005  # [s] from one odometry to the next
     delay: float = 0.0  # [s] of a torque on its way to the wheels: no clock shows it
@@ -93,14 +93,14 @@ def simulate(
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
     state, torques, rows = start, np.zeros(2), []
-    every, late = round(link.period / STEP), round(link.delay / STEP)
-    for step in range(round(duration / STEP) + 1):
-        now = SECOND + round(step * STEP * SECOND)
+    every, late = round(link.period / link.step), round(link.delay / link.step)
+    for step in range(round(duration / link.step) + 1):
+        now = SECOND + round(step * link.step * SECOND)
         if step % every == 0:
-            error = np.array(tracking_error(state.pose, trajectory.at(step * STEP)))
-            rows.append([step * STEP, *state.pose, *state.velocity, *error, *torques])
+            error = np.array(tracking_error(state.pose, trajectory.at(step * link.step)))
+            rows.append([step * link.step, *state.pose, *state.velocity, *error, *torques])
             if random.random() >= link.loss:
-                arrival = step + round(random.uniform(0, link.jitter) / STEP)
+                arrival = step + round(random.uniform(0, link.jitter) / link.step)
                 arrival = max(arrival, arriving[-1][0]) if arriving else arrival
                 arriving.append((arrival, now, measured(state, link, random)))
         while arriving and arriving[0][0] <= step:
@@ -111,7 +111,7 @@ def simulate(
                 commanded.append((step + late, answer.torques))
         while commanded and commanded[0][0] <= step:
             _, acting = commanded.popleft()
-        plant = Plant(climber_at(step * STEP), STEP)
+        plant = Plant(climber_at(step * link.step), link.step)
         limit = plant.climber.max_wheel_torque
         if acting is not None:
             torques = np.clip(motors(state, acting), -limit, limit)

@@ -43,6 +43,7 @@ class Follower:
         self._heard: int | None = None  # [ns] time of the last odometry, good or bad
         self._trouble: tuple[Mode, str] | None = None  # with that odometry
         self._stamp = 0  # [ns] of the last good one
+        self._now = 0  # [ns] of the last look at the clock
         self._unsettled = 0  # odometry messages until a jump is forgiven
         self._moved_without_twist = 0.0  # [m]
         self._waiting_since: int | None = None  # [ns] stamp of the first one not answered
@@ -59,6 +60,9 @@ class Follower:
 
     def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
         """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
+        if now < self._now:  # a simulation started again: times of before say nothing
+            self._stamp, self.preview, self._waiting_since = 0, None, None
+        self._now = now
         if stamp == self._stamp and self.mode is Mode.FOLLOWING:
             return self.answer  # it was not received: the same once more
         timeout = round(self.safety.odometry_timeout * SECOND)

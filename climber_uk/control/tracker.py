@@ -60,6 +60,7 @@ class Tracker:
         self.controller, self.observer = controller, observer
         self.timing, self.pacing = timing, pacing
         self.period = timing.control_period  # [s] from one odometry to the next
+        self._period_is_measured = False
         self._acting: deque[tuple[int, Array]] = deque()  # when they begin to, torques
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
         self.reset()
@@ -96,7 +97,9 @@ class Tracker:
         """Take in a newer odometry."""
         if self.state is not None:
             time = (stamp - self.stamp) / SECOND
-            self.period += PERIOD_SMOOTHING * (time - self.period)
+            share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
+            self.period += share * (time - self.period)
+            self._period_is_measured = True
             expected = self.expected_at(stamp)
             state, learnt = self.observer.corrected(
                 self.controller.climber, self.disturbance, expected, state, time

@@ -118,12 +118,14 @@ def wrench(planar: Sequence[float] | Array, stamp: int, frame: str) -> WrenchSta
     return message
 
 
-def diagnostics(name: str, fault: str, values: Mapping[str, object], stamp: int) -> DiagnosticArray:
-    """One status: OK, or an ERROR that says `fault`."""
+def diagnostics(
+    name: str, level: bytes, trouble: str, values: Mapping[str, object], stamp: int
+) -> DiagnosticArray:
+    """One status."""
     status = DiagnosticStatus(
         name=name,
-        level=DiagnosticStatus.ERROR if fault else DiagnosticStatus.OK,
-        message=fault or "ok",
+        level=level,
+        message=trouble or "ok",
         values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
     )
     message = DiagnosticArray(status=[status])

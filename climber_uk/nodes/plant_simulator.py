@@ -86,7 +86,7 @@ class PlantSimulator(ClimberNode):
         self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
         self.subscription(JointState, "wheel_torques", self.on_torques)
         self.create_service(Trigger, "~/reset", self.on_reset)
-        self.start_diagnostics(self.values)
+        self.start_diagnostics(self.values, alone_on=("odom", "wheel_torques"))
         if self.options.simulated_time:
             self.stamp = SECOND  # [ns]; 0 would mean that there is no time yet
             self.clock = self.publisher(ClockMessage, "/clock")

@@ -2,13 +2,13 @@
 
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.experimental import EventsExecutor
@@ -49,7 +49,8 @@ class ClimberNode(Node):
         self.parameters = Parameters(self, self.on_parameters)
         self.parameters.declare(Names)
         self.names = self.parameters.read(Names)
-        self._troubles: dict[str, str] = {}
+        self._troubles: dict[str, tuple[str, bool]] = {}
+        self._alone_on: Sequence[str] = ()
         self._values: Callable[[], Mapping[str, object]] = dict
         self._diagnostics: Publisher | None = None
 
@@ -68,33 +69,50 @@ class ClimberNode(Node):
         options = QoSOverridingOptions.with_default_policies()
         return self.create_subscription(kind, topic, callback, qos, qos_overriding_options=options)
 
-    def say(self, subject: str, trouble: str, detail: str = "") -> None:
-        """Log a trouble, or that it is over (''), once each time the trouble changes."""
-        if trouble == self._troubles.get(subject, ""):
+    def say(self, subject: str, trouble: str, detail: str = "", is_fault: bool = True) -> None:
+        """Log a trouble, or that it is over (''), once each time the trouble changes.
+
+        In diagnostics it is an error if `is_fault`, else a warning.
+        """
+        if trouble == self._troubles.get(subject, ("", True))[0]:
             return
-        self._troubles[subject] = trouble
+        self._troubles[subject] = trouble, is_fault
         if trouble:
             self.get_logger().warning(f"{subject}: {trouble}{detail and f' ({detail})'}")
         else:
             self.get_logger().info(f"{subject}: ok again")
         self.diagnose()
 
-    def start_diagnostics(self, values: Callable[[], Mapping[str, object]]) -> None:
-        """Publish troubles and `values` on /diagnostics, every second and when troubles change."""
-        self._values = values
+    def start_diagnostics(
+        self, values: Callable[[], Mapping[str, object]], alone_on: Sequence[str] = ()
+    ) -> None:
+        """Publish troubles and `values` on /diagnostics, every second and when troubles change.
+
+        On the topics `alone_on` there should be no more than one publisher.
+        """
+        self._values, self._alone_on = values, alone_on
         self._diagnostics = self.publisher(DiagnosticArray, "/diagnostics")
-        self.create_timer(1.0, self.diagnose, clock=WALL_CLOCK)
+        self.create_timer(1.0, self.look_around, clock=WALL_CLOCK)
+
+    def look_around(self) -> None:
+        """Say where others publish what only one should, and how it goes."""
+        for topic in self._alone_on:
+            is_crowded = self.count_publishers(topic) > 1
+            self.say(topic, "more than one publisher" if is_crowded else "", is_fault=False)
+        self.diagnose()
 
     def diagnose(self) -> None:
         """Publish troubles and values."""
-        if self._diagnostics is not None:
-            troubles = [
-                f"{about}: {trouble}" for about, trouble in self._troubles.items() if trouble
-            ]
-            now = self.get_clock().now().nanoseconds
-            name = self.get_fully_qualified_name()
-            message = writing.diagnostics(name, "; ".join(troubles), self._values(), now)
-            self._diagnostics.publish(message)
+        if self._diagnostics is None:
+            return
+        troubles = {about: said for about, said in self._troubles.items() if said[0]}
+        level = DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK
+        if any(is_fault for _, is_fault in troubles.values()):
+            level = DiagnosticStatus.ERROR
+        text = "; ".join(f"{about}: {trouble}" for about, (trouble, _) in troubles.items())
+        now = self.get_clock().now().nanoseconds
+        name = self.get_fully_qualified_name()
+        self._diagnostics.publish(writing.diagnostics(name, level, text, self._values(), now))
 
 
 def run(make_node: Callable[[], Node]) -> None:

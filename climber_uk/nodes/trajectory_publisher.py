@@ -60,6 +60,7 @@ class TrajectoryPublisher(ClimberNode):
         )
         self.trajectory = self.planned
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
+        self.last_look = 0  # [ns] at the clock
         self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
         self.next_point = 0  # every point is computed once: previews agree to the last bit
 
@@ -112,8 +113,14 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish(self) -> None:
         """Publish the preview at the clock's time."""
+        now = self.get_clock().now().nanoseconds
+        if now < self.last_look and self.start is not None:
+            self.get_logger().warning("the clock went back: starts again at the next odometry")
+            self.start = None
+            self.wait_for_odometry()
+        self.last_look = now
         if self.start is not None:
-            self.publish_around(max(self.start, self.get_clock().now().nanoseconds))
+            self.publish_around(max(self.start, now))
 
     def publish_around(self, now: int) -> None:
         """Publish points from before the last preview to the end of the next one."""

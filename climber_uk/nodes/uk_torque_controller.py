@@ -64,7 +64,7 @@ class UkTorqueController(ClimberNode):
         shortest = min(safety.odometry_timeout, safety.reference_timeout)
         # on the wall clock: one in simulated time would not notice that there is no clock
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
-        self.start_diagnostics(self.values)
+        self.start_diagnostics(self.values, alone_on=("odom", "reference", "wheel_torques"))
 
     def settings(self) -> tuple[Controller, Observer, Timing, Pacing]:
         """What the parameters, and the measured pressure, say now."""
@@ -134,8 +134,8 @@ class UkTorqueController(ClimberNode):
                 self.publish_causes(answer.stamp, answer.command)
         mode = self.follower.mode
         if mode is not Mode.WAITING:
-            is_safe = mode is not Mode.FOLLOWING
-            self.say("safe output", mode.value if is_safe else "", self.follower.detail)
+            trouble = "" if mode is Mode.FOLLOWING else mode.value
+            self.say("safe output", trouble, self.follower.detail, mode.is_fault)
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""

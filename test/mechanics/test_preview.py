@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,3 +70,21 @@ def test_points_out_of_order_or_not_finite_are_refused():
         preview(0, 1)
     with pytest.raises(ValueError, match="velocity of a point is not finite"):
         Preview(good.times, good.pose, good.velocity * np.nan, good.acceleration)
+
+
+def test_a_preview_that_goes_on_keeps_what_was_before_it():
+    old, newer = preview(0, 40), preview(20, 60)
+    assert old.goes_on_with(newer, 1e-9)
+    joint = old.continued(newer, since=10 * PERIOD)
+    np.testing.assert_array_equal(joint.times, np.arange(10, 60) * PERIOD)
+    for time, one in ((15 * PERIOD + 7, old), (20 * PERIOD, newer), (48 * PERIOD + 9, newer)):
+        np.testing.assert_array_equal(joint.at(time).pose, one.at(time).pose)
+
+
+def test_a_preview_of_something_else_does_not_go_on():
+    old, newer = preview(0, 40), preview(20, 60)
+    elsewhere = replace(newer, pose=newer.pose + np.array([0.1, 0.0, 0.0]))
+    assert not old.goes_on_with(elsewhere, 0.05)
+    turned = replace(newer, pose=newer.pose + np.array([0.0, 0.0, 2 * np.pi]))
+    assert old.goes_on_with(turned, 1e-9)
+    assert not old.goes_on_with(preview(60, 80), 0.05)

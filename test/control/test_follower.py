@@ -1,0 +1,277 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from climber_uk.analysis.closed_loop import sampled
+from climber_uk.control.constraints import Guidance
+from climber_uk.control.controller import Controller, Law
+from climber_uk.control.follower import Follower
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.safety import Mode, Safety
+from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics.shapes import Circle, Ellipse
+from climber_uk.mechanics.time_laws import ConstantRate
+from climber_uk.mechanics.trajectory import Trajectory
+
+CIRCLE = Trajectory(Circle(), ConstantRate(rate=0.5))
+MILLISECOND = SECOND // 1000
+PERIOD = 5 * MILLISECOND
+
+
+class Loop:
+    """A climber that is always where it should be, on a clock that the test turns."""
+
+    def __init__(self, observer=None, **safety):
+        controller = Controller(Climber(), Guidance(), Law())
+        tracker = Tracker(controller, observer or Observer(), Timing(), Pacing())
+        self.follower = Follower(tracker, Safety(**safety))
+        self.now = SECOND
+        self.answer = None
+
+    def plan(self, trajectory=CIRCLE):
+        self.answer = self.follower.on_reference(self.now, sampled(trajectory, 10.0))
+
+    def state(self, stamp):
+        reference = CIRCLE.at((stamp - SECOND) / SECOND)
+        return State(reference.pose, reference.velocity)
+
+    def tell(self, stamp=None, moved=(0.0, 0.0, 0.0), times=1):
+        for _ in range(times):
+            self.now += PERIOD
+            at = self.now if stamp is None else stamp
+            state = self.state(at)
+            state = State(state.pose + np.array(moved), state.velocity)
+            self.answer = self.follower.on_odometry(self.now, at, state)
+        return self.follower.mode
+
+    def look(self, after=PERIOD):
+        self.now += after
+        self.answer = self.follower.look(self.now)
+        return self.follower.mode
+
+
+@pytest.fixture
+def loop():
+    loop = Loop()
+    loop.plan()
+    assert loop.tell() is Mode.FOLLOWING
+    return loop
+
+
+def is_safe(loop):
+    return loop.answer.command is None and not loop.answer.torques.any()
+
+
+def test_it_follows_odometry_and_answers_with_its_stamp(loop):
+    assert loop.answer.stamp == loop.now
+    assert loop.answer.torques.any()
+    assert loop.answer.command is not None
+
+
+def test_the_same_odometry_again_gets_the_same_answer(loop):
+    before = loop.answer
+    assert loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now)) is before
+
+
+def test_odometry_waits_for_a_reference_then_is_safe_then_is_answered():
+    loop = Loop()
+    assert loop.tell() is Mode.WAITING
+    assert loop.answer is None
+    assert loop.tell(times=25) is Mode.NO_REFERENCE
+    assert is_safe(loop)
+    loop.plan()
+    assert loop.follower.mode is Mode.FOLLOWING
+    assert loop.answer.stamp == loop.now
+
+
+def test_a_clock_that_stands_still_waits_for_the_reference_for_ever():
+    loop = Loop()
+    for _ in range(100):
+        assert loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now)) is None
+    loop.plan()
+    assert loop.answer.command is not None
+
+
+def test_a_reference_that_ends_is_missed_after_its_timeout(loop):
+    loop.now += 10 * SECOND  # beyond the preview of 12 s, in which nothing is stale
+    loop.follower.on_reference(loop.now, sampled(CIRCLE, 10.0))
+    loop.now += round(1.98 * SECOND)
+    assert loop.tell() in (Mode.FOLLOWING, Mode.WAITING)
+    assert loop.tell(times=30) is Mode.NO_REFERENCE
+    assert is_safe(loop)
+
+
+def test_a_reference_that_begins_later_is_no_fault(loop):
+    later = sampled(CIRCLE, 10.0)
+    begin = loop.now + SECOND
+    shifted = type(later)(
+        later.times - SECOND + begin, later.pose + 1.0, later.velocity, later.acceleration
+    )
+    loop.follower.on_reference(loop.now, shifted)
+    assert loop.tell() is Mode.NOT_BEGUN
+    assert is_safe(loop)
+    assert not loop.follower.mode.is_fault
+
+
+def test_odometry_that_stops_is_noticed_and_followed_when_it_is_back(loop):
+    assert loop.look(50 * MILLISECOND) is Mode.FOLLOWING
+    assert loop.answer is None
+    assert loop.look(60 * MILLISECOND) is Mode.NO_ODOMETRY
+    assert is_safe(loop)
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_odometry_that_never_comes_is_noticed():
+    loop = Loop()
+    assert loop.look() is Mode.WAITING
+    assert loop.look(200 * MILLISECOND) is Mode.NO_ODOMETRY
+
+
+@pytest.mark.parametrize("age", [-200, 200], ids=["future", "past"])
+def test_a_stamp_far_from_the_clock_is_refused(loop, age):
+    assert loop.tell(stamp=loop.now - age * MILLISECOND) is Mode.BAD_ODOMETRY
+    assert is_safe(loop)
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_an_odometry_that_was_overtaken_is_ignored(loop):
+    loop.tell(times=3)
+    stamp = loop.answer.stamp
+    assert loop.tell(stamp=stamp - 7 * MILLISECOND) is Mode.FOLLOWING
+    assert loop.answer is None
+    assert loop.tell() is Mode.FOLLOWING
+    assert loop.answer.stamp > stamp
+
+
+def test_a_clock_that_went_back_starts_anew(loop):
+    loop.tell(times=3)
+    loop.now = SECOND
+    assert loop.tell() is Mode.WAITING  # for a reference of the new time
+    loop.plan()
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_bad_odometry_is_safe_at_once(loop):
+    answer = loop.follower.on_bad_odometry(loop.now, "nan")
+    assert answer.command is None
+    assert (loop.follower.mode, loop.follower.detail) == (Mode.BAD_ODOMETRY, "nan")
+    assert loop.tell() is Mode.FOLLOWING
+
+
+@pytest.mark.parametrize("moved", [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)], ids=["place", "heading"])
+def test_a_jump_is_safe_until_odometry_agrees_with_itself(loop, moved):
+    modes = [loop.tell(moved=moved) for _ in range(5)]
+    assert modes == 4 * [Mode.JUMPED] + [Mode.FOLLOWING]
+    assert np.abs(loop.answer.torques).max() <= 20.0
+
+
+def test_a_single_wrong_odometry_never_reaches_the_wheels(loop):
+    assert loop.tell(moved=(1.0, 0.0, 0.0)) is Mode.JUMPED
+    assert is_safe(loop)
+    assert loop.tell() is Mode.JUMPED  # back again is a jump, too
+    assert loop.tell(times=4) is Mode.FOLLOWING
+
+
+def test_a_fault_forgets_what_was_learnt(loop):
+    loop.follower.tracker.disturbance = np.array([5.0, 1.0])
+    loop.tell(moved=(1.0, 0.0, 0.0))
+    np.testing.assert_array_equal(loop.follower.tracker.disturbance, 0)
+
+
+def test_a_twist_of_zero_while_the_pose_moves_is_a_fault_until_there_is_one():
+    loop = Loop()
+    loop.plan()
+    real = loop.state
+    loop.state = lambda stamp: State(real(stamp).pose, np.zeros(3))
+    while loop.tell() is Mode.FOLLOWING:
+        assert loop.now < 2 * SECOND
+    assert loop.follower.mode is Mode.NO_TWIST
+    assert loop.tell() is Mode.NO_TWIST
+    loop.state = real
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_disabled_it_is_safe_until_it_is_enabled(loop):
+    loop.follower.enable(False)
+    assert loop.tell() is Mode.DISABLED
+    assert is_safe(loop)
+    assert not loop.follower.mode.is_fault
+    loop.follower.enable(True)
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_without_a_clock_it_follows_for_a_moment_only(loop):
+    assert loop.follower.mode is Mode.FOLLOWING
+    for _ in range(30):
+        answer = loop.follower.look(0)
+    assert loop.follower.mode is Mode.NO_CLOCK
+    assert answer.command is None
+
+
+def test_hold_carries_the_weight_brakes_and_lets_the_brake_go_when_it_must_have_stopped():
+    loop = Loop(safe_output="hold")
+    loop.plan()
+    loop.tell(times=20)
+    weight = loop.follower.tracker.controller.climber.weight_along_wall
+    heading = loop.state(loop.now).heading
+    loop.follower.enable(False)
+    loop.tell()
+    braking = loop.answer.torques.sum() / 0.027
+    assert braking < weight * np.sin(heading) - 1.0
+    loop.look(SECOND)
+    held = loop.answer.torques.sum() / 0.027
+    assert held == pytest.approx(weight * np.sin(heading), abs=2.0)
+
+
+def test_a_new_reference_elsewhere_is_followed_within_the_limits(loop):
+    loop.plan(Trajectory(Ellipse(3.0, 2.0), ConstantRate(rate=0.5)))
+    assert loop.tell() is Mode.FOLLOWING
+    assert np.abs(loop.answer.torques).max() <= 20.0
+
+
+size = st.one_of(st.floats(-10, 10), st.floats(-1e6, 1e6))
+vector = st.tuples(size, size, size).map(np.array)
+event = st.one_of(
+    st.tuples(st.just("odometry"), st.integers(-(10**9), 10**9), vector, vector),
+    st.tuples(st.just("reference"), st.integers(-(10**9), 10**9), vector, vector),
+    st.tuples(st.sampled_from(["good", "look", "bad", "enable", "disable"])),
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(event, min_size=1, max_size=20), st.sampled_from(["odometry", "pose"]))
+def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source):
+    loop = Loop(Observer(velocity_source=source), safe_output="hold")
+    loop.plan()
+    for kind, *details in events:
+        loop.now += PERIOD
+        answer = None
+        if kind == "odometry":
+            shift, pose, velocity = details
+            answer = loop.follower.on_odometry(
+                loop.now, loop.now + shift // 10, State(pose, velocity)
+            )
+        elif kind == "reference":
+            shift, pose, velocity = details
+            preview = sampled(CIRCLE, 1.0)
+            moved = type(preview)(
+                preview.times + shift,
+                preview.pose + pose,
+                preview.velocity + velocity,
+                preview.acceleration,
+            )
+            answer = loop.follower.on_reference(loop.now, moved)
+        elif kind == "good":
+            answer = loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now))
+        elif kind == "look":
+            answer = loop.follower.look(loop.now)
+        elif kind == "bad":
+            answer = loop.follower.on_bad_odometry(loop.now, "bad")
+        else:
+            loop.follower.enable(kind == "enable")
+        if answer is not None:
+            assert np.abs(answer.torques).max() <= 20.0  # and not nan
