@@ -89,8 +89,8 @@ class AdaptiveRobust(Tracker):
     """
 
     # found by `robustness.py --tune adaptive`
-    drive_gains = AdaptiveGains(23_800.0, 4.12, 5.14)
-    turn_gains = AdaptiveGains(442.0, 4.12, 0.583)
+    drive_gains = AdaptiveGains(23_200.0, 4.06, 4.57)
+    turn_gains = AdaptiveGains(732.0, 3.55, 0.558)
 
     def forget(self) -> None:
         """Forget what was learnt."""

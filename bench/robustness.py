@@ -43,7 +43,7 @@ NOISE = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
 
 
 # Found by `--tune kanayama`.
-KANAYAMA = KanayamaGains(10.0, 3.0, 3.0, 0.5, 1.0)
+KANAYAMA = KanayamaGains(38.8, 8.32, 5.13, 1.06, 1.0)
 
 
 def ours(

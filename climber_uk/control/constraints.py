@@ -12,7 +12,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import State, across, along, no_slip
-from climber_uk.mechanics.elementary import arctan, cos, select, sin, sqrt, tanh, wrapped
+from climber_uk.mechanics.elementary import arctan, cos, select, sign, sin, sqrt, tanh, wrapped
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.trajectory import Reference
 
@@ -50,19 +50,27 @@ def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Arr
 class Guidance:
     """Speed and heading that lead back to the reference; never singular, and so good at rest.
 
-    v = v_d - v_c tanh(k_x e_x / v_c), first order with rate λ;  θ = θ_d - atan(g e_y), second
-    order with frequency ω_n, critically damped;  g = k_y v_d / √(v_d² + v_s²) fades where steering
-    cannot help and changes sign in reverse gear. With the no-slip row, A is orthonormal.
+    v = v_d - L tanh(k_x e_x / L), first order with rate λ;  ψ = θ - θ_d + atan(g e_y) to 0 by
+    ψ̇ = -R tanh(ω_n ψ / R), that with rate ω_n: critically damped, and never faster than R;
+    g = k_y v_d / √(v_d² + v_s²) fades where steering cannot help and changes sign in reverse gear.
+    With the no-slip row, A is orthonormal.
+
+    L = v_s/2 + v_c |v_d| / √(v_d² + v_s²) bounds what is added to the speed of who is behind, and
+    L = √(v_d² + v_s²/4) what is taken from who is ahead: he waits, for driving backwards he would
+    steer away.
     """
 
-    along_track_gain: float = parameter(3.0, "1/s", "k_x", above=0, runtime=True)
+    along_track_gain: float = parameter(5.0, "1/s", "k_x", above=0, runtime=True)
+    cross_track_gain: float = parameter(1.0, "1/m", "k_y", at_least=0, runtime=True)
+    speed_rate: float = parameter(10.0, "1/s", "λ of the speed", above=0, runtime=True)
+    heading_frequency: float = parameter(12.0, "rad/s", "ω_n of the heading", above=0, runtime=True)
+    fade_speed: float = parameter(1.0, "m/s", "v_s, below which k_y fades", above=0, runtime=True)
     catch_up_speed: float = parameter(
         2.0, "m/s", "v_c, most that is added to the reference's speed", above=0, runtime=True
     )
-    cross_track_gain: float = parameter(1.0, "1/m", "k_y", at_least=0, runtime=True)
-    speed_rate: float = parameter(10.0, "1/s", "λ of the speed", above=0, runtime=True)
-    heading_frequency: float = parameter(10.0, "rad/s", "ω_n of the heading", above=0, runtime=True)
-    fade_speed: float = parameter(1.0, "m/s", "v_s, below which k_y fades", above=0, runtime=True)
+    turn_rate: float = parameter(
+        4.0, "rad/s", "R, fastest turn back to the heading wanted", above=0, runtime=True
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -70,12 +78,11 @@ class Guidance:
     def speed(self, state: State, reference: Reference) -> Array:
         """See `ConstraintSet`."""
         e_x, _, _ = tracking_error(state.pose, reference)
-        return reference.speed - self._catch_up(e_x)[0]
+        return self._speed(reference, e_x, 0 * e_x)[0]
 
     def demand(self, state: State, reference: Reference) -> tuple[Array, Array]:
         """See `ConstraintSet`."""
-        v, omega = state.forward_speed, state.yaw_rate
-        v_d, v_d1, v_d2 = reference.speed, reference.speed_rate, reference.speed_second_rate
+        v, omega, v_d = state.forward_speed, state.yaw_rate, reference.speed
         omega_d, omega_d1 = reference.yaw_rate, unpack(reference.acceleration)[2]
 
         e_x, e_y, turned = tracking_error(state.pose, reference)
@@ -83,29 +90,43 @@ class Guidance:
         e_x1 = v * cosine - v_d + omega_d * e_y
         e_y1 = v * sine - omega_d * e_x
 
-        catch_up, k_x = self._catch_up(e_x)
-        v_1 = v_d1 - k_x * e_x1 - self.speed_rate * (v - v_d + catch_up)
+        wanted, wanted_1 = self._speed(reference, e_x, e_x1)
+        v_1 = wanted_1 - self.speed_rate * (v - wanted)
 
         e_y2 = v_1 * sine + v * cosine * (omega - omega_d) - omega_d1 * e_x - omega_d * e_x1
-        g, g_1, g_2 = self._steering_gain(v_d, v_d1, v_d2)
+        g, g_1, g_2 = self._steering_gain(reference)
         w = g * e_y
         w_1 = g_1 * e_y + g * e_y1
         w_2 = g_2 * e_y + 2 * g_1 * e_y1 + g * e_y2
         slope = 1 / (1 + w**2)
-        led = turned + arctan(w)  # heading minus the one that leads back
+        led = turned + arctan(w)  # ψ, heading minus the one that leads back
         led_1 = omega - omega_d + slope * w_1
         led_2 = slope * w_2 - 2 * w * (slope * w_1) ** 2
 
-        omega_n = self.heading_frequency
-        return v_1, omega_d1 - led_2 - 2 * omega_n * led_1 - omega_n**2 * led
+        omega_n, most = self.heading_frequency, self.turn_rate
+        part = tanh(omega_n * led / most)
+        turning_back = led_1 + most * part  # 0 when it turns back as fast as it should
+        return v_1, omega_d1 - led_2 - omega_n * ((1 - part**2) * led_1 + turning_back)
 
-    def _catch_up(self, e_x: Array) -> tuple[Array, Array]:
-        """v_c tanh(k_x e_x / v_c) and its derivative by e_x."""
-        part = tanh(self.along_track_gain * e_x / self.catch_up_speed)
-        return self.catch_up_speed * part, self.along_track_gain * (1 - part**2)
+    def _speed(self, reference: Reference, e_x: Array, e_x1: Array) -> tuple[Array, Array]:
+        """Speed that leads back along the track, and its rate."""
+        v_d, v_d1 = reference.speed, reference.speed_rate
+        waiting = sqrt(v_d**2 + self.fade_speed**2 / 4)
+        root = sqrt(v_d**2 + self.fade_speed**2)
+        hurrying = self.fade_speed / 2 + self.catch_up_speed * abs(v_d) / root
+        hurrying_1 = self.catch_up_speed * sign(v_d) * self.fade_speed**2 / root**3 * v_d1
+        is_ahead = e_x * v_d > 0
+        most = select(is_ahead, waiting, hurrying)
+        most_1 = select(is_ahead, v_d * v_d1 / waiting, hurrying_1)
+        u = self.along_track_gain * e_x / most
+        part = tanh(u)
+        inside = 1 - part**2
+        back_1 = self.along_track_gain * inside * e_x1 + (part - u * inside) * most_1
+        return v_d - most * part, v_d1 - back_1
 
-    def _steering_gain(self, v: Array, v_1: Array, v_2: Array) -> tuple[Array, Array, Array]:
-        """g(v) = k_y v / √(v² + v_s²) and its first two derivatives by time."""
+    def _steering_gain(self, reference: Reference) -> tuple[Array, Array, Array]:
+        """g = k_y v_d / √(v_d² + v_s²) and its first two derivatives by time."""
+        v, v_1, v_2 = reference.speed, reference.speed_rate, reference.speed_second_rate
         square = self.fade_speed**2
         root = sqrt(v**2 + square)
         slope = square / root**3

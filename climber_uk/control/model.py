@@ -57,7 +57,7 @@ class Observer:
     """
 
     bandwidth: float = parameter(
-        80.0, "1/s", "K of the disturbance observer; 0 switches it off", at_least=0, runtime=True
+        100.0, "1/s", "K of the disturbance observer; 0 switches it off", at_least=0, runtime=True
     )
     velocity_source: str = parameter(
         "odometry",

@@ -4,12 +4,11 @@ Stamps are integers in nanoseconds, on the clock of the odometry.
 """
 
 import dataclasses
-from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from climber_uk.control.acting import Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
 from climber_uk.control.model import Observer, rolled
@@ -61,15 +60,14 @@ class Tracker:
         self.timing, self.pacing = timing, pacing
         self.period = timing.control_period  # [s] from one odometry to the next
         self._period_is_measured = False
-        self._acting: deque[tuple[int, Array]] = deque()  # when they begin to, torques
+        self._acting = Acting()
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
         self.reset()
 
     def reset(self) -> None:
         """Start anew, from an unknown state at an unknown time."""
         self.stamp = 0  # [ns]
-        for _, torques in list(self._acting)[-1:]:
-            self._acting = deque([(0, torques)])
+        self._acting.restart()
         self.state: State | None = None
         self.forget()
 
@@ -104,7 +102,7 @@ class Tracker:
             state, learnt = self.observer.corrected(
                 self.controller.climber, self.disturbance, expected, state, time
             )
-            if self._learning and self._acting[0][0] <= self.stamp:  # all that acted is known
+            if self._learning and self._acting.are_known_since(self.stamp):
                 self.disturbance = learnt
         elif self.observer.velocity_source == "pose":
             state = State(state.pose, np.zeros(3))
@@ -161,7 +159,7 @@ class Tracker:
         """State at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.state is not None
         state = self.state
-        for torques, time in self._acted(self.stamp, stamp):
+        for torques, time in self._acting.between(self.stamp, stamp):
             state = rolled(self.controller.climber, state, torques, self.disturbance, time)
         return state
 
@@ -185,30 +183,14 @@ class Tracker:
     def _begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
         delay = self.timing.transport_delay + age * self.timing.measure_delay
-        begins = self.stamp + round(delay * SECOND)
-        return max(begins, self._acting[-1][0]) if self._acting else begins
+        return self._acting.begin(self.stamp + round(delay * SECOND))
 
     def _situation(self, age: float) -> tuple[int, Situation]:
         begins = self._begin(age)
-        held = self._acting[-1][1] if self._acting else np.zeros(2)
         state = self.expected_at(begins)
-        return begins, Situation(state, held, self.disturbance, self.period)
+        return begins, Situation(state, self._acting.last, self.disturbance, self.period)
 
     def _send(self, begins: int, torques: Array) -> None:
-        self._acting.append((begins, torques))
-        since = max(self.stamp, begins - round(LONGEST_STEP * 2 * SECOND))
-        while len(self._acting) > 1 and self._acting[1][0] <= since:
-            self._acting.popleft()
-
-    def _acted(self, start: int, end: int) -> Iterator[tuple[Array, float]]:
-        """Torques that act from `start` to `end` [ns], each with how long it does [s]."""
-        torques: Array = np.zeros(2)
-        for begins, following in self._acting:
-            if begins >= end:
-                break
-            if begins > start:
-                yield torques, (begins - start) / SECOND
-                start = begins
-            torques = following
-        if end > start:
-            yield torques, (end - start) / SECOND
+        self._acting.add(begins, torques)
+        # without odometry, too, that of long ago is not needed
+        self._acting.forget_before(max(self.stamp, begins - round(2 * LONGEST_STEP * SECOND)))

@@ -98,7 +98,9 @@ class ClimberNode(Node):
         """Say where others publish what only one should, and how it goes."""
         for topic in self._alone_on:
             is_crowded = self.count_publishers(topic) > 1
-            self.say(topic, "more than one publisher" if is_crowded else "", is_fault=False)
+            self.say(
+                f"publishers of {topic}", "more than one" if is_crowded else "", is_fault=False
+            )
         self.diagnose()
 
     def diagnose(self) -> None:

@@ -14,7 +14,10 @@ from climber_uk.mechanics.shapes import SHAPES
 from climber_uk.mechanics.time_laws import TIME_LAWS, Stopping
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.messages import reading, writing
-from climber_uk.nodes.running import BEST_EFFORT, LATCHED, ClimberNode, run
+from climber_uk.nodes.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
+
+STANDSTILL = 0.2  # [s] of wall-clock time after which a clock that does not go on stands still
+ODOMETRY_AGE = 1.0  # [s] of an odometry that is too old to start at
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class TrajectoryPublisher(ClimberNode):
         )
         self.trajectory = self.planned
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
-        self.last_look = 0  # [ns] at the clock
+        self.last_look = self.stood_at = 0  # [ns] what the clock said
         self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
         self.next_point = 0  # every point is computed once: previews agree to the last bit
 
@@ -69,6 +72,7 @@ class TrajectoryPublisher(ClimberNode):
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_timer(self.options.publish_period, self.publish)
+        self.create_timer(STANDSTILL, self.publish_at_standstill, clock=WALL_CLOCK)
         self.odometry: Subscription | None = None  # only while a start is waited for
         if self.options.autostart:
             self.wait_for_odometry()
@@ -100,11 +104,19 @@ class TrajectoryPublisher(ClimberNode):
         """Start the trajectory `start_delay` after the stamp of `message`."""
         if self.odometry is None:
             return
+        now, stamp = self.get_clock().now().nanoseconds, reading.nanoseconds(message.header.stamp)
+        try:
+            reading.state(message, self.names.odom_frame, self.names.base_frame)
+            if now > 0 and abs(now - stamp) > ODOMETRY_AGE * SECOND:
+                raise ValueError("stamp is too far from the clock")
+        except ValueError as error:
+            self.say("start", "odometry refused", str(error))
+            return
+        self.say("start", "")
         self.destroy_subscription(self.odometry)
         self.odometry = None
         self.trajectory, self.next_point = self.planned, 0
         self.points.clear()
-        stamp = reading.nanoseconds(message.header.stamp)
         self.start = stamp + round(self.options.start_delay * SECOND)
         self.publish_around(self.start)
         self.get_logger().info(f"{self.options.shape} starts at {self.start / SECOND:.3f} s")
@@ -121,6 +133,13 @@ class TrajectoryPublisher(ClimberNode):
         self.last_look = now
         if self.start is not None:
             self.publish_around(max(self.start, now))
+
+    def publish_at_standstill(self) -> None:
+        """Publish again if time stands still: lock-step may wait for who missed the preview."""
+        now = self.get_clock().now().nanoseconds
+        if now == self.stood_at:
+            self.publish()
+        self.stood_at = now
 
     def publish_around(self, now: int) -> None:
         """Publish points from before the last preview to the end of the next one."""

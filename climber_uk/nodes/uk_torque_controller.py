@@ -127,15 +127,15 @@ class UkTorqueController(ClimberNode):
         return now
 
     def tell(self, answer: Answer | None) -> None:
-        """Publish an answer, if there is one, and say what changed."""
-        if answer is not None:
-            self.publish_torques(answer)
-            if answer.command is not None:
-                self.publish_causes(answer.stamp, answer.command)
+        """Say what has changed, and publish an answer if there is one."""
         mode = self.follower.mode
         if mode is not Mode.WAITING:
             trouble = "" if mode is Mode.FOLLOWING else mode.value
             self.say("safe output", trouble, self.follower.detail, mode.is_fault)
+        if answer is not None:
+            self.publish_torques(answer)
+            if answer.command is not None:
+                self.publish_causes(answer.stamp, answer.command)
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""

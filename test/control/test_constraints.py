@@ -49,14 +49,18 @@ def differences(function, state, demand, time):
 @given(cases)
 def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
     trajectory, time, *_ = case
-    gains = Guidance(2.0, 1.5, 1.3, 7.0, 6.0, 0.4)
+    gains = Guidance(2.0, 1.3, 7.0, 6.0, 0.4, 1.5, 3.0)
     state = state_of(case)
     demand = gains.demand(state, trajectory.at(time))
 
     def speed_error(state, time):
         reference = trajectory.at(time)
         e_x, _, _ = tracking_error(state.pose, reference)
-        return state.forward_speed - reference.speed + 1.5 * np.tanh(2.0 * e_x / 1.5)
+        v_d = reference.speed
+        most = 0.2 + 1.5 * abs(v_d) / np.hypot(v_d, 0.4)
+        if e_x * v_d > 0:
+            most = np.hypot(v_d, 0.2)
+        return state.forward_speed - v_d + most * np.tanh(2.0 * e_x / most)
 
     def heading_error(state, time):
         reference = trajectory.at(time)
@@ -66,7 +70,9 @@ def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
     value, rate, _ = differences(speed_error, state, demand, time)
     assert rate == pytest.approx(-7.0 * value, abs=1e-5 * (1 + abs(value)))
     value, rate, second = differences(heading_error, state, demand, time)
-    assert second == pytest.approx(-12.0 * rate - 36.0 * value, abs=1e-4 * (1 + abs(second)))
+    part = np.tanh(6.0 * value / 3.0)
+    expected = -6.0 * ((1 - part**2) * rate + rate + 3.0 * part)
+    assert second == pytest.approx(expected, abs=1e-4 * (1 + abs(second)))
 
 
 @settings(deadline=None)

@@ -13,7 +13,7 @@ from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.preview import SECOND
-from climber_uk.mechanics.shapes import Ellipse, Lemniscate, Line
+from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
@@ -141,6 +141,18 @@ def test_guidance_comes_back_from_far_off_without_spinning(seed):
     assert np.abs(run.torques).max() <= 4.0
 
 
+@pytest.mark.parametrize("time", [6.0, 14.0, 34.0, 42.0])
+def test_a_slow_climber_comes_to_a_new_path_from_anywhere_on_the_old_one(time):
+    """Behind, ahead, beside, turned the other way: it once drove off backwards for ever."""
+    eight = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))
+    circle = Trajectory(Circle(0.5), RestToRest(rate=0.4, ramp_time=1.0), origin=(-0.5, 3.0))
+    start = State(eight.at(time).pose, np.zeros(3))
+    run = simulate(circle, start, 18.0, follower(BUILT, BUILT_GAINS), BUILT)
+    assert run.distance[-1] < 2e-3
+    assert run.distance.max() < 2.5
+    assert np.abs(run.velocity[:, 2]).max() < 10.0
+
+
 def test_it_catches_up_with_a_reference_that_runs_already():
     start = State(np.array([3.0, 0.0, 2.0]), np.zeros(3))  # the reference has left at 10 m/s
     weak = replace(CLIMBER, max_wheel_torque=4.0)
@@ -234,9 +246,9 @@ def test_changed_gains_act_in_full_half_a_second_later():
     tracker.see(SECOND, START)
     changed = replace(tracker.controller, constraints=Guidance(along_track_gain=6.0))
     tracker.retune(changed, tracker.observer, tracker.timing, tracker.pacing)
-    assert tracker._constraints().along_track_gain == 3.0
+    assert tracker._constraints().along_track_gain == 5.0
     tracker.stamp += SECOND // 4
-    assert tracker._constraints().along_track_gain == pytest.approx(4.5)
+    assert tracker._constraints().along_track_gain == pytest.approx(5.5)
     tracker.stamp += SECOND // 4
     assert tracker._constraints() is changed.constraints
 

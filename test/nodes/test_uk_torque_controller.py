@@ -139,7 +139,7 @@ def test_disabled_it_gives_the_safe_output_until_it_is_enabled(world):
     world.wait(
         lambda: status and "disabled" in status[-1].status[0].message, "word of it in diagnostics"
     )
-    assert status[-1].status[0].level == DiagnosticStatus.ERROR
+    assert status[-1].status[0].level == DiagnosticStatus.WARN
     assert world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=True)).success
     loop.follows()
     world.wait(lambda: status[-1].status[0].level == DiagnosticStatus.OK, "all well")

@@ -1,0 +1,251 @@
+"""What the climber does when a part of it stops, dies, jumps or interferes, and how it recovers."""
+
+import math
+import signal
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Vector3Stamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from test_uk_torque_controller import Loop
+
+from climber_uk.mechanics.preview import SECOND
+from climber_uk.messages import reading
+
+pytestmark = pytest.mark.nodes
+
+CONTROLLER, PLANT, PLANNER = "uk_torque_controller", "plant_simulator", "trajectory_publisher"
+CROWDED, WHOSE = "more than one", "publishers of wheel_torques"
+LIMIT = 4.0  # [N m] of the configuration
+ON_PATH = 0.02  # [m]
+WALL_CLOCK = {  # patient: what is slow here is the machine
+    PLANT: ["command_timeout:=1.0"],
+    CONTROLLER: ["odometry_timeout:=1.0", "reference_timeout:=1.0"],
+    PLANNER: ["rest_to_rest.ramp_time:=1.0"],
+}
+LOCK_STEP = {
+    PLANT: ["simulated_time:=true", "lockstep_timeout:=2.0"],
+    CONTROLLER: ["use_sim_time:=true"],
+    PLANNER: ["use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"],
+}
+
+
+def said(world, name, subject="safe output"):
+    """What a node has logged about a subject, a line each."""
+    lines = [line.partition(f": {subject}: ") for line in world.log(name).splitlines()]
+    return [text for _, found, text in lines if found]
+
+
+class Climb:
+    """The three nodes, each in its process, and what they tell each other."""
+
+    def __init__(self, world, parameters):
+        self.world, self.parameters = world, parameters
+        for name in parameters:
+            self.start(name)
+        self.torques = world.listen(JointState, "wheel_torques")
+        self.joints = world.listen(JointState, "joint_states")
+        self.odometry = world.listen(Odometry, "odom")
+        self.errors = world.listen(Vector3Stamped, f"{CONTROLLER}/tracking_error")
+
+    def start(self, name, *others):
+        self.world.start_node(name, *self.parameters[name], *others, config="climber.yaml")
+
+    def kill(self, name):
+        self.world.end(name, signal.SIGKILL)
+
+    def is_under_way(self):
+        self.world.wait(self.is_moving, "motion")
+        self.is_on_path()
+
+    def is_moving(self):
+        return self.odometry and self.odometry[-1].twist.twist.linear.x > 0.1
+
+    def is_on_path(self):
+        """From now on the climber is answered, and comes to its path and stays there."""
+        begin = len(self.errors)
+
+        def is_near():
+            last = [error.vector for error in self.errors[begin:][-50:]]
+            return len(last) == 50 and all(math.hypot(e.x, e.y) < ON_PATH for e in last)
+
+        self.world.wait(is_near, "climber on its path")
+        assert all(abs(torque) <= LIMIT for m in self.torques for torque in m.effort)
+
+    def is_told(self, name, text, subject="safe output", begin=0):
+        self.world.wait(lambda: text in said(self.world, name, subject)[begin:], text)
+
+
+def test_odometry_that_stops_gets_the_safe_output_until_it_comes_back(world):
+    climb = Climb(world, WALL_CLOCK)
+    climb.is_under_way()
+    begin = len(said(world, CONTROLLER))
+    plant = world.processes[PLANT]
+    plant.send_signal(signal.SIGSTOP)
+    try:
+        climb.is_told(CONTROLLER, "no odometry", begin=begin)
+        last = len(climb.torques)
+        world.wait(lambda: len(climb.torques) > last, "safe output")
+        left, right = climb.torques[-1].effort
+        assert 0 < left == right  # the weight is held
+    finally:
+        plant.send_signal(signal.SIGCONT)
+    climb.is_on_path()
+    assert said(world, CONTROLLER)[begin:] == ["no odometry", "ok again"]
+
+
+def test_odometry_that_jumps_gets_the_safe_output_for_a_few_messages(world):
+    loop = Loop(world, "odometry_timeout:=1.0")
+
+    def elsewhere(message):
+        message.pose.pose.position.y += 1.0
+
+    loop.plan()
+    loop.follows()
+    begin = len(loop.torques)
+    loop.is_safe(spoil=elsewhere)
+    loop.until(any, "torque of a controller that follows", spoil=elsewhere)
+    efforts = [list(m.effort) for m in loop.torques[begin:]]
+    assert 0 < efforts.count([0.0, 0.0]) <= 5
+    assert all(abs(torque) <= 20.0 for effort in efforts for torque in effort)
+    world.wait(lambda: "ok again" in said(world, CONTROLLER)[-1:], "word of the recovery")
+    assert said(world, CONTROLLER)[-2:] == ["odometry jumped", "ok again"]
+    assert said(world, CONTROLLER).count("odometry jumped") == 1
+
+
+def test_odometry_of_the_future_is_refused(world):
+    loop = Loop(world, "odometry_timeout:=1.0")
+    loop.plan()
+    loop.follows()
+    loop.is_safe(age=-5 * SECOND)
+    loop.follows()
+    refused = "bad odometry (stamp is too far from the clock)"
+    world.wait(lambda: "ok again" in said(world, CONTROLLER)[-1:], "word of the recovery")
+    assert said(world, CONTROLLER)[-2:] == [refused, "ok again"]
+    assert said(world, CONTROLLER).count(refused) == 1
+
+
+def test_odometry_that_was_overtaken_is_ignored(world):
+    loop = Loop(world, "odometry_timeout:=1.0")
+    loop.plan()
+    loop.follows()
+    before = said(world, CONTROLLER)
+    begin = len(loop.torques)
+    newer = loop.tell()
+    overtaken = loop.tell(age=SECOND // 20)
+    last = loop.tell()
+
+    def answered():
+        return [reading.nanoseconds(m.header.stamp) for m in loop.torques[begin:]]
+
+    world.wait(lambda: last in answered(), "answer to the last one")
+    assert newer in answered()
+    assert overtaken not in answered()
+    assert said(world, CONTROLLER) == before
+
+
+def test_a_reference_that_stops_gets_the_safe_output_until_a_new_one_comes(world):
+    climb = Climb(world, WALL_CLOCK)
+    climb.is_under_way()
+    begin = len(said(world, CONTROLLER))
+    climb.kill(PLANNER)
+    climb.is_told(CONTROLLER, "no reference", begin=begin)
+    world.wait(lambda: climb.odometry[-1].twist.twist.linear.x == 0, "rest")
+    climb.start(PLANNER)
+    climb.is_on_path()
+    assert said(world, CONTROLLER)[begin:] == ["no reference", "ok again"]
+
+
+def test_without_a_controller_the_plant_applies_no_torque_until_there_is_one_again(world):
+    climb = Climb(world, WALL_CLOCK)
+    climb.is_under_way()
+    climb.kill(CONTROLLER)
+    world.wait(lambda: list(climb.joints[-1].effort) == [0.0, 0.0], "zero torque")
+    climb.start(CONTROLLER)
+    climb.is_on_path()
+    assert said(world, PLANT, "torque command") == ["stale; zero torque instead", "ok again"]
+
+
+def test_in_lock_step_the_plant_waits_for_a_new_controller(world):
+    climb = Climb(world, LOCK_STEP)
+    climb.is_under_way()
+    begin = len(said(world, PLANT, "lock-step"))
+    climb.kill(CONTROLLER)
+    (waits,) = world.wait(lambda: said(world, PLANT, "lock-step")[begin:], "word of it")
+    stamp = reading.nanoseconds(climb.odometry[-1].header.stamp)
+    assert waits == f"no torque for the odometry of {stamp / SECOND:.3f} s"
+    climb.start(CONTROLLER)
+    climb.is_on_path()
+    assert said(world, PLANT, "lock-step")[begin:] == [waits, "ok again"]
+
+
+def test_a_plant_that_starts_again_is_brought_to_the_path(world):
+    climb = Climb(world, WALL_CLOCK)
+    climb.is_under_way()
+    begin = len(said(world, CONTROLLER))
+    climb.kill(PLANT)
+    climb.is_told(CONTROLLER, "no odometry", begin=begin)
+    climb.start(PLANT)
+    climb.is_on_path()
+    assert said(world, CONTROLLER)[begin:] == ["no odometry", "ok again"]
+
+
+def test_in_lock_step_a_plant_whose_time_starts_again_is_brought_to_the_path(world):
+    climb = Climb(world, LOCK_STEP)
+    climb.is_under_way()
+    climb.kill(PLANT)
+    climb.start(PLANT)
+    starts = "lemniscate starts at 1.000 s"
+    world.wait(lambda: world.log(PLANNER).count(starts) == 2, "a start with the new time")
+    climb.is_under_way()
+
+
+def test_another_path_is_taken_up_from_where_the_climber_is(world):
+    climb = Climb(world, WALL_CLOCK)
+    climb.is_under_way()
+    climb.kill(PLANNER)
+    circle = ["shape:=circle", "circle.radius:=0.5", "origin_x:=-0.5"]
+    climb.start(PLANNER, *circle, "rest_to_rest.rate:=0.4", "rest_to_rest.laps:=9")
+
+    def are_on_circle():
+        places = [m.pose.pose.position for m in climb.odometry[-200:]]
+        return all(abs(math.hypot(p.x + 0.5, p.y - 3.0) - 0.5) < ON_PATH for p in places)
+
+    world.wait(are_on_circle, "climber on the circle")
+    climb.is_on_path()
+    assert are_on_circle()
+
+
+def test_a_flood_of_other_torques_is_survived_and_reported_once(world):
+    climb = Climb(world, WALL_CLOCK)
+    climb.is_under_way()
+    reports = world.listen(DiagnosticArray, "/diagnostics")
+    flood = world.speak(JointState, "wheel_torques")
+    names, begin = climb.torques[-1].name, len(climb.torques)
+
+    def is_reported():
+        flood.publish(JointState(name=names, effort=[1.0, -1.0]))  # for each message heard
+        crowded = [m.status[0].name for m in reports if WHOSE in m.status[0].message]
+        return len(climb.torques) > begin + 1000 and all(
+            crowded.count(f"/{name}") > 3 for name in (CONTROLLER, PLANT)
+        )
+
+    world.wait(is_reported, "word of it")
+    world.node.destroy_publisher(flood)
+    for name in (CONTROLLER, PLANT):
+        climb.is_told(name, "ok again", WHOSE)
+    climb.is_on_path()
+    for name in (CONTROLLER, PLANT):
+        assert said(world, name, WHOSE) == [CROWDED, "ok again"]
+
+
+def test_simulated_time_without_a_clock_gets_the_safe_output_until_there_is_one(world):
+    world.start_node(CONTROLLER, *LOCK_STEP[CONTROLLER], config="climber.yaml")
+    torques = world.listen(JointState, "wheel_torques")
+    world.wait(lambda: said(world, CONTROLLER), "word of it")
+    world.wait(lambda: torques and list(torques[-1].effort) == [0.0, 0.0], "safe output")
+    climb = Climb(world, {name: LOCK_STEP[name] for name in (PLANT, PLANNER)})
+    climb.is_on_path()
+    no_clock = "use_sim_time is true, but there is no clock"
+    assert said(world, CONTROLLER) == [no_clock, "ok again"]
