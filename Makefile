@@ -10,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 
-.PHONY: demo paper test lint unit colcon clean
+.PHONY: demo paper test lint unit soak colcon clean
 
 demo: $(SET_UP)
 	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT)
@@ -29,6 +29,10 @@ lint: $(SET_UP)
 unit: $(SET_UP)
 	$(BIN)/python -m pytest
 
+# Longer tests than CI has time for
+soak: $(SET_UP)
+	$(BIN)/python -m pytest -m soak
+
 # As in a ROS workspace, the tests of the mathematics and of what was installed
 colcon: $(SET_UP)
 	rm -rf build install log
@@ -36,7 +40,7 @@ colcon: $(SET_UP)
 		--event-handlers console_cohesion+
 	. $(BIN)/activate && . install/setup.sh && colcon test --packages-select climber_uk \
 		--event-handlers console_cohesion+ --return-code-on-test-failure \
-		--pytest-args -m "installed or not nodes"
+		--pytest-args -m "installed or not (nodes or slow or soak)"
 	. $(BIN)/activate && colcon test-result --all
 	rm -rf build install log
 

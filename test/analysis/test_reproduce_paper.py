@@ -14,6 +14,8 @@ from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.udwadia_kalaba import velocity_correction
 from climber_uk.simulation.plant import Plant
 
+pytestmark = pytest.mark.slow
+
 CONSISTENT = ConsistentSystem()
 STABILISED = ConsistentSystem(natural_frequency=5.0, hidden_rate=10.0)
 

@@ -17,6 +17,8 @@ from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
+pytestmark = pytest.mark.slow
+
 PAPER = Trajectory(Ellipse(), ConstantRate())
 START = State(np.array([0.0, 6.0, 0.0]), np.array([10.0, 0.0, -0.6]))
 RAMPED = Trajectory(Ellipse(), RestToRest(rate=1.0, ramp_time=3.0, laps=9))

@@ -1,4 +1,7 @@
-"""Two thousand random messages on every topic: the nodes live, stay finite, and go on working."""
+"""Random messages on every topic: the nodes live, stay finite, and go on working.
+
+Some hundred here, two thousand with `make soak`.
+"""
 
 import importlib
 import itertools
@@ -24,7 +27,11 @@ from climber_uk.messages import reading, writing
 
 pytestmark = pytest.mark.nodes
 
-BATCHES, SIZE = 84, 24
+SIZE = 24
+SOME, MANY = 16, 84  # batches: 384 messages, 2016 messages
+HOW_MANY = pytest.mark.parametrize(
+    "batches", [SOME, pytest.param(MANY, marks=pytest.mark.soak)], ids=["some", "many"]
+)
 # a good one ends each batch and fills the history: only then is it acknowledged at once
 DEEP = QoSProfile(depth=SIZE + 1)
 DEEP_SUBSCRIPTIONS = [  # so that no message of a batch is lost
@@ -101,13 +108,13 @@ def changed(message, changes):
     return message
 
 
-def storm(template, send):
+def storm(template, send, batches):
     """Send batches of (age of the stamp, what to change in a good message)."""
     sent = []
     anything = st.one_of(changes(template, most=2), changes(template, most=30))
 
     @settings(
-        max_examples=BATCHES,
+        max_examples=batches,
         deadline=None,
         derandomize=True,
         database=None,
@@ -120,7 +127,7 @@ def storm(template, send):
         sent.extend(batch)
 
     send_batch()
-    assert len(sent) >= 2000
+    assert len(sent) >= batches * SIZE
 
 
 def stamp(message):
@@ -190,6 +197,7 @@ def good_pressure(now):
     return message
 
 
+@HOW_MANY
 @pytest.mark.parametrize(
     ("kind", "topic", "good"),
     [
@@ -199,7 +207,9 @@ def good_pressure(now):
     ],
     ids=["odom", "reference", "suction_pressure"],
 )
-def test_the_controller_survives_whatever_it_is_told_and_follows_again(world, kind, topic, good):
+def test_the_controller_survives_whatever_it_is_told_and_follows_again(
+    world, kind, topic, good, batches
+):
     loop = Loop(world, "odometry_timeout:=0.1", "reference_timeout:=0.05", *DEEP_SUBSCRIPTIONS)
     publisher = speak(world, kind, topic)
     loop.plan()
@@ -217,7 +227,7 @@ def test_the_controller_survives_whatever_it_is_told_and_follows_again(world, ki
         world.wait(is_answered, "answer after a batch")
         assert efforts_are_finite(loop.torques[begin:])
 
-    storm(good(loop.now()), send)
+    storm(good(loop.now()), send, batches)
     speak(world, FluidPressure, "suction_pressure").publish(good_pressure(loop.now()))
     loop.begin = loop.now()
     loop.plan()
@@ -231,7 +241,8 @@ def good_torques(now, torque=1.0):
     )
 
 
-def test_the_plant_survives_whatever_it_is_told_and_obeys_again(world):
+@HOW_MANY
+def test_the_plant_survives_whatever_it_is_told_and_obeys_again(world, batches):
     world.start_node("plant_simulator", *DEEP_SUBSCRIPTIONS)
     joints, odometry = world.listen(JointState, "joint_states"), world.listen(Odometry, "odom")
     publisher = speak(world, JointState, "wheel_torques")
@@ -248,13 +259,14 @@ def test_the_plant_survives_whatever_it_is_told_and_obeys_again(world):
 
         world.wait(acts, "torque to act")
 
-    storm(good_torques(0), send)
+    storm(good_torques(0), send, batches)
     assert odometry_is_finite(odometry)
     assert efforts_are_finite(joints)
     assert "Traceback" not in world.log("plant_simulator")
 
 
-def test_the_plant_in_lock_step_survives_whatever_it_is_told_and_steps_again(world):
+@HOW_MANY
+def test_the_plant_in_lock_step_survives_whatever_it_is_told_and_steps_again(world, batches):
     world.start_node("plant_simulator", "simulated_time:=true", *DEEP_SUBSCRIPTIONS)
     odometry = world.listen(Odometry, "odom")
     publisher = speak(world, JointState, "wheel_torques")
@@ -270,12 +282,13 @@ def test_the_plant_in_lock_step_survives_whatever_it_is_told_and_steps_again(wor
 
         world.wait(is_a_step_further, "step")
 
-    storm(good_torques(0), send)
+    storm(good_torques(0), send, batches)
     assert odometry_is_finite(odometry)
     assert "Traceback" not in world.log("plant_simulator")
 
 
-def test_the_trajectory_publisher_survives_whatever_it_is_told_and_starts_again(world):
+@HOW_MANY
+def test_the_trajectory_publisher_survives_whatever_it_is_told_and_starts_again(world, batches):
     world.start_node("trajectory_publisher", "autostart:=false", *DEEP_SUBSCRIPTIONS)
     references = world.listen(MultiDOFJointTrajectory, "reference")
     publisher = world.node.create_publisher(Odometry, "odom", DEEP)
@@ -291,7 +304,7 @@ def test_the_trajectory_publisher_survives_whatever_it_is_told_and_starts_again(
         now = world.node.get_clock().now().nanoseconds
         start(lambda: publish(publisher, spoilt(good_odometry, now, batch)))
 
-    storm(good_odometry(0), send)
+    storm(good_odometry(0), send, batches)
     now = world.node.get_clock().now().nanoseconds
     start(lambda: publisher.publish(good_odometry(now)))
     assert stamp(references[-1]) == now

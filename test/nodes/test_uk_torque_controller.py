@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -198,3 +199,13 @@ def test_a_second_climber_keeps_to_its_namespace(world):
 
     world.wait(lambda: wanted <= names(), "topics of the namespace")
     assert not names() & {"/odom", "/reference", "/wheel_torques"}
+
+
+def test_what_the_model_does_not_expect_is_published(world):
+    loop = Loop(world, "odometry_timeout:=1.0")
+    disturbances = world.listen(WrenchStamped, f"{NAME}/disturbance")
+    loop.plan()
+    # this robot goes its way whatever the torques are
+    loop.until(lambda _: any(m.wrench.force.x for m in disturbances), "disturbance")
+    assert disturbances[-1].header.frame_id == "base_link"
+    assert not disturbances[-1].wrench.force.y
