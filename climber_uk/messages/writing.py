@@ -25,6 +25,8 @@ from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.trajectory import Reference
 
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
 
 def time(nanoseconds: int) -> Time:
     """Stamp of `nanoseconds`."""
@@ -120,13 +122,16 @@ def wrench(planar: Sequence[float] | Array, stamp: int, frame: str) -> WrenchSta
 
 def diagnostics(name: str, fault: str, values: Mapping[str, object], stamp: int) -> DiagnosticArray:
     """One status: OK, or an ERROR that says `fault`."""
-    status = DiagnosticStatus(
-        name=name,
-        level=DiagnosticStatus.ERROR if fault else DiagnosticStatus.OK,
-        message=fault or "ok",
-        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-    )
-    message = DiagnosticArray(status=[status])
+    return status(name, (ERROR if fault else OK), fault or "ok", values, stamp)
+
+
+def status(
+    name: str, level: bytes, said: str, values: Mapping[str, object], stamp: int
+) -> DiagnosticArray:
+    """One status of any level."""
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    one = DiagnosticStatus(name=name, level=level, message=said, values=pairs)
+    message = DiagnosticArray(status=[one])
     message.header.stamp = time(stamp)
     return message
 

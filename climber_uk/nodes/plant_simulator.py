@@ -2,20 +2,27 @@
 
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import FluidPressure, JointState
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.contact import AMPLE, Contact, Grip
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.running import WALL_CLOCK, ClimberNode, run
+from climber_uk.simulation.inputs import FellOff, NotFinite
+from climber_uk.simulation.machine import NONE, VARIANTS, Machine, Parts, Physics, Push
+from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.sensors import Sensors
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -34,9 +41,15 @@ class Options:
     simulated_time: bool = parameter(
         False, "", "publish /clock and step when a torque answers the odometry: lock-step"
     )
+    real_time_factor: float = parameter(
+        0.0, "", "most of simulated time to the wall clock's; 0: as answers come", at_least=0
+    )
     control_period: float = parameter(0.005, "s", "between two odometry messages", above=0)
     integration_step: float = parameter(0.0025, "s", "of the integrator", above=0)
     command_timeout: float = parameter(0.1, "s", "age at which a torque is dropped", above=0)
+    push_timeout: float = parameter(
+        0.5, "s", "age at which a push ends; 0: with the next one", at_least=0
+    )
     lockstep_timeout: float = parameter(5.0, "s", "wall-clock wait that is reported", above=0)
     initial_x: float = parameter(0.0, "m", "x at the start")
     initial_y: float = parameter(0.0, "m", "y at the start")
@@ -51,6 +64,8 @@ class Options:
                 f"control_period={self.control_period} must be a multiple of "
                 f"integration_step={self.integration_step} [s]"
             )
+        if self.real_time_factor > 0 and not self.simulated_time:
+            raise ValueError(f"real_time_factor={self.real_time_factor} needs simulated_time=True")
 
     @property
     def steps(self) -> int:
@@ -64,6 +79,25 @@ class Options:
         return State.rolling(pose, self.initial_speed, self.initial_yaw_rate)
 
 
+@dataclass(frozen=True)
+class Alarm:
+    """Margins that are worth a word; see `Contact`."""
+
+    warn_margin: float = parameter(1.5, "", "below which margins warn", at_least=0, runtime=True)
+    error_margin: float = parameter(
+        1.0, "", "below which they are errors", at_least=0, runtime=True
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def level(self, margin: float) -> bytes:
+        """Level of a status."""
+        if margin < self.error_margin:
+            return writing.ERROR
+        return writing.WARN if margin < self.warn_margin else writing.OK
+
+
 class PlantSimulator(ClimberNode):
     """The plant with its time: the wall clock's, or its own that waits for every torque.
 
@@ -72,50 +106,117 @@ class PlantSimulator(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__("plant_simulator")
-        for kind in (Options, Climber):
+        for kind in (Options, Climber, Physics, Grip, Motors, Sensors, Alarm):
             self.parameters.declare(kind)
+        for variants in VARIANTS.values():
+            for name, variant in variants.items():
+                self.parameters.declare(variant, f"{name}.")
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
+        self.alarm = self.parameters.read(Alarm)
         self.period = round(self.options.control_period * SECOND)  # [ns]
-        self.on_parameters()
+        self.paused = self.granted = False
+        simulated = self.options.simulated_time
+        # 0 would mean that there is no time yet
+        self.stamp = SECOND if simulated else self.get_clock().now().nanoseconds
         self.place_at_start()
 
         self.odometry = self.publisher(Odometry, "odom")
+        self.truth = self.publisher(Odometry, "ground_truth")
         self.joints = self.publisher(JointState, "joint_states")
         self.pressure = self.publisher(FluidPressure, "suction_pressure")
+        self.margins = self.publisher(Vector3Stamped, "~/margins")
         self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
         self.subscription(JointState, "wheel_torques", self.on_torques)
+        self.subscription(WrenchStamped, "push", self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
+        self.create_service(SetBool, "~/pause", self.on_pause)
+        self.create_service(Trigger, "~/step", self.on_step)
         self.start_diagnostics(self.values)
-        if self.options.simulated_time:
-            self.stamp = SECOND  # [ns]; 0 would mean that there is no time yet
+        self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
+        if simulated:
             self.clock = self.publisher(ClockMessage, "/clock")
             self.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
+            if self.options.real_time_factor > 0:
+                self.create_timer(self.pace / SECOND, self.go_on, clock=WALL_CLOCK)
         else:
-            self.stamp = self.get_clock().now().nanoseconds
             self.create_timer(self.options.control_period, self.keep_up)
-        self.stepped_at = WALL_CLOCK.now()
         self.publish_state()
 
+    def parts(self) -> Parts:
+        """What the parameters say that the climber is made of."""
+        read = self.parameters.read
+        physics, step = read(Physics), self.options.integration_step
+        chosen: dict[str, Any] = {}
+        for group, variants in VARIANTS.items():
+            name = getattr(physics, group)
+            chosen[group] = read(variants[name], f"{name}.")
+        wall = chosen.pop("wall")
+        contact = Contact(**chosen, grip=read(Grip))
+        plant = Plant(read(Climber), step, contact, wall, physics.slip)
+        return Parts(plant, read(Motors), read(Sensors), physics)
+
     def on_parameters(self) -> None:
-        """Take up a changed suction pressure."""
-        self.plant = Plant(self.parameters.read(Climber), self.options.integration_step)
+        """Take up what was changed: the pump's pressure, a magnet's gap, levels of alarm."""
+        self.machine.take(self.parts())
+        self.alarm = self.parameters.read(Alarm)
+
+    # Commands
 
     def place_at_start(self) -> None:
         """Go back to the initial state, with no torque yet."""
-        self.state = self.options.initial_state
-        self.held = bool(self.state.velocity.any())
-        self.angles: Array = np.zeros(2)  # [rad] of the wheels: right, left
-        self.applied: Array = np.zeros(2)  # [N m] right, left
+        start = self.options.initial_state
+        self.machine = Machine(self.parts(), start, self.options.control_period)
+        self.held = bool(start.velocity.any())
+        self.origin = self.stamp  # of the first odometry [ns]
         self.commands: deque[tuple[int, Array]] = deque()  # arrival [ns], torques
+        self.pushes: deque[tuple[int, Push]] = deque()  # begin [ns]
+        self.fallen = self.answered = False
+        self.lowest = AMPLE, AMPLE  # margins since they were told
+        self.told = writing.OK
 
     def on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start again from the initial state; time goes on."""
-        self.place_at_start()
         self.stamp += self.period
+        self.catch_up()
+        self.place_at_start()
+        self.say("climber", "")
         self.publish_state()
         response.success, response.message = True, f"at the start at {self.stamp * 1e-9:.3f} s"
         return response
+
+    def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Stop the climber's time, or let it go on."""
+        if self.paused and not request.data:
+            self.catch_up()
+        self.paused, self.granted = bool(request.data), False
+        response.success = True
+        response.message = f"{'paused' if self.paused else 'going on'} at {self.stamp * 1e-9:.3f} s"
+        self.go_on()
+        return response
+
+    def on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Go on by one control period, once the torque for it is there."""
+        response.success, response.message = False, "not paused"
+        if self.fallen:
+            response.message = "fallen: reset first"
+        elif self.paused:
+            response.success, response.message = True, f"from {self.stamp * 1e-9:.3f} s"
+            self.granted = True
+            self.catch_up()
+            self.go_on()
+        return response
+
+    def on_push(self, message: WrenchStamped) -> None:
+        """Push from the message's stamp on, or from now if it has none or is late."""
+        try:
+            wrench = reading.wrench(message, self.names.odom_frame, self.names.base_frame)
+        except ValueError as error:
+            self.say("push", "refused", str(error))
+            return
+        self.say("push", "")
+        begin = reading.nanoseconds(message.header.stamp) or self.stamp
+        self.pushes.append((begin, Push(*wrench)))
 
     def on_torques(self, message: JointState) -> None:
         """Apply torques from now on or, in simulated time, for a step if they answer the last."""
@@ -128,44 +229,16 @@ class PlantSimulator(ClimberNode):
         except ValueError as error:
             self.say("wheel_torques", "refused, zero torque instead", str(error))
             torques = np.zeros(2)
-        limit = self.plant.climber.max_wheel_torque
+        limit = self.machine.plant.climber.max_wheel_torque
         torques = np.clip(torques, -limit, limit)
         self.held = self.held and not torques.any()
         if not self.options.simulated_time:
             self.commands.append((self.get_clock().now().nanoseconds, torques))
-        elif reading.nanoseconds(message.header.stamp) == self.stamp:
+        elif reading.nanoseconds(message.header.stamp) == self.asked and not self.answered:
             self.commands = deque([(self.stamp, torques)])
-            self.step()
+            self.answered = True
             self.say("lock-step", "")
-
-    def ask_again(self) -> None:
-        """Publish the odometry once more to whom missed it; report who does not answer."""
-        waited = (WALL_CLOCK.now() - self.stepped_at).nanoseconds
-        if waited > ASK_AGAIN * SECOND:
-            self.publish_state()
-        if waited > self.options.lockstep_timeout * SECOND:
-            self.say("lock-step", f"no torque for the odometry of {self.stamp * 1e-9:.3f} s")
-
-    def keep_up(self) -> None:
-        """Step until the clock's time is reached."""
-        now = self.get_clock().now().nanoseconds
-        if now - self.stamp > FALLEN_BEHIND * SECOND:
-            self.get_logger().warning(f"{(now - self.stamp) * 1e-9:.1f} s behind: left out")
-            self.stamp = now - self.period
-        while self.stamp + self.period <= now:
-            self.step()
-
-    def step(self) -> None:
-        """Advance by a control period and publish."""
-        rates = self.plant.climber.wheel_rates(self.state)
-        for number in range(0 if self.held else self.options.steps):
-            self.applied = self.command_at(self.stamp + number * self.period // self.options.steps)
-            self.state = self.plant.advance(self.state, self.applied, steps=1)
-        rates = (rates + self.plant.climber.wheel_rates(self.state)) / 2
-        self.angles = self.angles + rates * self.options.control_period * (not self.held)
-        self.stamp += self.period
-        self.stepped_at = WALL_CLOCK.now()
-        self.publish_state()
+            self.go_on()
 
     def command_at(self, time: int) -> Array:
         """Torques that act at `time` [ns]: the last to arrive, unless they are too old."""
@@ -179,32 +252,144 @@ class PlantSimulator(ClimberNode):
         self.say("torque command", "stale; zero torque instead" if stale else "")
         return np.zeros(2) if stale else self.commands[0][1]
 
+    def push_at(self, time: int) -> Push:
+        """Push that acts at `time` [ns]: the last to begin, unless it is too old."""
+        while len(self.pushes) > 1 and self.pushes[1][0] <= time:
+            self.pushes.popleft()
+        if not self.pushes or self.pushes[0][0] > time:
+            return NONE
+        timeout = self.options.push_timeout
+        if timeout > 0 and time - self.pushes[0][0] >= timeout * SECOND:
+            return NONE
+        return self.pushes[0][1]
+
+    # Time
+
+    @property
+    def asked(self) -> int:
+        """Stamp of the odometry that is published last [ns]."""
+        number, _ = self.machine.odometer.latest()
+        return self.origin + number * self.period
+
+    @property
+    def pace(self) -> float:
+        """Of the wall clock for a control period [ns]."""
+        return self.period / self.options.real_time_factor
+
+    def ask_again(self) -> None:
+        """Publish the odometry once more to whom missed it; report who does not answer."""
+        waited = WALL_CLOCK.now().nanoseconds - self.stepped_at
+        if self.answered or self.fallen:
+            return
+        if waited > ASK_AGAIN * SECOND:
+            self.publish_state()
+        if waited > self.options.lockstep_timeout * SECOND:
+            self.say("lock-step", f"no torque for the odometry of {self.asked * 1e-9:.3f} s")
+
+    def go_on(self) -> None:
+        """Step if nothing speaks against it: no answer yet, a pause, the pace of time."""
+        if self.fallen or (self.paused and not self.granted):
+            return
+        if self.options.simulated_time:
+            if not self.answered:
+                return
+            if self.options.real_time_factor > 0:
+                now = WALL_CLOCK.now().nanoseconds
+                if now < self.due:
+                    return
+                self.due = max(self.due + self.pace, now - FALLEN_BEHIND * SECOND)
+        elif not self.granted:
+            return
+        self.granted = self.answered = False
+        self.step()
+
+    def keep_up(self) -> None:
+        """Step until the clock's time is reached."""
+        now = self.get_clock().now().nanoseconds
+        if self.paused or self.fallen:
+            return
+        if now - self.stamp > FALLEN_BEHIND * SECOND:
+            self.get_logger().warning(f"{(now - self.stamp) * 1e-9:.1f} s behind: left out")
+            self.catch_up()
+        while self.stamp + self.period <= now and not self.fallen:
+            self.step()
+
+    def catch_up(self) -> None:
+        """Leave out what has passed on the wall clock, but for the last period."""
+        if not self.options.simulated_time:
+            missed = self.get_clock().now().nanoseconds - self.period - self.stamp
+            self.stamp, self.origin = self.stamp + missed, self.origin + missed
+
+    def step(self) -> None:
+        """Advance by a control period and publish; a climber that falls is heard of no more."""
+        try:
+            for number in range(0 if self.held else self.options.steps):
+                time = self.stamp + number * self.period // self.options.steps
+                self.machine.advance(self.command_at(time), self.push_at(time))
+        except (FellOff, NotFinite) as error:
+            self.fallen = True
+            self.say("climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error))
+            return
+        self.machine.measure()
+        self.stamp += self.period
+        self.stepped_at = WALL_CLOCK.now().nanoseconds
+        self.publish_state()
+
+    # What it tells
+
     def publish_state(self) -> None:
         """Publish all that a robot would tell, the odometry first: it is waited for."""
-        names, stamp = self.names, writing.time(self.stamp)
-        odometry = writing.odometry(self.state, self.stamp, names.odom_frame, names.base_frame)
-        self.odometry.publish(odometry)
+        names, stamp, machine = self.names, writing.time(self.stamp), self.machine
+        frames = names.odom_frame, names.base_frame
+        _, measured = machine.odometer.latest()
+        self.odometry.publish(writing.odometry(measured, self.asked, *frames))
         if self.options.simulated_time:
             self.clock.publish(ClockMessage(clock=stamp))
+        truth = writing.odometry(machine.state, self.stamp, *frames)
+        self.truth.publish(truth)
         joints = writing.wheel_torques(
-            self.applied, self.stamp, names.left_wheel_joint, names.right_wheel_joint
+            machine.torques, self.stamp, names.left_wheel_joint, names.right_wheel_joint
         )
-        joints.position = self.angles[::-1].tolist()
-        joints.velocity = self.plant.climber.wheel_rates(self.state)[::-1].tolist()
+        joints.position = machine.angles[::-1].tolist()
+        joints.velocity = machine.rates[::-1].tolist()
         self.joints.publish(joints)
         if self.transform is not None:
-            self.transform.publish(TFMessage(transforms=[writing.transform(odometry)]))
+            self.transform.publish(TFMessage(transforms=[writing.transform(truth)]))
+        self.publish_margins()
         if self.stamp % PRESSURE_PERIOD < self.period:
-            pressure = FluidPressure(fluid_pressure=self.plant.climber.suction_pressure)
+            pressure = FluidPressure(fluid_pressure=machine.pressure)
             pressure.header.stamp = stamp
             self.pressure.publish(pressure)
+
+    def publish_margins(self) -> None:
+        """Publish slip margin, tip margin and the wheels' load [N]; tell at once if they worsen."""
+        slip, tip = margins = self.machine.margins()
+        load = self.machine.plant.wheel_load(self.machine.state)
+        message = writing.vector((*margins, load), self.stamp, self.names.base_frame)
+        self.margins.publish(message)
+        self.lowest = min(slip, self.lowest[0]), min(tip, self.lowest[1])
+        if self.alarm.level(min(margins)) > self.told:
+            self.diagnose()
+
+    def diagnose(self) -> None:
+        """Publish troubles and values, and how near to slipping and tipping it has been."""
+        super().diagnose()
+        slip, tip = self.lowest
+        self.told, self.lowest = self.alarm.level(min(slip, tip)), self.machine.margins()
+        if self._diagnostics is not None:
+            name = f"{self.get_fully_qualified_name()}: margins"
+            said = f"lowest: slip margin {slip:.2f}, tip margin {tip:.2f}"
+            values = {"slip margin": slip, "tip margin": tip}
+            now = self.get_clock().now().nanoseconds
+            self._diagnostics.publish(writing.status(name, self.told, said, values, now))
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
         return {
             "time [s]": self.stamp * 1e-9,
-            "suction pressure [Pa]": self.plant.climber.suction_pressure,
-            "side slip [m/s]": float(self.state.side_slip),
+            "suction pressure [Pa]": self.machine.pressure,
+            "side slip [m/s]": float(self.machine.state.side_slip),
+            "paused": self.paused,
         }
 
 

@@ -5,7 +5,7 @@ Smooth motion is integrated by Runge-Kutta (`body`), sticking and sliding of the
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from climber_uk.simulation.inputs import NO_PUSH, FellOff, Given, NotFinite, Pla
 from climber_uk.simulation.rolling import Rolling
 from climber_uk.simulation.sliding import Sliding
 
+CONTACT, UPRIGHT = Contact(), Plane()
 SIDEWAYS = 1e-9  # of the speed, and of 1 m/s: more than rounding makes of rolling
 
 
@@ -31,8 +32,8 @@ class Plant:
 
     climber: Climber
     step: float  # [s]
-    contact: Contact = field(default_factory=Contact)
-    wall: Wall = field(default_factory=Plane)
+    contact: Contact = CONTACT
+    wall: Wall = UPRIGHT
     slip: bool = False  # whether wheels slip where their load does not suffice
 
     def __post_init__(self) -> None:
@@ -49,9 +50,8 @@ class Plant:
         """
         given = Given.of(self.climber, torques, push)
         try:
-            with np.errstate(all="ignore"):
-                end = self._advance(state, given, steps)
-        except (ValueError, OverflowError, ZeroDivisionError) as error:
+            end = self._advance(state, given, steps)
+        except (ValueError, ArithmeticError, RuntimeWarning) as error:  # numpy warns, or raises
             raise NotFinite(f"{error} in {steps} steps from {state}") from None
         if not math.isfinite(sum(end.pose.tolist()) + sum(end.velocity.tolist())):
             raise NotFinite(f"{end} after {steps} steps from {state}")
@@ -78,6 +78,15 @@ class Plant:
         if isinstance(state, PlantState):
             rates = rates + state.slip / self.climber.wheel_radius
         return rates
+
+    def as_wheels_tell(self, state: State) -> State:
+        """State of a climber that rolls as its wheels turn, whether or not they slip."""
+        if not (isinstance(state, PlantState) and state.slip.any()):
+            return state
+        climber = self.climber
+        right, left = (climber.wheel_radius * self.wheel_rates(state)).tolist()
+        yaw_rate = (right - left) / (2 * climber.half_track)
+        return State.rolling(state.pose, (right + left) / 2, yaw_rate)
 
     def wheel_load(self, state: State) -> float:
         """N_w [N]."""

@@ -75,10 +75,11 @@ class Rolling:
 
     def _direction(self, y: Array, given: Given) -> float:
         """Way the seal slides: 1 forwards, -1 backwards, 0 where friction holds it."""
-        speed, push = forward_speed(y), self.body.push(y, given)
-        if speed == 0 and abs(push) <= self.body.stiction:
-            return 0.0
-        return float(np.sign(speed or push))
+        speed = forward_speed(y)
+        if speed != 0:
+            return 1.0 if speed > 0 else -1.0
+        push = self.body.push(y, given)
+        return 0.0 if abs(push) <= self.body.stiction else float(np.sign(push))
 
     def _margin(self, y: Array, given: Given, direction: float) -> float:
         """Falls below 0 where sliding in `direction` ends or, for 0, where friction gives way."""
