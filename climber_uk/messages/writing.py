@@ -101,7 +101,7 @@ def path(poses: Array, stamp: int, odom_frame: str) -> Path:
     return path
 
 
-def vector(vector: Iterable[Array], stamp: int, frame: str) -> Vector3Stamped:
+def vector(vector: Iterable[Array | float], stamp: int, frame: str) -> Vector3Stamped:
     """Three numbers with a stamp."""
     x, y, z = (float(component) for component in vector)
     message = Vector3Stamped(vector=Vector3(x=x, y=y, z=z))

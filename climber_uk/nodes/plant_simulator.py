@@ -1,101 +1,31 @@
 """A climber on its wall in a robot's place: wheel torques in, odometry out."""
 
-from collections import deque
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Vector3Stamped, WrenchStamped
-from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import FluidPressure, JointState
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import AMPLE, Contact, Grip
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading, writing
+from climber_uk.nodes.plant_topics import PlantTopics
 from climber_uk.nodes.running import WALL_CLOCK, ClimberNode, run
 from climber_uk.simulation.inputs import FellOff, NotFinite
 from climber_uk.simulation.machine import NONE, VARIANTS, Machine, Parts, Physics, Push
 from climber_uk.simulation.motors import Motors
+from climber_uk.simulation.options import Alarm, Options
 from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.schedule import Schedule
 from climber_uk.simulation.sensors import Sensors
 
-try:
-    from tf2_msgs.msg import TFMessage
-except ImportError:  # it comes with a ROS installation, not with the wheels
-    TFMessage = None
-
 ASK_AGAIN = 0.2  # [s] of wall-clock time, for a torque that does not come
-PRESSURE_PERIOD = SECOND // 10  # [ns] of the suction pressure, which changes slowly
 FALLEN_BEHIND = 1.0  # [s] from which lost wall-clock time is not made up for
-
-
-@dataclass(frozen=True)
-class Options:
-    """How time passes, and where the climber starts."""
-
-    simulated_time: bool = parameter(
-        False, "", "publish /clock and step when a torque answers the odometry: lock-step"
-    )
-    real_time_factor: float = parameter(
-        0.0, "", "most of simulated time to the wall clock's; 0: as answers come", at_least=0
-    )
-    control_period: float = parameter(0.005, "s", "between two odometry messages", above=0)
-    integration_step: float = parameter(0.0025, "s", "of the integrator", above=0)
-    command_timeout: float = parameter(0.1, "s", "age at which a torque is dropped", above=0)
-    push_timeout: float = parameter(
-        0.5, "s", "age at which a push ends; 0: with the next one", at_least=0
-    )
-    lockstep_timeout: float = parameter(5.0, "s", "wall-clock wait that is reported", above=0)
-    initial_x: float = parameter(0.0, "m", "x at the start")
-    initial_y: float = parameter(0.0, "m", "y at the start")
-    initial_heading: float = parameter(0.0, "rad", "heading at the start")
-    initial_speed: float = parameter(0.0, "m/s", "forward speed at the start")
-    initial_yaw_rate: float = parameter(0.0, "rad/s", "yaw rate at the start")
-
-    def __post_init__(self) -> None:
-        check(self)
-        if abs(self.steps * self.integration_step - self.control_period) > 1e-9:
-            raise ValueError(
-                f"control_period={self.control_period} must be a multiple of "
-                f"integration_step={self.integration_step} [s]"
-            )
-        if self.real_time_factor > 0 and not self.simulated_time:
-            raise ValueError(f"real_time_factor={self.real_time_factor} needs simulated_time=True")
-
-    @property
-    def steps(self) -> int:
-        """Integration steps in a control period."""
-        return max(1, round(self.control_period / self.integration_step))
-
-    @property
-    def initial_state(self) -> State:
-        """Where the climber starts; it does not slip."""
-        pose = np.array([self.initial_x, self.initial_y, self.initial_heading])
-        return State.rolling(pose, self.initial_speed, self.initial_yaw_rate)
-
-
-@dataclass(frozen=True)
-class Alarm:
-    """Margins that are worth a word; see `Contact`."""
-
-    warn_margin: float = parameter(1.5, "", "below which margins warn", at_least=0, runtime=True)
-    error_margin: float = parameter(
-        1.0, "", "below which they are errors", at_least=0, runtime=True
-    )
-
-    def __post_init__(self) -> None:
-        check(self)
-
-    def level(self, margin: float) -> bytes:
-        """Level of a status."""
-        if margin < self.error_margin:
-            return writing.ERROR
-        return writing.WARN if margin < self.warn_margin else writing.OK
+CATCH_UP = 0.1  # [s] of the wall clock that simulated time may make up for
+LEVELS = writing.OK, writing.WARN, writing.ERROR
 
 
 class PlantSimulator(ClimberNode):
@@ -121,12 +51,7 @@ class PlantSimulator(ClimberNode):
         self.stamp = SECOND if simulated else self.get_clock().now().nanoseconds
         self.place_at_start()
 
-        self.odometry = self.publisher(Odometry, "odom")
-        self.truth = self.publisher(Odometry, "ground_truth")
-        self.joints = self.publisher(JointState, "joint_states")
-        self.pressure = self.publisher(FluidPressure, "suction_pressure")
-        self.margins = self.publisher(Vector3Stamped, "~/margins")
-        self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
+        self.topics = PlantTopics(self, self.period, simulated)
         self.subscription(JointState, "wheel_torques", self.on_torques)
         self.subscription(WrenchStamped, "push", self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
@@ -135,7 +60,6 @@ class PlantSimulator(ClimberNode):
         self.start_diagnostics(self.values)
         self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
         if simulated:
-            self.clock = self.publisher(ClockMessage, "/clock")
             self.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
             if self.options.real_time_factor > 0:
                 self.create_timer(self.pace / SECOND, self.go_on, clock=WALL_CLOCK)
@@ -169,15 +93,17 @@ class PlantSimulator(ClimberNode):
         self.machine = Machine(self.parts(), start, self.options.control_period)
         self.held = bool(start.velocity.any())
         self.origin = self.stamp  # of the first odometry [ns]
-        self.commands: deque[tuple[int, Array]] = deque()  # arrival [ns], torques
-        self.pushes: deque[tuple[int, Push]] = deque()  # begin [ns]
+        timeout = 0.0 if self.options.simulated_time else self.options.command_timeout
+        self.commands: Schedule[Array] = Schedule(round(timeout * SECOND))
+        self.pushes: Schedule[Push] = Schedule(round(self.options.push_timeout * SECOND))
         self.fallen = self.answered = False
         self.lowest = AMPLE, AMPLE  # margins since they were told
-        self.told = writing.OK
+        self.told = 0  # level of alarm
 
     def on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start again from the initial state; time goes on."""
-        self.stamp += self.period
+        late = self.parameters.read(Sensors).delay_in(self.options.control_period)
+        self.stamp += self.period * (1 + late)  # no odometry has the stamp of one before
         self.catch_up()
         self.place_at_start()
         self.say("climber", "")
@@ -216,7 +142,7 @@ class PlantSimulator(ClimberNode):
             return
         self.say("push", "")
         begin = reading.nanoseconds(message.header.stamp) or self.stamp
-        self.pushes.append((begin, Push(*wrench)))
+        self.pushes.add(begin, Push(*wrench))
 
     def on_torques(self, message: JointState) -> None:
         """Apply torques from now on or, in simulated time, for a step if they answer the last."""
@@ -233,35 +159,19 @@ class PlantSimulator(ClimberNode):
         torques = np.clip(torques, -limit, limit)
         self.held = self.held and not torques.any()
         if not self.options.simulated_time:
-            self.commands.append((self.get_clock().now().nanoseconds, torques))
+            self.commands.add(self.get_clock().now().nanoseconds, torques)
         elif reading.nanoseconds(message.header.stamp) == self.asked and not self.answered:
-            self.commands = deque([(self.stamp, torques)])
+            self.commands.add(self.stamp, torques)
             self.answered = True
             self.say("lock-step", "")
             self.go_on()
 
     def command_at(self, time: int) -> Array:
         """Torques that act at `time` [ns]: the last to arrive, unless they are too old."""
-        while len(self.commands) > 1 and self.commands[1][0] <= time:
-            self.commands.popleft()
-        if not self.commands or self.commands[0][0] > time:
-            return np.zeros(2)
-        if self.options.simulated_time:
-            return self.commands[0][1]
-        stale = time - self.commands[0][0] > self.options.command_timeout * SECOND
-        self.say("torque command", "stale; zero torque instead" if stale else "")
-        return np.zeros(2) if stale else self.commands[0][1]
-
-    def push_at(self, time: int) -> Push:
-        """Push that acts at `time` [ns]: the last to begin, unless it is too old."""
-        while len(self.pushes) > 1 and self.pushes[1][0] <= time:
-            self.pushes.popleft()
-        if not self.pushes or self.pushes[0][0] > time:
-            return NONE
-        timeout = self.options.push_timeout
-        if timeout > 0 and time - self.pushes[0][0] >= timeout * SECOND:
-            return NONE
-        return self.pushes[0][1]
+        torques, stale = self.commands.at(time)
+        if not self.options.simulated_time:
+            self.say("torque command", "stale; zero torque instead" if stale else "")
+        return np.zeros(2) if torques is None else torques
 
     # Time
 
@@ -297,7 +207,8 @@ class PlantSimulator(ClimberNode):
                 now = WALL_CLOCK.now().nanoseconds
                 if now < self.due:
                     return
-                self.due = max(self.due + self.pace, now - FALLEN_BEHIND * SECOND)
+                late = now - self.due > CATCH_UP * SECOND
+                self.due = (now if late else self.due) + self.pace
         elif not self.granted:
             return
         self.granted = self.answered = False
@@ -317,7 +228,7 @@ class PlantSimulator(ClimberNode):
     def catch_up(self) -> None:
         """Leave out what has passed on the wall clock, but for the last period."""
         if not self.options.simulated_time:
-            missed = self.get_clock().now().nanoseconds - self.period - self.stamp
+            missed = max(0, self.get_clock().now().nanoseconds - self.period - self.stamp)
             self.stamp, self.origin = self.stamp + missed, self.origin + missed
 
     def step(self) -> None:
@@ -325,7 +236,8 @@ class PlantSimulator(ClimberNode):
         try:
             for number in range(0 if self.held else self.options.steps):
                 time = self.stamp + number * self.period // self.options.steps
-                self.machine.advance(self.command_at(time), self.push_at(time))
+                push, _ = self.pushes.at(time)
+                self.machine.advance(self.command_at(time), push or NONE)
         except (FellOff, NotFinite) as error:
             self.fallen = True
             self.say("climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error))
@@ -338,35 +250,9 @@ class PlantSimulator(ClimberNode):
     # What it tells
 
     def publish_state(self) -> None:
-        """Publish all that a robot would tell, the odometry first: it is waited for."""
-        names, stamp, machine = self.names, writing.time(self.stamp), self.machine
-        frames = names.odom_frame, names.base_frame
-        _, measured = machine.odometer.latest()
-        self.odometry.publish(writing.odometry(measured, self.asked, *frames))
-        if self.options.simulated_time:
-            self.clock.publish(ClockMessage(clock=stamp))
-        truth = writing.odometry(machine.state, self.stamp, *frames)
-        self.truth.publish(truth)
-        joints = writing.wheel_torques(
-            machine.torques, self.stamp, names.left_wheel_joint, names.right_wheel_joint
-        )
-        joints.position = machine.angles[::-1].tolist()
-        joints.velocity = machine.rates[::-1].tolist()
-        self.joints.publish(joints)
-        if self.transform is not None:
-            self.transform.publish(TFMessage(transforms=[writing.transform(truth)]))
-        self.publish_margins()
-        if self.stamp % PRESSURE_PERIOD < self.period:
-            pressure = FluidPressure(fluid_pressure=machine.pressure)
-            pressure.header.stamp = stamp
-            self.pressure.publish(pressure)
-
-    def publish_margins(self) -> None:
-        """Publish slip margin, tip margin and the wheels' load [N]; tell at once if they worsen."""
-        slip, tip = margins = self.machine.margins()
-        load = self.machine.plant.wheel_load(self.machine.state)
-        message = writing.vector((*margins, load), self.stamp, self.names.base_frame)
-        self.margins.publish(message)
+        """Publish all that a robot would tell; tell at once if the margins worsen."""
+        self.topics.publish(self.machine, self.stamp, self.asked)
+        slip, tip = margins = self.topics.publish_margins(self.machine, self.stamp)
         self.lowest = min(slip, self.lowest[0]), min(tip, self.lowest[1])
         if self.alarm.level(min(margins)) > self.told:
             self.diagnose()
@@ -381,7 +267,7 @@ class PlantSimulator(ClimberNode):
             said = f"lowest: slip margin {slip:.2f}, tip margin {tip:.2f}"
             values = {"slip margin": slip, "tip margin": tip}
             now = self.get_clock().now().nanoseconds
-            self._diagnostics.publish(writing.status(name, self.told, said, values, now))
+            self._diagnostics.publish(writing.status(name, LEVELS[self.told], said, values, now))
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""

@@ -1,6 +1,7 @@
 """A climber with its pump, motors and sensors, from one odometry to the next."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,12 @@ from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Odometer, Sensors
 
-VARIANTS = {"friction": FRICTION, "adhesion": ADHESION, "locomotion": LOCOMOTION, "wall": WALLS}
+VARIANTS: dict[str, dict[str, Any]] = {
+    "friction": FRICTION,
+    "adhesion": ADHESION,
+    "locomotion": LOCOMOTION,
+    "wall": WALLS,
+}
 
 
 @dataclass(frozen=True)
