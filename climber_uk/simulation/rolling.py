@@ -60,7 +60,16 @@ class Rolling:
 
     def exact_step(self, y: Array, given: Given) -> Array:
         """y after a step, in which a seal without radius may stick and slide."""
-        left_over = self.body.step
+        for _ in range(self._steep_parts):
+            y = self._exact_part(y, given, self.body.step / self._steep_parts)
+        return y
+
+    @cached_property
+    def _steep_parts(self) -> int:
+        steepness = self.body.contact.friction.steepness(self.body.friction)
+        return max(1, math.ceil(self.body.step * steepness / self.body.climber.mass / STIFF))
+
+    def _exact_part(self, y: Array, given: Given, left_over: float) -> Array:
         direction = self._direction(y, given)
         for _ in range(MAX_CHANGES_IN_A_STEP):
             end = self.body.runge_kutta(y, given, direction, left_over)
