@@ -1,6 +1,7 @@
 """A run in numbers."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +62,7 @@ def _lowest(values: Array) -> float:
     return float(np.min(values)) if values.size else float("nan")
 
 
-def _share(holds: Array) -> float:
+def _share(holds: Any) -> float:
     return 100 * float(np.mean(holds)) if holds.size else float("nan")
 
 

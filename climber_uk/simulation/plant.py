@@ -119,9 +119,10 @@ class Plant:
     @cached_property
     def _is_plain(self) -> bool:
         """Whether sticking forwards is all that there is besides smooth motion."""
-        turns_freely = self.contact.grip.seal_radius == 0
-        turns_freely &= self.contact.locomotion.turning_resistance(1.0) == 0
-        return self._rolling.sticks and turns_freely and not self.slip
+        is_plain = self.contact.grip.seal_radius == 0
+        is_plain &= self.contact.locomotion.turning_resistance(1.0) == 0
+        is_plain &= self._rolling.is_soft
+        return self._rolling.sticks and is_plain and not self.slip
 
     def _load(self, y: Array) -> float:
         return float(self.contact.wheel_load(self.climber, self._body.into_wall(y)))

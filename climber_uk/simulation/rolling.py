@@ -20,6 +20,7 @@ from climber_uk.simulation.inputs import Given
 MAX_CHANGES_IN_A_STEP = 8
 # Rate of friction times a part of a step, at most: Runge-Kutta is stable up to 2.8.
 STIFF = 0.5
+MAX_PARTS = 100  # beyond that, what is stiff is left to an implicit method
 
 
 @dataclass(frozen=True)
@@ -34,18 +35,18 @@ class Rolling:
         return bool(self.body.contact.friction.stiction(1.0) > 0)
 
     def step(self, y: Array, given: Given) -> Array | None:
-        """y after a step; None if it cannot be told, since a ring comes to rest or starts."""
+        """y after a step; None if a ring comes to rest or starts, or friction is too stiff."""
         if not self.sticks:
             return self._in_parts(y, given)
         if self.body.contact.grip.seal_radius == 0:
-            return self.exact_step(y, given)
+            return self.exact_step(y, given) if self.is_soft else None
         rests = not y[3:6].any()
         if rests and self._ring_holds(y, given):
             return y
         if rests or self._creeps(y):
             return None
         end = self._in_parts(y, given)
-        return None if self._creeps(end) else end
+        return None if end is None or self._creeps(end) else end
 
     def accelerations(self, y: Array, given: Given) -> tuple[float, float]:
         """v̇ [m/s²] and ω̇ [rad/s²]."""
@@ -66,8 +67,15 @@ class Rolling:
 
     @cached_property
     def _steep_parts(self) -> int:
+        """In which friction's change with speed is followed."""
         steepness = self.body.contact.friction.steepness(self.body.friction)
-        return max(1, math.ceil(self.body.step * steepness / self.body.climber.mass / STIFF))
+        parts = math.ceil(min(self.body.step * steepness / self.body.climber.mass / STIFF, 1e9))
+        return max(1, parts)
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether a seal without radius is not too stiff for steps in parts."""
+        return self._steep_parts <= MAX_PARTS
 
     def _exact_part(self, y: Array, given: Given, left_over: float) -> Array:
         direction = self._direction(y, given)
@@ -130,15 +138,17 @@ class Rolling:
         fastest = self.body.stiction * self.body.step
         return fastest > STIFF * self._lightest * self._sliding_speed(y)
 
-    def _in_parts(self, y: Array, given: Given) -> Array:
-        """y after a step, in as many parts as friction is stiff."""
+    def _in_parts(self, y: Array, given: Given) -> Array | None:
+        """y after a step, in as many parts as friction is stiff; None if it is too stiff."""
         body, law = self.body, self.body.contact.friction
         rate = law.steepness(body.friction) / self._lightest
         if isinstance(law, LuGre):
             stiffness = law.stiffness(body.friction) / self._lightest
             rate += math.sqrt(stiffness) + law.damping_time * stiffness
             rate += min(law.relaxation(self._sliding_speed(y)), SETTLED / body.step)
-        parts = max(1, math.ceil(body.step * rate / STIFF))
+        parts = max(1, math.ceil(min(body.step * rate / STIFF, 1e9)))
+        if parts > MAX_PARTS:
+            return None
         for _ in range(parts):
             y = body.runge_kutta(y, given, None, body.step / parts)
         speed = self._sliding_speed(y)

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.friction import LuGre
+from climber_uk.mechanics.friction import LuGre, Stribeck
 from climber_uk.simulation.body import Body, forward_speed
 from climber_uk.simulation.cones import Cone, opposed
 from climber_uk.simulation.inputs import Given
@@ -129,6 +129,12 @@ class Sliding:
     def _radius(self) -> float:
         return self.body.contact.grip.seal_radius
 
+    @property
+    def _drag(self) -> float:
+        """Part of friction with an edge that goes with the speed [N s/m]."""
+        law = self.body.contact.friction
+        return law.viscous * self.body.friction if isinstance(law, Stribeck) else 0.0
+
     def _cones(self, load: float, sliding: float, h: float) -> list[Cone]:
         """The wheels first, if they may slip; then the seal, and what resists turning."""
         contact, d = self.body.contact, self.body.climber.half_track
@@ -144,6 +150,7 @@ class Sliding:
             rows = np.eye(3, n)
             rows[2, 2] = self._radius
             level = float(contact.friction.level(self.body.friction, sliding))
+            level -= self._drag * sliding  # that is implicit
             cones.append(Cone(rows, h * level))
         else:
             cones.append(Cone(np.eye(1, n), 0.0))
@@ -172,7 +179,7 @@ class Sliding:
             drag = stiffness * (h + T) / q + f * law.viscous
             return lever * there, lever**2 * drag
         if law.stiction(1.0) > 0:
-            return np.zeros(3), np.zeros(3)
+            return np.zeros(3), lever**2 * self._drag
         share = law.level(f, speed) / speed if speed > 0 else law.steepness(f)
         return np.zeros(3), lever**2 * share
 

@@ -177,6 +177,14 @@ def test_viscous_friction_lets_it_slide_at_its_terminal_speed(slip):
     assert end.velocity[1] == pytest.approx(-expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("law", [Viscous(speed=1e-6), Stribeck(viscous=1e6)], ids=str)
+def test_friction_too_stiff_for_its_step_is_followed_all_the_same(law):
+    drive = 2 * PAPER.seal_friction
+    torques = PAPER.wheel_torques(drive + 49.05, 0.0)
+    end = Plant(PAPER, 0.0025, Contact(law)).advance(UPRIGHT, torques, steps=40)
+    assert law.level(PAPER.seal_friction, float(end.forward_speed)) == pytest.approx(drive)
+
+
 @pytest.mark.parametrize(("part", "falls"), [(1 + 1e-6, False), (1 - 1e-6, True)])
 def test_it_tips_off_the_wall_just_below_its_tip_over_pressure(part, falls):
     pressure = part * 49.05 * 0.05 / 0.125 / 0.06  # 327 Pa
