@@ -12,7 +12,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 
-MAX_SWEEPS = 200
+MAX_SWEEPS = 5000  # a few will do, but for contacts that only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
 SMALLEST = 1e-140  # an impulse that might as well be none
 
