@@ -112,7 +112,9 @@ class Body:
             sliding = direction * speed
             force = force - self.contact.friction.level(self.friction, sliding) * direction
 
-        f_x, f_y = self.outside(height, given)
+        # as `outside`, without the call: this is where the plant spends its time
+        w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
+        f_x, f_y = given.push_x + w_x, given.push_y + w_y
         a_x = (force * cosine + f_x) / climber.mass
         a_y = (force * sine + f_y) / climber.mass
         b_minus_A_a = -yaw_rate * speed - (sine * a_x - cosine * a_y)

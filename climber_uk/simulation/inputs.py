@@ -1,7 +1,7 @@
 """What goes into a plant and what comes out of it, or does not."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,8 +35,12 @@ class Given(NamedTuple):
     @classmethod
     def of(cls, climber: Climber, torques: Array, push: Array) -> "Given":
         """Of wheel torques (2,) right, left, and a push (3,) in the wall's frame."""
+        drive: Any
+        turn: Any
         drive, turn = climber.drive_and_turn(torques)
-        return cls(float(drive), float(turn), *unpack(push))
+        if push is NO_PUSH:
+            return cls(drive, turn, 0.0, 0.0, 0.0)
+        return cls(drive, turn, *unpack(push))
 
 
 @dataclass(frozen=True)

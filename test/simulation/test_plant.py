@@ -284,7 +284,7 @@ BALANCES = {
     "viscous": Plant(PAPER, FINE, Contact(Viscous())),
     "stribeck": Plant(PAPER, FINE, Contact(Stribeck(viscous=0.3))),
     "lugre": Plant(PAPER, 0.0025, Contact(LuGre(viscous=0.3))),
-    "ring": Plant(PAPER, 0.0025, Contact(grip=Grip(seal_radius=0.12))),
+    "ring": Plant(PAPER, FINE, Contact(grip=Grip(seal_radius=0.12))),
     "pipe": Plant(replace(PAPER, inclination=30.0), FINE, wall=Cylinder(5.0)),
     "tilted": Plant(PAPER, FINE, wall=Plane(tilt=30.0)),
     "gripping": Plant(PAPER, FINE, Contact(grip=Grip(100.0)), slip=True),
