@@ -14,7 +14,7 @@ from climber_uk.mechanics import Array
 
 MAX_SWEEPS = 5000  # a few will do, but for contacts that only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
-SMALLEST = 1e-140  # an impulse that might as well be none
+SMALLEST = 1e-90  # [N s] an impulse that might as well be none; its cube is still a number
 
 
 @dataclass(frozen=True)
