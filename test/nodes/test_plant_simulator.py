@@ -219,14 +219,15 @@ def test_on_the_wall_clock_a_pause_is_left_out(world):
     odometry = world.listen(Odometry, "odom")
     world.wait(lambda: len(odometry) > 5, "odometry")
     world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=True))
-    seen = len(odometry)
     until = time.monotonic() + 1.2
     world.wait(lambda: time.monotonic() > until, "time to pass")
-    assert len(odometry) <= seen + 2
+    seen = len(odometry)
     world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False))
     world.wait(lambda: len(odometry) > seen + 50, "odometry again")
     assert "behind" not in world.log("plant_simulator")
-    assert stamp(odometry[-1]) - stamp(odometry[0]) > 1_200_000_000
+    gaps = np.diff([stamp(m) for m in odometry])
+    assert gaps.max() > 1_000_000_000  # the pause, of which nothing was told
+    assert (gaps > 0).all()
 
 
 def pushed(frame, x, at):
