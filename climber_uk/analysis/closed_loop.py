@@ -93,6 +93,7 @@ def simulate(
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
     state, torques, rows = start, np.zeros(2), []
+    plant = Plant(climber_at(0.0), link.step)
     every, late = round(link.period / link.step), round(link.delay / link.step)
     for step in range(round(duration / link.step) + 1):
         now = SECOND + round(step * link.step * SECOND)
@@ -111,7 +112,8 @@ def simulate(
                 commanded.append((step + late, answer.torques))
         while commanded and commanded[0][0] <= step:
             _, acting = commanded.popleft()
-        plant = Plant(climber_at(step * link.step), link.step)
+        now_it_is = climber_at(step * link.step)
+        plant = plant if now_it_is is plant.climber else Plant(now_it_is, link.step)
         limit = plant.climber.max_wheel_torque
         if acting is not None:
             torques = np.clip(motors(state, acting), -limit, limit)

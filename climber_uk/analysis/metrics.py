@@ -1,6 +1,7 @@
 """A run in numbers."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,9 @@ def metrics(run: RecordedRun) -> list[Metric]:
         Metric("wheel torque, RMS", _rms(run.torques), "N m"),
         Metric("wheel torque, peak", _largest(run.torques), "N m"),
         Metric("side slip, maximum", _largest(run.side_slip), "m/s"),
+        Metric("slip margin, lowest", _lowest(run.margins[:, 0]), ""),
+        Metric("slip margin below 1", _share(run.margins[:, 0] < 1), "%"),
+        Metric("tip margin, lowest", _lowest(run.margins[:, 1]), ""),
         Metric("loop latency, median", _quantile(microseconds, 0.5), "µs"),
         Metric("loop latency, 99 %", _quantile(microseconds, 0.99), "µs"),
     ]
@@ -52,6 +56,14 @@ def _rms(values: Array) -> float:
 
 def _largest(values: Array) -> float:
     return float(np.max(np.abs(values))) if values.size else float("nan")
+
+
+def _lowest(values: Array) -> float:
+    return float(np.min(values)) if values.size else float("nan")
+
+
+def _share(holds: Any) -> float:
+    return 100 * float(np.mean(holds)) if holds.size else float("nan")
 
 
 def _quantile(values: Array, share: float) -> float:

@@ -15,6 +15,7 @@ from climber_uk.messages import reading
 
 ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
 FORCE = "uk_torque_controller/constraint_force"
+MARGINS = "plant_simulator/margins"
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class RecordedRun:
     torques: Array  # (m, 2) right, left [N m]
     force_time: Array  # (k,) [s]
     constraint_force: Array  # (k, 3) drive [N], lateral [N], about z [N m]
+    margins: Array  # (j, 2) slip margin, tip margin, as the plant knows them
     latency: Array  # (m,) [s] from an odometry's arrival at the recorder to that of its torque
 
     @property
@@ -44,7 +46,7 @@ def read_run(bag: str | Path, namespace: str = "") -> RecordedRun:
     Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
     """
     prefix = f"/{namespace}/".replace("//", "/")
-    topics = {prefix + name: name for name in (ODOMETRY, REFERENCE, TORQUES, FORCE)}
+    topics = {prefix + name: name for name in (ODOMETRY, REFERENCE, TORQUES, FORCE, MARGINS)}
     found: dict[str, dict[int, tuple[int, Any]]] = {name: {} for name in topics.values()}
     previews = []
     for topic, arrival, message in read_messages(bag, topics):
@@ -81,6 +83,9 @@ def read_run(bag: str | Path, namespace: str = "") -> RecordedRun:
         constraint_force=np.array(
             [[m.wrench.force.x, m.wrench.force.y, m.wrench.torque.z] for m in forces.values()]
         ).reshape(-1, 3),
+        margins=np.array(
+            [[m.vector.x, m.vector.y] for stamp, (_, m) in found[MARGINS].items() if stamp >= start]
+        ).reshape(-1, 2),
         latency=np.array(
             [arrival - found[ODOMETRY][stamp][0] for stamp, (arrival, _) in torques.items()]
         )

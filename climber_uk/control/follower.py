@@ -63,6 +63,8 @@ class Follower:
         if now < self._now:  # a simulation started again: times of before say nothing
             self._stamp, self.preview, self._waiting_since = 0, None, None
         self._now = now
+        if self._stamp == 0:  # the first one: in simulated time the clock comes right after it
+            self._clockless_looks = 0
         if stamp == self._stamp and self.mode is Mode.FOLLOWING:
             return self.answer  # it was not received: the same once more
         timeout = round(self.safety.odometry_timeout * SECOND)
@@ -144,6 +146,8 @@ class Follower:
             return Mode.NO_ODOMETRY, ""
         if self._trouble is not None:
             return self._trouble
+        if self.tracker.controller.climber.suction_pressure < self.safety.least_pressure:
+            return Mode.LOW_PRESSURE, ""
         if self.preview is not None and self._stamp < self.preview.times[0]:
             return Mode.NOT_BEGUN, ""
         since = now if self._waiting_since is None else self._waiting_since

@@ -28,6 +28,7 @@ class Mode(Enum):
     BAD_ODOMETRY = "bad odometry"
     JUMPED = "odometry jumped"
     NO_TWIST = "the pose moves while the twist is zero"
+    LOW_PRESSURE = "suction pressure too low"
     NO_REFERENCE = "no reference"
     NO_SOLUTION = "no torque can be computed"
 
@@ -50,6 +51,9 @@ class Safety:
     braking_rate: float = parameter(5.0, "1/s", "of the safe output 'hold'", at_least=0)
     odometry_timeout: float = parameter(0.1, "s", "age at which odometry is stale", above=0)
     reference_timeout: float = parameter(0.1, "s", "how long a reference is waited for", above=0)
+    least_pressure: float = parameter(
+        0.0, "Pa", "suction below which the climber is stopped; 0: never", at_least=0
+    )
     max_jump: float = parameter(
         0.2, "m", "by which a wheel may be elsewhere than the model expects", above=0
     )

@@ -22,6 +22,7 @@ sin = _either(math.sin, np.sin)
 arctan = _either(math.atan, np.arctan)
 tanh = _either(math.tanh, np.tanh)
 sqrt = _either(math.sqrt, np.sqrt)
+exp = _either(math.exp, np.exp)
 sign = _either(lambda x: float((x > 0) - (x < 0)), np.sign)
 
 

@@ -15,7 +15,7 @@ from climber_uk.mechanics.preview import SECOND, Preview
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
-    from geometry_msgs.msg import Quaternion, Twist
+    from geometry_msgs.msg import Quaternion, Twist, WrenchStamped
     from nav_msgs.msg import Odometry
     from sensor_msgs.msg import FluidPressure, JointState
     from trajectory_msgs.msg import MultiDOFJointTrajectory
@@ -90,6 +90,17 @@ def pressure(message: "FluidPressure") -> float:
     if not 0 <= pressure <= LARGEST:
         raise ValueError(f"fluid_pressure={pressure} must be from 0 to {LARGEST:g} [Pa]")
     return pressure
+
+
+def wrench(message: "WrenchStamped", odom_frame: str, base_frame: str) -> tuple[Array, bool]:
+    """Planar wrench (3,) x, y [N], about z [N m], and whether it is one in `base_frame`."""
+    frame = message.header.frame_id
+    if frame not in (odom_frame, base_frame):
+        raise ValueError(f"frame_id={frame!r} must be {odom_frame!r} or {base_frame!r}")
+    force, torque = message.wrench.force, message.wrench.torque
+    planar = np.array([force.x, force.y, torque.z])
+    _check_size(wrench=planar)
+    return planar, frame == base_frame
 
 
 def _check_size(**vectors: "Array | list[list[float]]") -> None:

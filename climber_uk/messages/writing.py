@@ -25,6 +25,8 @@ from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.trajectory import Reference
 
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
 
 def time(nanoseconds: int) -> Time:
     """Stamp of `nanoseconds`."""
@@ -99,7 +101,7 @@ def path(poses: Array, stamp: int, odom_frame: str) -> Path:
     return path
 
 
-def vector(vector: Iterable[Array], stamp: int, frame: str) -> Vector3Stamped:
+def vector(vector: Iterable[Array | float], stamp: int, frame: str) -> Vector3Stamped:
     """Three numbers with a stamp."""
     x, y, z = (float(component) for component in vector)
     message = Vector3Stamped(vector=Vector3(x=x, y=y, z=z))

@@ -1,67 +1,31 @@
 """A climber on its wall in a robot's place: wheel torques in, odometry out."""
 
-from collections import deque
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import FluidPressure, JointState
-from std_srvs.srv import Trigger
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import Alarm, Contact, Grip
 from climber_uk.mechanics.preview import SECOND
-from climber_uk.messages import reading, writing
+from climber_uk.messages import reading
+from climber_uk.nodes.margins import Margins
+from climber_uk.nodes.plant_topics import PlantTopics
 from climber_uk.nodes.running import WALL_CLOCK, ClimberNode, run
+from climber_uk.simulation.inputs import FellOff, NotFinite
+from climber_uk.simulation.machine import NONE, VARIANTS, Machine, Parts, Physics, Push
+from climber_uk.simulation.motors import Motors
+from climber_uk.simulation.options import Options
 from climber_uk.simulation.plant import Plant
-
-try:
-    from tf2_msgs.msg import TFMessage
-except ImportError:  # it comes with a ROS installation, not with the wheels
-    TFMessage = None
+from climber_uk.simulation.schedule import Schedule
+from climber_uk.simulation.sensors import Sensors
 
 ASK_AGAIN = 0.2  # [s] of wall-clock time, for a torque that does not come
-PRESSURE_PERIOD = SECOND // 10  # [ns] of the suction pressure, which changes slowly
 FALLEN_BEHIND = 1.0  # [s] from which lost wall-clock time is not made up for
-
-
-@dataclass(frozen=True)
-class Options:
-    """How time passes, and where the climber starts."""
-
-    simulated_time: bool = parameter(
-        False, "", "publish /clock and step when a torque answers the odometry: lock-step"
-    )
-    control_period: float = parameter(0.005, "s", "between two odometry messages", above=0)
-    integration_step: float = parameter(0.0025, "s", "of the integrator", above=0)
-    command_timeout: float = parameter(0.1, "s", "age at which a torque is dropped", above=0)
-    lockstep_timeout: float = parameter(5.0, "s", "wall-clock wait that is reported", above=0)
-    initial_x: float = parameter(0.0, "m", "x at the start")
-    initial_y: float = parameter(0.0, "m", "y at the start")
-    initial_heading: float = parameter(0.0, "rad", "heading at the start")
-    initial_speed: float = parameter(0.0, "m/s", "forward speed at the start")
-    initial_yaw_rate: float = parameter(0.0, "rad/s", "yaw rate at the start")
-
-    def __post_init__(self) -> None:
-        check(self)
-        if abs(self.steps * self.integration_step - self.control_period) > 1e-9:
-            raise ValueError(
-                f"control_period={self.control_period} must be a multiple of "
-                f"integration_step={self.integration_step} [s]"
-            )
-
-    @property
-    def steps(self) -> int:
-        """Integration steps in a control period."""
-        return max(1, round(self.control_period / self.integration_step))
-
-    @property
-    def initial_state(self) -> State:
-        """Where the climber starts; it does not slip."""
-        pose = np.array([self.initial_x, self.initial_y, self.initial_heading])
-        return State.rolling(pose, self.initial_speed, self.initial_yaw_rate)
+CATCH_UP = 0.1  # [s] of the wall clock that simulated time may make up for
 
 
 class PlantSimulator(ClimberNode):
@@ -72,50 +36,111 @@ class PlantSimulator(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__("plant_simulator")
-        for kind in (Options, Climber):
+        for kind in (Options, Climber, Physics, Grip, Motors, Sensors, Alarm):
             self.parameters.declare(kind)
+        for variants in VARIANTS.values():
+            for name, variant in variants.items():
+                self.parameters.declare(variant, f"{name}.")
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
+        self.margins = Margins(self, self.parameters.read(Alarm))
         self.period = round(self.options.control_period * SECOND)  # [ns]
-        self.on_parameters()
+        self.paused = self.granted = False
+        simulated = self.options.simulated_time
+        # 0 would mean that there is no time yet
+        self.stamp = SECOND if simulated else self.get_clock().now().nanoseconds
         self.place_at_start()
 
-        self.odometry = self.publisher(Odometry, "odom")
-        self.joints = self.publisher(JointState, "joint_states")
-        self.pressure = self.publisher(FluidPressure, "suction_pressure")
-        self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
+        self.topics = PlantTopics(self, self.period, simulated)
         self.subscription(JointState, "wheel_torques", self.on_torques)
+        self.subscription(WrenchStamped, "push", self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
+        self.create_service(SetBool, "~/pause", self.on_pause)
+        self.create_service(Trigger, "~/step", self.on_step)
         self.start_diagnostics(self.values, alone_on=("odom", "wheel_torques"))
-        if self.options.simulated_time:
-            self.stamp = SECOND  # [ns]; 0 would mean that there is no time yet
-            self.clock = self.publisher(ClockMessage, "/clock")
+        self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
+        if simulated:
             self.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
+            if self.options.real_time_factor > 0:
+                self.create_timer(self.pace / SECOND, self.go_on, clock=WALL_CLOCK)
         else:
-            self.stamp = self.get_clock().now().nanoseconds
             self.create_timer(self.options.control_period, self.keep_up)
-        self.stepped_at = WALL_CLOCK.now()
         self.publish_state()
 
+    def parts(self) -> Parts:
+        """What the parameters say that the climber is made of."""
+        read = self.parameters.read
+        physics, step = read(Physics), self.options.integration_step
+        chosen: dict[str, Any] = {}
+        for group, variants in VARIANTS.items():
+            name = getattr(physics, group)
+            chosen[group] = read(variants[name], f"{name}.")
+        wall = chosen.pop("wall")
+        contact = Contact(**chosen, grip=read(Grip))
+        plant = Plant(read(Climber), step, contact, wall, physics.slip)
+        return Parts(plant, read(Motors), read(Sensors), physics)
+
     def on_parameters(self) -> None:
-        """Take up a changed suction pressure."""
-        self.plant = Plant(self.parameters.read(Climber), self.options.integration_step)
+        """Take up what was changed: the pump's pressure, a magnet's gap, levels of alarm."""
+        self.machine.take(self.parts())
+        self.margins.alarm = self.parameters.read(Alarm)
+
+    # Commands
 
     def place_at_start(self) -> None:
         """Go back to the initial state, with no torque yet."""
-        self.state = self.options.initial_state
-        self.held = bool(self.state.velocity.any())
-        self.angles: Array = np.zeros(2)  # [rad] of the wheels: right, left
-        self.applied: Array = np.zeros(2)  # [N m] right, left
-        self.commands: deque[tuple[int, Array]] = deque()  # arrival [ns], torques
+        start = self.options.initial_state
+        self.machine = Machine(self.parts(), start, self.options.control_period)
+        self.held = bool(start.velocity.any())
+        self.origin = self.stamp  # of the first odometry [ns]
+        timeout = 0.0 if self.options.simulated_time else self.options.command_timeout
+        self.commands: Schedule[Array] = Schedule(round(timeout * SECOND))
+        self.pushes: Schedule[Push] = Schedule(round(self.options.push_timeout * SECOND))
+        self.fallen = self.answered = False
 
     def on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start again from the initial state; time goes on."""
+        late = self.parameters.read(Sensors).delay_in(self.options.control_period)
+        self.stamp += self.period * (1 + late)  # no odometry has the stamp of one before
+        self.catch_up()
         self.place_at_start()
-        self.stamp += self.period
+        self.say("climber", "")
         self.publish_state()
         response.success, response.message = True, f"at the start at {self.stamp * 1e-9:.3f} s"
         return response
+
+    def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Stop the climber's time, or let it go on."""
+        if self.paused and not request.data:
+            self.catch_up()
+        self.paused, self.granted = bool(request.data), False
+        response.success = True
+        response.message = f"{'paused' if self.paused else 'going on'} at {self.stamp * 1e-9:.3f} s"
+        self.go_on()
+        return response
+
+    def on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Go on by one control period, once the torque for it is there."""
+        response.success, response.message = False, "not paused"
+        if self.fallen:
+            response.message = "fallen: reset first"
+        elif self.paused:
+            response.success, response.message = True, f"from {self.stamp * 1e-9:.3f} s"
+            self.granted = True
+            self.catch_up()
+            self.go_on()
+        return response
+
+    def on_push(self, message: WrenchStamped) -> None:
+        """Push from the message's stamp on, or from now if it has none or is late."""
+        try:
+            wrench = reading.wrench(message, self.names.odom_frame, self.names.base_frame)
+        except ValueError as error:
+            self.say("push", "refused", str(error))
+            return
+        self.say("push", "")
+        begin = reading.nanoseconds(message.header.stamp) or self.stamp
+        self.pushes.add(begin, Push(*wrench))
 
     def on_torques(self, message: JointState) -> None:
         """Apply torques from now on or, in simulated time, for a step if they answer the last."""
@@ -128,83 +153,120 @@ class PlantSimulator(ClimberNode):
         except ValueError as error:
             self.say("wheel_torques", "refused, zero torque instead", str(error))
             torques = np.zeros(2)
-        limit = self.plant.climber.max_wheel_torque
+        limit = self.machine.plant.climber.max_wheel_torque
         torques = np.clip(torques, -limit, limit)
         self.held = self.held and not torques.any()
         if not self.options.simulated_time:
-            self.commands.append((self.get_clock().now().nanoseconds, torques))
-        elif reading.nanoseconds(message.header.stamp) == self.stamp:
-            self.commands = deque([(self.stamp, torques)])
-            self.step()
+            self.commands.add(self.get_clock().now().nanoseconds, torques)
+        elif reading.nanoseconds(message.header.stamp) == self.asked and not (
+            self.answered or self.held  # its time begins with its motion
+        ):
+            self.commands.add(self.stamp, torques)
+            self.answered = True
             self.say("lock-step", "")
+            self.go_on()
+
+    def command_at(self, time: int) -> Array:
+        """Torques that act at `time` [ns]: the last to arrive, unless they are too old."""
+        torques, stale = self.commands.at(time)
+        if not self.options.simulated_time:
+            self.say("torque command", "stale; zero torque instead" if stale else "")
+        return np.zeros(2) if torques is None else torques
+
+    # Time
+
+    @property
+    def asked(self) -> int:
+        """Stamp of the odometry that is published last [ns]."""
+        number, _ = self.machine.odometer.latest()
+        return self.origin + number * self.period
+
+    @property
+    def pace(self) -> float:
+        """Of the wall clock for a control period [ns]."""
+        return self.period / self.options.real_time_factor
 
     def ask_again(self) -> None:
         """Publish the odometry once more to whom missed it; report who does not answer."""
-        waited = (WALL_CLOCK.now() - self.stepped_at).nanoseconds
+        waited = WALL_CLOCK.now().nanoseconds - self.stepped_at
+        if self.answered or self.fallen:
+            return
         if waited > ASK_AGAIN * SECOND:
             self.publish_state()
         if waited > self.options.lockstep_timeout * SECOND:
-            self.say("lock-step", f"no torque for the odometry of {self.stamp * 1e-9:.3f} s")
+            self.say("lock-step", f"no torque for the odometry of {self.asked * 1e-9:.3f} s")
+
+    def go_on(self) -> None:
+        """Step if nothing speaks against it: no answer yet, a pause, the pace of time."""
+        if self.fallen or (self.paused and not self.granted):
+            return
+        if self.options.simulated_time:
+            if not self.answered:
+                return
+            if self.options.real_time_factor > 0:
+                now = WALL_CLOCK.now().nanoseconds
+                if now < self.due:
+                    return
+                late = now - self.due > CATCH_UP * SECOND
+                self.due = (now if late else self.due) + self.pace
+        elif not self.granted:
+            return
+        self.granted = self.answered = False
+        self.step()
 
     def keep_up(self) -> None:
         """Step until the clock's time is reached."""
         now = self.get_clock().now().nanoseconds
+        if self.paused or self.fallen:
+            return
         if now - self.stamp > FALLEN_BEHIND * SECOND:
             self.get_logger().warning(f"{(now - self.stamp) * 1e-9:.1f} s behind: left out")
-            self.stamp = now - self.period
-        while self.stamp + self.period <= now:
+            self.catch_up()
+        while self.stamp + self.period <= now and not self.fallen:
             self.step()
 
+    def catch_up(self) -> None:
+        """Leave out what has passed on the wall clock, but for the last period."""
+        if not self.options.simulated_time:
+            missed = max(0, self.get_clock().now().nanoseconds - self.period - self.stamp)
+            self.stamp, self.origin = self.stamp + missed, self.origin + missed
+
     def step(self) -> None:
-        """Advance by a control period and publish."""
-        rates = self.plant.climber.wheel_rates(self.state)
-        for number in range(0 if self.held else self.options.steps):
-            self.applied = self.command_at(self.stamp + number * self.period // self.options.steps)
-            self.state = self.plant.advance(self.state, self.applied, steps=1)
-        rates = (rates + self.plant.climber.wheel_rates(self.state)) / 2
-        self.angles = self.angles + rates * self.options.control_period * (not self.held)
+        """Advance by a control period and publish; a climber that falls is heard of no more."""
+        try:
+            for number in range(0 if self.held else self.options.steps):
+                time = self.stamp + number * self.period // self.options.steps
+                push, _ = self.pushes.at(time)
+                self.machine.advance(self.command_at(time), push or NONE)
+        except (FellOff, NotFinite) as error:
+            self.fallen = True
+            self.say("climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error))
+            return
+        self.machine.measure()
         self.stamp += self.period
-        self.stepped_at = WALL_CLOCK.now()
+        self.stepped_at = WALL_CLOCK.now().nanoseconds
         self.publish_state()
 
-    def command_at(self, time: int) -> Array:
-        """Torques that act at `time` [ns]: the last to arrive, unless they are too old."""
-        while len(self.commands) > 1 and self.commands[1][0] <= time:
-            self.commands.popleft()
-        if not self.commands or self.commands[0][0] > time:
-            return np.zeros(2)
-        if self.options.simulated_time:
-            return self.commands[0][1]
-        stale = time - self.commands[0][0] > self.options.command_timeout * SECOND
-        self.say("torque command", "stale; zero torque instead" if stale else "")
-        return np.zeros(2) if stale else self.commands[0][1]
+    # What it tells
 
     def publish_state(self) -> None:
-        """Publish all that a robot would tell, the odometry first: it is waited for."""
-        names, stamp = self.names, writing.time(self.stamp)
-        odometry = writing.odometry(self.state, self.stamp, names.odom_frame, names.base_frame)
-        self.odometry.publish(odometry)
-        if self.options.simulated_time:
-            self.clock.publish(ClockMessage(clock=stamp))
-        joints = writing.wheel_torques(
-            self.applied, self.stamp, names.left_wheel_joint, names.right_wheel_joint
-        )
-        joints.position = self.angles[::-1].tolist()
-        joints.velocity = self.plant.climber.wheel_rates(self.state)[::-1].tolist()
-        self.joints.publish(joints)
-        if self.transform is not None:
-            self.transform.publish(TFMessage(transforms=[writing.transform(odometry)]))
-        if self.stamp % PRESSURE_PERIOD < self.period:
-            pressure = FluidPressure(fluid_pressure=self.plant.climber.suction_pressure)
-            pressure.header.stamp = stamp
-            self.pressure.publish(pressure)
+        """Publish all that a robot would tell, and the margins."""
+        self.topics.publish(self.machine, self.stamp, self.asked)
+        load = self.machine.plant.wheel_load(self.machine.state)
+        self.margins.publish(*self.machine.margins(), load, self.stamp)
+
+    def diagnose(self) -> None:
+        """Publish troubles and values, and how near to slipping and tipping it has been."""
+        super().diagnose()
+        self.margins.diagnose()
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
         return {
             "time [s]": self.stamp * 1e-9,
-            "suction pressure [Pa]": self.plant.climber.suction_pressure,
-            "side slip [m/s]": float(self.state.side_slip),
+            "suction pressure [Pa]": self.machine.pressure,
+            "side slip [m/s]": float(self.machine.state.side_slip),
+            "paused": self.paused,
         }
 
 

@@ -105,16 +105,21 @@ class ClimberNode(Node):
 
     def diagnose(self) -> None:
         """Publish troubles and values."""
-        if self._diagnostics is None:
-            return
         troubles = {about: said for about, said in self._troubles.items() if said[0]}
         level = DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK
         if any(is_fault for _, is_fault in troubles.values()):
             level = DiagnosticStatus.ERROR
         text = "; ".join(f"{about}: {trouble}" for about, (trouble, _) in troubles.items())
-        now = self.get_clock().now().nanoseconds
-        name = self.get_fully_qualified_name()
-        self._diagnostics.publish(writing.diagnostics(name, level, text, self._values(), now))
+        self.publish_status("", level, text, self._values())
+
+    def publish_status(
+        self, about: str, level: bytes, text: str, values: Mapping[str, object]
+    ) -> None:
+        """Publish one status of this node on /diagnostics, once these have started."""
+        if self._diagnostics is not None:
+            name = self.get_fully_qualified_name() + (f": {about}" if about else "")
+            now = self.get_clock().now().nanoseconds
+            self._diagnostics.publish(writing.diagnostics(name, level, text, values, now))
 
 
 def run(make_node: Callable[[], Node]) -> None:

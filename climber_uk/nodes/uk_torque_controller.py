@@ -17,8 +17,11 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import ADHESION, Alarm, Contact, Grip
 from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.wall import Plane
 from climber_uk.messages import reading, writing
+from climber_uk.nodes.margins import Margins
 from climber_uk.nodes.running import BEST_EFFORT, WALL_CLOCK, ClimberNode, run
 
 
@@ -27,6 +30,7 @@ class Options:
     """Which constraints, and what is published."""
 
     constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
+    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
     effort_commands: bool = parameter(False, "", "publish effort_controller/commands as well")
     effort_order: str = parameter(
         "left_right", "", "order of the torques in them", choices=("left_right", "right_left")
@@ -41,12 +45,14 @@ class UkTorqueController(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__("uk_torque_controller")
-        for kind in (Options, Climber, Law, Timing, Safety):
+        for kind in (Options, Climber, Law, Timing, Safety, Grip, Alarm):
             self.parameters.declare(kind)
-        for name, part in {**CONSTRAINTS, "observer": Observer, "pacing": Pacing}.items():
+        parts = {**CONSTRAINTS, **ADHESION, "observer": Observer, "pacing": Pacing}
+        for name, part in parts.items():
             self.parameters.declare(part, f"{name}.")
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
+        self.margins = Margins(self, self.parameters.read(Alarm))
         self.pressure: float | None = None  # [Pa] as last measured
         self.follower = Follower(Tracker(*self.settings()), self.parameters.read(Safety))
         self.answers = self.saturations = 0
@@ -77,6 +83,7 @@ class UkTorqueController(ClimberNode):
 
     def on_parameters(self) -> None:
         """Take up changed parameters."""
+        self.margins.alarm = self.parameters.read(Alarm)
         self.follower.tracker.retune(*self.settings())
 
     def on_odometry(self, message: Odometry) -> None:
@@ -136,6 +143,7 @@ class UkTorqueController(ClimberNode):
             self.publish_torques(answer)
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command)
+                self.publish_margins(answer.stamp, answer.command)
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
@@ -159,6 +167,27 @@ class UkTorqueController(ClimberNode):
         if follower.state is not None and desired is not None:
             error = tracking_error(follower.state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
+
+    def publish_margins(self, stamp: int, command: Command) -> None:
+        """Publish how near the torques bring the climber to slipping, and how near it is to tip."""
+        climber, read = self.follower.tracker.controller.climber, self.parameters.read
+        name = self.options.adhesion
+        contact = Contact(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
+        drive, _ = climber.drive_and_turn(command.torques)
+        lateral = float(command.constraint_force[1])
+        into_wall = Plane().into(climber.inclination, 0.0, 0.0)
+        along_wall = climber.weight_along_wall / climber.mass
+        self.margins.publish(
+            contact.slip_margin(climber, into_wall, drive, lateral),
+            contact.tip_margin(climber, into_wall, along_wall),
+            contact.wheel_load(climber, into_wall),
+            stamp,
+        )
+
+    def diagnose(self) -> None:
+        """Publish troubles and values, and how near to slipping and tipping it has been."""
+        super().diagnose()
+        self.margins.diagnose()
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""

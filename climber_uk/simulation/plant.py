@@ -1,132 +1,180 @@
-"""The climber on its wall: the corrected integration (30) of given torques, without side slip.
+"""The climber on its wall: state and wheel torques in, state out, in steps of fixed length.
 
-    q̇ = v + M^(-1/2) B⁺ (b_q - A v),   v̇ = a + M^(-1/2) B⁺ (b - A a)
-
-(30) alone lets v drift away from q̇, because b depends on the velocity. Here b is taken at the
-corrected velocity q̇, and after each step v is replaced by q̇: the rows then hold for both.
+Smooth motion is integrated by Runge-Kutta (`body`), sticking and sliding of the seal are exact
+(`rolling`), and what may stick and slip in several directions at once is implicit (`sliding`).
 """
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
-from climber_uk.mechanics import Array, unpack
-from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.elementary import cos, sin
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import GRAVITY, Climber, State
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.wall import Plane, Wall
+from climber_uk.simulation.body import Body, forward_speed
+from climber_uk.simulation.inputs import NO_PUSH, FellOff, Given, NotFinite, PlantState
+from climber_uk.simulation.rolling import Rolling
+from climber_uk.simulation.sliding import Sliding
 
-# More changes between sticking and sliding than this within one step are not followed.
-MAX_CHANGES_IN_A_STEP = 8
+CONTACT, UPRIGHT = Contact(), Plane()
+SIDEWAYS = 1e-9  # of the speed, and of 1 m/s: more than rounding makes of rolling
 
 
 @dataclass(frozen=True)
 class Plant:
-    """A climber integrated in steps of fixed length by the classic Runge-Kutta method.
+    """A climber, its contacts and its wall; one climber at a time.
 
-    Coulomb friction of the seal is exact: it slides at f against the motion or, at rest, takes
-    whatever value up to f holds the climber still; the instant of change is located within the
-    step. One climber at a time. Raises `ValueError` if `step` is not positive.
+    Raises `ValueError` if `step` is not positive, or a wheel has more inertia than the climber.
     """
 
     climber: Climber
     step: float  # [s]
+    contact: Contact = CONTACT
+    wall: Wall = UPRIGHT
+    slip: bool = False  # whether wheels slip where their load does not suffice
 
     def __post_init__(self) -> None:
         if not self.step > 0:
             raise ValueError(f"step={self.step!r} must be > 0 [s]")
+        if self.slip:
+            _ = self._sliding  # it may have something to refuse
 
-    def advance(self, state: State, torques: Array, steps: int) -> State:
-        """State after `steps` steps under constant wheel torques (2,) (right, left) [N m]."""
-        y = np.concatenate([state.pose, state.velocity])
-        for _ in range(steps):
-            y = self._one_step(y, torques)
-        return State(y[:3], y[3:])
+    def advance(self, state: State, torques: Array, steps: int, push: Array = NO_PUSH) -> State:
+        """State after `steps` steps under constant wheel torques (2,) (right, left) [N m].
 
-    def _one_step(self, y: Array, torques: Array) -> Array:
-        left_over = self.step
-        direction = self._direction(y, torques)
-        for _ in range(MAX_CHANGES_IN_A_STEP):
-            end = self._runge_kutta(y, torques, direction, left_over)
-            if self._margin(end, torques, direction) >= 0:
-                return end
-            y, until = self._until_change(y, torques, direction, left_over)
-            left_over -= until
-            gave_way = direction == 0
-            push = self._push(y, torques)
-            direction = float(np.sign(push)) if gave_way else self._direction(y, torques)
-        return self._runge_kutta(y, torques, direction, left_over)
-
-    def _direction(self, y: Array, torques: Array) -> float:
-        """Way the seal slides: 1 forwards, -1 backwards, 0 where friction holds it."""
-        speed, push = _forward_speed(y), self._push(y, torques)
-        if speed == 0 and abs(push) <= self.climber.seal_friction:
-            return 0.0
-        return float(np.sign(speed or push))
-
-    def _margin(self, y: Array, torques: Array, direction: float) -> float:
-        """Falls below 0 where sliding in `direction` ends or, for 0, where friction gives way."""
-        if direction == 0:
-            return self.climber.seal_friction - abs(self._push(y, torques))
-        return direction * _forward_speed(y)
-
-    def _push(self, y: Array, torques: Array) -> float:
-        """Force along the climber that friction is up against [N]."""
-        drive, _ = self.climber.drive_and_turn(torques)
-        return float(drive - self.climber.weight_along_wall * sin(float(y[2])))
-
-    def _until_change(
-        self, y: Array, torques: Array, direction: float, step: float
-    ) -> tuple[Array, float]:
-        """State at the instant within `step` at which `_margin` reaches 0, and that instant."""
-
-        def margin(duration: float) -> float:
-            end = self._runge_kutta(y, torques, direction, duration)
-            return self._margin(end, torques, direction)
-
-        until = brentq(margin, 0.0, step, xtol=1e-15) if margin(0.0) > 0 else 0.0
-        changed = self._runge_kutta(y, torques, direction, until)
-        changed[3:5] = 0.0  # not merely small: at rest is what friction can hold
-        return changed, until
-
-    def _runge_kutta(self, y: Array, torques: Array, direction: float, h: float) -> Array:
-        k1 = self._derivative(y, torques, direction)
-        k2 = self._derivative(y + h / 2 * k1, torques, direction)
-        k3 = self._derivative(y + h / 2 * k2, torques, direction)
-        k4 = self._derivative(y + h * k3, torques, direction)
-        end = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        end[3:] = self._derivative(end, torques, direction)[:3]
+        `push` (3,) acts on the centre of mass, in the wall's frame [N, N, N m]. Raises `FellOff`
+        where nothing holds the climber on its wall, `NotFinite` where numbers end.
+        """
+        given = Given.of(self.climber, torques, push)
+        try:
+            end = self._advance(state, given, steps)
+        except (ValueError, ArithmeticError, RuntimeWarning) as error:  # numpy warns, or raises
+            raise NotFinite(f"{error} in {steps} steps from {state}") from None
+        if not math.isfinite(sum(end.pose.tolist()) + sum(end.velocity.tolist())):
+            raise NotFinite(f"{end} after {steps} steps from {state}")
         return end
 
-    def _derivative(self, y: Array, torques: Array, direction: float) -> Array:
-        """(q̇, v̇) of (30) at y = (q, v), both (3,).
+    def _advance(self, state: State, given: Given, steps: int) -> State:
+        y = np.concatenate([state.pose, state.velocity])
+        if self._is_plain:
+            one_step, held = self._rolling.exact_step, self._is_held_everywhere
+            for _ in range(steps):
+                if not held:
+                    self._check_hold_at(y)
+                y = one_step(y, given)
+            return State(y[:3], y[3:])
+        more = PlantState.of(state)
+        y, slip = np.concatenate([y, more.bent]), more.slip
+        for _ in range(steps):
+            self._check_hold(y)
+            y, slip = self._step(y, slip, given)
+        return PlantState(y[:3], y[3:6], y[6:], slip)
 
-        A = [sinθ -cosθ 0] has unit length and M weighs x and y alike, so that M^(-1/2) B⁺ = Aᵀ.
-        While friction holds the climber, [cosθ sinθ 0] is a second such row with b_q = b = 0.
-        """
+    def wheel_rates(self, state: State) -> Array:
+        """Turning rates (2,) of the wheels (right, left), slipping or not [rad/s]."""
+        rates = self.climber.wheel_rates(state)
+        if isinstance(state, PlantState):
+            rates = rates + state.slip / self.climber.wheel_radius
+        return rates
+
+    def as_wheels_tell(self, state: State) -> State:
+        """State of a climber that rolls as its wheels turn, whether or not they slip."""
+        if not (isinstance(state, PlantState) and state.slip.any()):
+            return state
         climber = self.climber
-        _, _, heading, v_x, v_y, yaw_rate = unpack(y)
-        cosine, sine = cos(heading), sin(heading)
-        drive, turn = climber.drive_and_turn(torques)
-        yaw_acceleration = turn / climber.yaw_inertia
-        if direction == 0:
-            return np.array([0.0, 0.0, yaw_rate, 0.0, 0.0, yaw_acceleration])
+        right, left = (climber.wheel_radius * self.wheel_rates(state)).tolist()
+        yaw_rate = (right - left) / (2 * climber.half_track)
+        return State.rolling(state.pose, (right + left) / 2, yaw_rate)
 
-        A_v = sine * v_x - cosine * v_y
-        x_dot, y_dot = v_x - sine * A_v, v_y + cosine * A_v
+    def wheel_load(self, state: State) -> float:
+        """N_w [N]."""
+        return self._load(np.concatenate([state.pose, state.velocity]))
 
-        force = drive - climber.seal_friction * direction
-        a_x = force * cosine / climber.mass
-        a_y = (force * sine - climber.weight_along_wall) / climber.mass
-        b = -yaw_rate * (x_dot * cosine + y_dot * sine)
-        b_minus_A_a = b - (sine * a_x - cosine * a_y)
-        return np.array(
-            [
-                *(x_dot, y_dot, yaw_rate),
-                *(a_x + sine * b_minus_A_a, a_y - cosine * b_minus_A_a, yaw_acceleration),
-            ]
+    def margins(self, state: State, torques: Array, push: Array = NO_PUSH) -> tuple[float, float]:
+        """Slip and tip margin (§7): of the drive force and the no-slip row's lateral reaction."""
+        climber, given = self.climber, Given.of(self.climber, torques, push)
+        y = np.concatenate([state.pose, state.velocity])
+        into = self._body.into_wall(y)
+        lateral = self._body.lateral(y, given, climber.mass)
+        s_x, s_y = self.wall.along(climber.inclination, float(y[1]))
+        return (
+            float(self.contact.slip_margin(climber, into, given.drive, lateral)),
+            float(self.contact.tip_margin(climber, into, GRAVITY * math.hypot(s_x, s_y))),
         )
 
+    @cached_property
+    def _body(self) -> Body:
+        return Body(self.climber, self.contact, self.wall, self.step)
 
-def _forward_speed(y: Array) -> float:
-    _, _, heading, v_x, v_y, _ = unpack(y)
-    return float(v_x * cos(heading) + v_y * sin(heading))
+    @cached_property
+    def _rolling(self) -> Rolling:
+        return Rolling(self._body)
+
+    @cached_property
+    def _sliding(self) -> Sliding:
+        return Sliding(self._body, self.slip)
+
+    @cached_property
+    def _is_plain(self) -> bool:
+        """Whether sticking forwards is all that there is besides smooth motion."""
+        is_plain = self.contact.grip.seal_radius == 0
+        is_plain &= self.contact.locomotion.turning_resistance(1.0) == 0
+        is_plain &= self._rolling.is_soft
+        return self._rolling.sticks and is_plain and not self.slip
+
+    def _load(self, y: Array) -> float:
+        return float(self.contact.wheel_load(self.climber, self._body.into_wall(y)))
+
+    def _step(self, y: Array, slip: Array, given: Given) -> tuple[Array, Array]:
+        """One step, implicit if something may stick, slip or be caught within it."""
+        end = None if slip.any() else self._regular_step(y, given)
+        if end is not None:
+            return end, slip
+        return self._sliding.advance(y, slip, given, self._load(y))
+
+    def _regular_step(self, y: Array, given: Given) -> Array | None:
+        """End of a step without change between sticking and slipping; None if there is one."""
+        load, turn = self._load(y), given.turn + given.push_turn
+        resistance = float(self.contact.locomotion.turning_resistance(load))
+        turning = float(np.sign(y[5]))
+        if turning == 0 and resistance > 0:
+            if abs(turn) > resistance:
+                return None
+            turning = turn / resistance
+        resisted = given._replace(push_turn=given.push_turn - resistance * turning)
+        if not self._wheels_hold(y, given, resisted):
+            return None
+        end = self._rolling.step(y, resisted)
+        if end is None or (resistance > 0 and y[5] != 0 and end[5] * turning <= 0):
+            return None
+        return end if self._wheels_hold(end, given, resisted) else None
+
+    def _wheels_hold(self, y: Array, given: Given, resisted: Given) -> bool:
+        if not self.slip:
+            return True
+        if abs(State(y[:3], y[3:6]).side_slip) > SIDEWAYS * (1 + abs(forward_speed(y))):
+            return False
+        rates = self._rolling.accelerations(y, resisted)
+        return self._sliding.wheels_hold(y, given, rates, self._load(y))
+
+    @cached_property
+    def _is_held_everywhere(self) -> bool:
+        if self.wall.flat:
+            self._check_hold_at(np.zeros(6))
+        return self.wall.flat
+
+    def _check_hold(self, y: Array) -> None:
+        if not self._is_held_everywhere:
+            self._check_hold_at(y)
+
+    def _check_hold_at(self, y: Array) -> None:
+        """Raise `FellOff` where the climber is pulled off its wall, or tipped off it."""
+        hold = float(self.contact.hold(self.climber, self._body.into_wall(y)))
+        if hold < 1e-9 * self.climber.mass * GRAVITY:  # cos(90°) is 6e-17
+            raise FellOff("force onto the wall", hold, 0.0, "N")
+        _, tip = self.margins(State(y[:3], y[3:6]), np.zeros(2))
+        if tip < 1:
+            raise FellOff("tip margin", tip, 1.0, "")

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -212,6 +214,15 @@ def test_without_a_clock_it_follows_for_a_moment_only(loop):
     assert answer.command is None
 
 
+def test_a_clock_that_comes_right_after_the_first_odometry_is_in_time():
+    loop = Loop()
+    for _ in range(30):
+        loop.follower.look(0)
+    assert loop.follower.mode is Mode.NO_CLOCK
+    # a safe output would be an answer, with which lock-step would go on
+    assert loop.follower.on_odometry(0, loop.now, loop.state(loop.now)) is None
+
+
 def test_hold_carries_the_weight_brakes_and_lets_the_brake_go_when_it_must_have_stopped():
     loop = Loop(safe_output="hold")
     loop.plan()
@@ -275,3 +286,17 @@ def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source
             loop.follower.enable(kind == "enable")
         if answer is not None:
             assert np.abs(answer.torques).max() <= 20.0  # and not nan
+
+
+def test_too_little_suction_stops_the_climber_until_it_is_back():
+    loop = Loop(least_pressure=2000.0)
+    loop.plan()
+    tracker = loop.follower.tracker
+    whole = tracker.controller
+    assert loop.tell() is Mode.FOLLOWING
+    tracker.controller = replace(whole, climber=replace(whole.climber, suction_pressure=1999.0))
+    assert loop.tell() is Mode.LOW_PRESSURE
+    assert loop.follower.mode.is_fault
+    assert is_safe(loop)
+    tracker.controller = whole
+    assert loop.tell() is Mode.FOLLOWING

@@ -1,11 +1,15 @@
+import time
+
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.messages import reading, writing
 
@@ -135,3 +139,206 @@ def test_odometry_says_where_it_is_and_how_sure_it_is(world):
     assert (message.header.frame_id, message.child_frame_id) == ("wall", "climber")
     for covariance in (message.pose.covariance, message.twist.covariance):
         assert (np.diag(np.reshape(covariance, (6, 6))) > 0).all()
+
+
+class Answering:
+    """Answers every odometry once, with torques that are a function of its stamp."""
+
+    def __init__(self, world, namespace="", torque=lambda time: 0.0):
+        self.states, self.torque = {}, torque
+        self.commands = world.speak(JointState, f"{namespace}wheel_torques")
+        self.heard = world.listen(Odometry, f"{namespace}odom")
+        self.truth = world.listen(Odometry, f"{namespace}ground_truth")
+
+    def answer(self):
+        """Answer what is new; return how many stamps there have been."""
+        for message in self.heard:
+            if stamp(message) not in self.states:
+                self.states[stamp(message)] = message
+                torque = self.torque(stamp(message) * 1e-9 - 1.0)
+                self.commands.publish(torques(torque, 0.9 * torque, stamp(message)))
+        self.heard.clear()
+        return len(self.states)
+
+    def places(self):
+        return [(s, m.pose.pose.position.x, m.twist.twist.linear.x) for s, m in self.states.items()]
+
+
+def test_the_pace_of_time_does_not_change_the_trajectory(world):
+    factors, periods, runs = (0.5, 1.0, 5.0, 0.0), 100, []
+    for number, factor in enumerate(factors):
+        world.start(
+            "plant_simulator",
+            *("--ros-args", "-r", f"__ns:=/n{number}", "-p", "simulated_time:=true"),
+            *("-p", "inclination:=30.0", "-p", f"real_time_factor:={factor}"),
+        )
+        world.processes[f"plant_{number}"] = world.processes.pop("plant_simulator")
+        runs.append(Answering(world, f"n{number}/", lambda t: 3.0 * np.sin(5 * t)))
+    begun = [0.0] * len(factors)
+    took = [0.0] * len(factors)
+
+    def all_done():
+        for number, one in enumerate(runs):
+            count = one.answer()
+            if count and not begun[number]:
+                begun[number] = time.monotonic()
+            if count > periods and not took[number]:
+                took[number] = time.monotonic() - begun[number]
+        return all(took)
+
+    world.wait(all_done, "all to have gone half a second")
+    first, *others = (one.places()[: periods + 1] for one in runs)
+    assert len({speed for _, _, speed in first}) > periods / 2
+    for other in others:
+        assert other == first
+    for factor, passed in zip(factors[:2], took[:2], strict=True):
+        assert passed > 0.8 * periods * 0.005 / factor
+
+
+def test_paused_it_goes_on_step_by_step_and_only_when_asked(world):
+    world.start_node("plant_simulator", "simulated_time:=true", "inclination:=0.0")
+    answering = Answering(world)
+    world.wait(lambda: answering.answer() > 3, "motion")
+    assert world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=True)).success
+    world.wait(lambda: answering.answer() and not answering.heard, "what was on its way")
+    for _ in range(2):
+        before = answering.answer()
+        assert world.call(Trigger, "plant_simulator/step", Trigger.Request()).success
+        world.wait(lambda before=before: answering.answer() > before, "one step")
+        until = time.monotonic() + 0.3
+        world.wait(lambda until=until: answering.answer() and time.monotonic() > until, "no more")
+        assert answering.answer() == before + 1
+    assert world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False)).success
+    world.wait(lambda: answering.answer() > before + 20, "going on")
+    refused = world.call(Trigger, "plant_simulator/step", Trigger.Request())
+    assert (refused.success, refused.message) == (False, "not paused")
+
+
+def test_on_the_wall_clock_a_pause_is_left_out(world):
+    world.start_node("plant_simulator", "inclination:=0.0", "initial_x:=2.0")
+    odometry = world.listen(Odometry, "odom")
+    world.wait(lambda: len(odometry) > 5, "odometry")
+    world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=True))
+    until = time.monotonic() + 1.2
+    world.wait(lambda: time.monotonic() > until, "time to pass")
+    seen = len(odometry)
+    world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False))
+    world.wait(lambda: len(odometry) > seen + 50, "odometry again")
+    assert "behind" not in world.log("plant_simulator")
+    gaps = np.diff([stamp(m) for m in odometry])
+    assert gaps.max() > 1_000_000_000  # the pause, of which nothing was told
+    assert (gaps > 0).all()
+
+
+def pushed(frame, x, at):
+    message = WrenchStamped()
+    message.header.frame_id = frame
+    message.header.stamp = writing.time(at)
+    message.wrench.force.x = x
+    return message
+
+
+@pytest.mark.parametrize(("frame", "direction"), [("odom", 0.0), ("base_link", -1.0)])
+def test_a_push_acts_in_its_frame_from_its_stamp_until_it_is_too_old(world, frame, direction):
+    # rolling down the wall would need 56.4 N more; heading is -y, so x of the wall is sideways
+    world.start_node(
+        "plant_simulator",
+        *("simulated_time:=true", "suction_area:=0.06", "push_timeout:=0.1"),
+        "initial_heading:=-1.5707963267948966",
+    )
+    answering = Answering(world)
+    pushes = world.speak(WrenchStamped, "push")
+    begin = 1_200_000_000
+    pushes.publish(pushed("map", 1000.0, begin))
+    pushes.publish(pushed(frame, 107.35, begin))  # 100 N more than friction leaves of the weight
+    world.wait(lambda: "push: ok again" in world.log("plant_simulator"), "the push")
+    world.wait(lambda: answering.answer() > 61, "0.3 s")
+    speed = {s: m.twist.twist.linear.x for s, m in answering.states.items()}
+    assert not any(v for s, v in speed.items() if s <= begin)
+    assert speed[begin + 100_000_000] == pytest.approx(-2.0 * direction, abs=1e-9)
+    assert "frame_id='map' must be 'odom' or 'base_link'" in world.log("plant_simulator")
+
+
+def levels(diagnostics, name):
+    return [s.level for m in diagnostics for s in m.status if s.name.endswith(name)]
+
+
+def test_suction_lost_it_slides_then_falls_says_so_and_reset_revives_it(world):
+    world.start_node(
+        "plant_simulator",
+        *("simulated_time:=true", "initial_heading:=1.5", "suction.pump_time:=0.2"),
+        *("pressure_loss_time:=0.1", "pressure_loss_level:=0.0"),
+    )
+    answering = Answering(world)
+    diagnostics = world.listen(DiagnosticArray, "/diagnostics")
+
+    def fallen():
+        answering.answer()
+        return "fell off: tip margin" in world.log("plant_simulator")
+
+    world.wait(fallen, "the fall")
+    answering.answer()
+    speeds = [m.twist.twist.linear.x for m in answering.states.values()]
+    assert not any(speeds[:20])  # until 0.1 s
+    assert speeds[-1] < -0.5
+    # P S l/2 = m g h at 327 Pa, of 2500 Pa
+    fell_at = max(answering.states) * 1e-9 - 1.0
+    assert fell_at == pytest.approx(0.1 + 0.2 * np.log(2500 / 327), abs=0.006)
+    error = DiagnosticStatus.ERROR
+    world.wait(lambda: error in levels(diagnostics, "plant_simulator"), "the error")
+    last, until = max(answering.states), time.monotonic() + 0.5
+    world.wait(lambda: time.monotonic() > until, "silence")
+    assert all(stamp(m) <= last for m in answering.heard)
+    assert world.call(Trigger, "plant_simulator/reset", Trigger.Request()).success
+    world.wait(lambda: answering.answer() and max(answering.states) > last, "odometry")
+    assert answering.states[max(answering.states)].pose.pose.position.y == 0.0
+    assert "climber: ok again" in world.log("plant_simulator")
+
+
+def test_margins_are_published_with_their_stamp_and_alarm_in_diagnostics(world):
+    world.start_node("plant_simulator", "simulated_time:=true")
+    margins = world.listen(Vector3Stamped, "plant_simulator/margins")
+    diagnostics = world.listen(DiagnosticArray, "/diagnostics")
+    world.wait(lambda: DiagnosticStatus.WARN in levels(diagnostics, ": margins"), "a warning")
+    answering = Answering(world, torque=lambda t: 0.0 if t < 0.1 else 1.5)
+    world.wait(lambda: answering.answer() > 40, "0.2 s")
+    world.wait(lambda: len({stamp(m) for m in margins}) > 40, "margins")
+    by_stamp = {stamp(m): m.vector for m in margins}
+    rest, driving = by_stamp[1_050_000_000], by_stamp[1_150_000_000]
+    # 0.8 · 79.5 N against 49.05 N sideways, then against 105.6 N along as well
+    assert (rest.x, rest.z) == pytest.approx((0.8 * 79.5 / 49.05, 79.5))
+    assert driving.x < 0.8 * 79.5 / 105.5
+    assert rest.y == pytest.approx(150 * 0.125 / (49.05 * 0.05))
+    world.wait(lambda: DiagnosticStatus.ERROR in levels(diagnostics, ": margins"), "an error")
+
+
+def test_late_noisy_odometry_runs_in_lock_step_beside_the_truth(world):
+    world.start_node(
+        "plant_simulator",
+        *("simulated_time:=true", "inclination:=0.0", "odometry_delay:=0.01"),
+        *("position_noise:=0.01", "seed:=7"),
+    )
+    answering = Answering(world, torque=lambda t: 2.0)
+    world.wait(lambda: answering.answer() > 40 and len(answering.truth) > 40, "0.2 s")
+    truth = {stamp(m): m.pose.pose.position.x for m in answering.truth}
+    off = [m.pose.pose.position.x - truth.get(s, 0.0) for s, m in answering.states.items()]
+    assert min(answering.states) == 990_000_000
+    assert 0.004 < np.std(off) < 0.02
+    assert list(truth.values())[-1] > 0.01
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        (["real_time_factor:=2.0"], "real_time_factor=2.0 needs simulated_time=True"),
+        (["odometry_delay:=0.007"], "odometry_delay=0.007 must be a multiple"),
+        (["wall:=cylinder", "cylinder.radius:=0.0"], "cylinder.radius=0.0 must not be 0"),
+        (["friction:=dry"], "friction='dry' must be one of coulomb, viscous"),
+        (["slip:=true", "wheel_inertia:=1.0"], "wheel_inertia=1.0 must be <"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_with_one_line(world, parameters, said):
+    assert world.start_node("plant_simulator", *parameters).wait(60) == 1
+    (line,) = world.log("plant_simulator").splitlines()
+    assert said in line
+    del world.processes["plant_simulator"]

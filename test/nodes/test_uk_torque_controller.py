@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import MultiDOFJointTrajectory
@@ -209,3 +209,28 @@ def test_what_the_model_does_not_expect_is_published(world):
     loop.until(lambda _: any(m.wrench.force.x for m in disturbances), "disturbance")
     assert disturbances[-1].header.frame_id == "base_link"
     assert not disturbances[-1].wrench.force.y
+
+
+def test_suction_that_is_lost_stops_the_climber_and_its_margins_tell(world):
+    loop = Loop(world, "odometry_timeout:=1.0", "least_pressure:=2000.0")
+    margins = world.listen(Vector3Stamped, f"{NAME}/margins")
+    status = world.listen(DiagnosticArray, "/diagnostics")
+    pressure = world.speak(FluidPressure, "suction_pressure")
+    loop.plan()
+    loop.follows()
+    world.wait(lambda: margins, "margins")
+    assert margins[-1].vector.z == pytest.approx(0.53 * 2500 * 0.06)  # wheels' load, k P S
+    before = margins[-1].vector.y
+    pressure.publish(FluidPressure(fluid_pressure=2100.0))
+    loop.until(lambda _: margins[-1].vector.z < 70, "less load on the wheels")
+    assert margins[-1].vector.y == pytest.approx(before * 2100 / 2500)
+    assert margins[-1].vector.x > 0
+    pressure.publish(FluidPressure(fluid_pressure=1999.0))
+    loop.is_safe()
+    world.wait(lambda: "safe output: suction pressure too low" in world.log(NAME), "word of it")
+    world.wait(
+        lambda: any(s.level == DiagnosticStatus.ERROR for m in status[-2:] for s in m.status),
+        "error",
+    )
+    pressure.publish(FluidPressure(fluid_pressure=2500.0))
+    loop.follows()

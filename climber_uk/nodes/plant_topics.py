@@ -1,0 +1,53 @@
+"""The topics on which a simulated climber tells what a robot would tell, and the truth."""
+
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import FluidPressure, JointState
+
+from climber_uk.mechanics.preview import SECOND
+from climber_uk.messages import writing
+from climber_uk.nodes.running import ClimberNode
+from climber_uk.simulation.machine import Machine
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # it comes with a ROS installation, not with the wheels
+    TFMessage = None
+
+PRESSURE_PERIOD = SECOND // 10  # [ns] of the suction pressure, which changes slowly
+
+
+class PlantTopics:
+    """The publishers of a node; /clock only if its time is simulated."""
+
+    def __init__(self, node: ClimberNode, period: int, simulated: bool) -> None:
+        self.names, self.period = node.names, period
+        self.odometry = node.publisher(Odometry, "odom")
+        self.truth = node.publisher(Odometry, "ground_truth")
+        self.joints = node.publisher(JointState, "joint_states")
+        self.pressure = node.publisher(FluidPressure, "suction_pressure")
+        self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
+        self.clock = node.publisher(ClockMessage, "/clock") if simulated else None
+
+    def publish(self, machine: Machine, now: int, measured_at: int) -> None:
+        """Publish the odometry first: it is waited for. Times in ns."""
+        names, stamp = self.names, writing.time(now)
+        frames = names.odom_frame, names.base_frame
+        _, measured = machine.odometer.latest()
+        self.odometry.publish(writing.odometry(measured, measured_at, *frames))
+        if self.clock is not None:
+            self.clock.publish(ClockMessage(clock=stamp))
+        truth = writing.odometry(machine.state, now, *frames)
+        self.truth.publish(truth)
+        joints = writing.wheel_torques(
+            machine.torques, now, names.left_wheel_joint, names.right_wheel_joint
+        )
+        joints.position = machine.angles[::-1].tolist()
+        joints.velocity = machine.rates[::-1].tolist()
+        self.joints.publish(joints)
+        if self.transform is not None:
+            self.transform.publish(TFMessage(transforms=[writing.transform(truth)]))
+        if now % PRESSURE_PERIOD < self.period:
+            pressure = FluidPressure(fluid_pressure=machine.pressure)
+            pressure.header.stamp = stamp
+            self.pressure.publish(pressure)

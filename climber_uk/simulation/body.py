@@ -1,0 +1,155 @@
+"""The smooth motion of a climber on its wall: (q̇, v̇) of (30) under the no-slip row.
+
+    q̇ = v + M^(-1/2) B⁺ (b_q - A v),   v̇ = a + M^(-1/2) B⁺ (b - A a)
+
+(30) alone lets v drift away from q̇, because b depends on the velocity. Here b is taken at the
+corrected velocity q̇, and after each step v is replaced by q̇: the rows then hold for both.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import GRAVITY, Climber
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.friction import LuGre
+from climber_uk.mechanics.wall import Wall
+from climber_uk.simulation.inputs import Given
+
+# Relaxation lengths within a step after which bristles are where they end up: exp(-20) = 2e-9.
+SETTLED = 20.0
+
+
+@dataclass(frozen=True)
+class Body:
+    """A climber with all that acts on it; y = (q, v), then the bristles (3,) if there are any."""
+
+    climber: Climber
+    contact: Contact
+    wall: Wall
+    step: float  # [s]
+
+    @cached_property
+    def friction(self) -> float:
+        """Coulomb's friction f of the seal [N]."""
+        return self.contact.seal_friction(self.climber)
+
+    @cached_property
+    def stiction(self) -> float:
+        """What the seal holds at rest [N]."""
+        return float(self.contact.friction.stiction(self.friction))
+
+    @cached_property
+    def _weight_on_plane(self) -> tuple[float, float]:
+        return self._weight(0.0)
+
+    def _weight(self, height: float) -> tuple[float, float]:
+        s_x, s_y = self.wall.along(self.climber.inclination, height)
+        weight = self.climber.mass * GRAVITY
+        return weight * s_x, weight * s_y
+
+    def outside(self, height: float, given: Given) -> tuple[float, float]:
+        """Weight and push along the wall (x, y) [N], at y = `height` [m]."""
+        w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
+        return given.push_x + w_x, given.push_y + w_y
+
+    def push(self, y: Array, given: Given) -> float:
+        """Force along the climber that friction is up against [N]."""
+        _, height, heading, *_ = y.tolist()
+        f_x, f_y = self.outside(height, given)
+        return float(given.drive + f_x * math.cos(heading) + f_y * math.sin(heading))
+
+    def lateral(self, y: Array, given: Given, mass: float) -> float:
+        """What the wheels have to take to the left, for `mass` to follow the heading [N]."""
+        _, height, heading, *_ = y.tolist()
+        f_x, f_y = self.outside(height, given)
+        return (
+            mass * forward_speed(y) * float(y[5])
+            + f_x * math.sin(heading)
+            - f_y * math.cos(heading)
+        )
+
+    def into_wall(self, y: Array) -> float:
+        """What presses the climber's mass into the wall: g_n with the way's curvature [m/s²]."""
+        return float(self.wall.into(self.climber.inclination, float(y[1]), float(y[4])))
+
+    def runge_kutta(self, y: Array, given: Given, direction: float | None, h: float) -> Array:
+        """y after `h` [s], by the classic method of fourth order; see `derivative`."""
+        k1 = self.derivative(y, given, direction)
+        k2 = self.derivative(y + h / 2 * k1, given, direction)
+        k3 = self.derivative(y + h / 2 * k2, given, direction)
+        k4 = self.derivative(y + h * k3, given, direction)
+        end = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        end[3:6] = self.derivative(end, given, direction)[:3]
+        return end
+
+    def derivative(self, y: Array, given: Given, direction: float | None) -> Array:
+        """(q̇, v̇) of (30), both (3,), and the bristles' rates (3,) if there are any.
+
+        A = [sinθ -cosθ 0] has unit length and M weighs x and y alike, so that M^(-1/2) B⁺ = Aᵀ.
+        Where the seal slides in `direction` 1 or -1, friction is its law's; for 0 it holds the
+        climber: [cosθ sinθ 0] is a second row with b_q = b = 0. For None see `_ring`.
+        """
+        climber = self.climber
+        _, height, heading, v_x, v_y, yaw_rate, *bent = y.tolist()
+        cosine, sine = math.cos(heading), math.sin(heading)
+        force, turn = given.drive, given.turn + given.push_turn
+        bending = [0.0] * len(bent)
+        if direction == 0:
+            held = [0.0, 0.0, yaw_rate, 0.0, 0.0, turn / climber.yaw_inertia]
+            return np.array(held + bending)
+
+        A_v = sine * v_x - cosine * v_y
+        x_dot, y_dot = v_x - sine * A_v, v_y + cosine * A_v
+        speed = x_dot * cosine + y_dot * sine
+        if direction is None:
+            resistance, moment, bending = self._ring(speed, yaw_rate, bent)
+            force, turn = force - resistance, turn - moment
+        else:
+            sliding = direction * speed
+            force = force - self.contact.friction.level(self.friction, sliding) * direction
+
+        # as `outside`, without the call: this is where the plant spends its time
+        w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
+        f_x, f_y = given.push_x + w_x, given.push_y + w_y
+        a_x = (force * cosine + f_x) / climber.mass
+        a_y = (force * sine + f_y) / climber.mass
+        b_minus_A_a = -yaw_rate * speed - (sine * a_x - cosine * a_y)
+        rates = [
+            *(x_dot, y_dot, yaw_rate),
+            *(a_x + sine * b_minus_A_a, a_y - cosine * b_minus_A_a, turn / climber.yaw_inertia),
+        ]
+        return np.array(rates + bending)
+
+    def _ring(self, v: float, omega: float, bent: list[float]) -> tuple[float, float, list[float]]:
+        """Force and moment of the seal against v and ω, and the rates of its bristles.
+
+        A ring of radius R that slides at s = √(v² + (R ω)²): exact for sliding alone and for
+        turning alone, and for both the ellipse between them.
+        """
+        radius, law, f = self.contact.grip.seal_radius, self.contact.friction, self.friction
+        around = radius * omega
+        speed = math.hypot(v, around)
+        if isinstance(law, LuGre) and not self.has_settled(speed):
+            relaxation = law.relaxation(speed)
+            ahead, aside, turned = bent
+            ahead_1, turned_1 = v - relaxation * ahead, around - relaxation * turned
+            moment = radius * law.force(f, around, turned, turned_1)
+            rates = [ahead_1, -relaxation * aside, turned_1]
+            return law.force(f, v, ahead, ahead_1), moment, rates
+        share = law.level(f, speed) / speed if speed > 0 else 0.0
+        return share * v, share * around * radius, [0.0] * len(bent)
+
+    def has_settled(self, speed: float) -> bool:
+        """Whether bristles are, within a step, where they end up at a sliding `speed` [m/s]."""
+        law = self.contact.friction
+        return isinstance(law, LuGre) and law.relaxation(speed) * self.step >= SETTLED
+
+
+def forward_speed(y: Array) -> float:
+    """v = ẋ cosθ + ẏ sinθ (12) [m/s]."""
+    _, _, heading, v_x, v_y, *_ = y.tolist()
+    return float(v_x * math.cos(heading) + v_y * math.sin(heading))

@@ -1,0 +1,73 @@
+"""Friction on cones of known size: the impulses that oppose every sliding as far as they may.
+
+    ν⁺ = ν + M⁻¹ Σ Hᵢᵀ λᵢ,   |λᵢ| <= Lᵢ,   λᵢ = -Lᵢ sᵢ/|sᵢ| where sᵢ = Hᵢ ν⁺ is not 0
+
+ν⁺ minimises ½ (ν⁺ - ν)ᵀ M (ν⁺ - ν) + Σ Lᵢ |sᵢ|: it is unique, and has no more energy than ν. It is
+found contact by contact until nothing changes (block Gauss-Seidel), each contact exactly.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+
+MAX_SWEEPS = 5000  # a few will do, but for contacts that only just hold each other
+UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
+SMALLEST = 1e-90  # [N s] an impulse that might as well be none; its cube is still a number
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A contact: sliding s = H ν of k components, with H M⁻¹ Hᵀ diagonal, and its limit."""
+
+    rows: Array  # H (k, n)
+    limit: float  # L of the impulse [N s]
+
+
+def opposed(velocity: Array, lightness: Array, cones: list[Cone]) -> tuple[Array, list[bool]]:
+    """ν⁺ (n,) of ν (n,) and the diagonal (n,) of M⁻¹, and whether each contact holds."""
+    velocity = velocity.copy()
+    impulses: list[Array] = [np.zeros(len(cone.rows)) for cone in cones]
+    per_impulse = [lightness[:, None] * cone.rows.T for cone in cones]  # M⁻¹ Hᵀ
+    yielding = [(cone.rows**2) @ lightness for cone in cones]
+    enough = UNCHANGED * (1 + np.abs(velocity).max())
+    for _ in range(MAX_SWEEPS):
+        changed = 0.0
+        for number, cone in enumerate(cones):
+            without = cone.rows @ velocity - yielding[number] * impulses[number]
+            impulse = impulse_against(without, yielding[number], cone.limit)
+            change = per_impulse[number] @ (impulse - impulses[number])
+            velocity += change
+            impulses[number] = impulse
+            changed = max(changed, float(np.abs(change).max()))
+        if changed <= enough:
+            break
+    holds = [
+        bool(impulse @ impulse < (1 - 1e-9) * cone.limit**2)
+        for impulse, cone in zip(impulses, cones, strict=True)
+    ]
+    return velocity, holds
+
+
+def impulse_against(sliding: Array, yielding: Array, limit: float) -> Array:
+    """Impulse λ (k,) with |λ| <= `limit` that stops `sliding` (k,), or opposes what remains.
+
+    Remains s + W λ with W = diag(yielding). λ = -s / (W + κ), with κ >= 0 such that |λ| is the
+    limit, by Newton's method on 1/|λ|, which comes up to κ from below.
+    """
+    if limit < SMALLEST:
+        return 0.0 * sliding
+    W = np.where(yielding > 0, yielding, 1.0)  # what cannot move does not slide
+    kappa, impulse = 0.0, -sliding / W
+    size = float(np.linalg.norm(impulse))
+    if size <= limit:
+        return impulse
+    for _ in range(60):
+        slope = float(impulse @ (impulse / (W + kappa)))
+        kappa += size**2 / slope * (size - limit) / limit
+        impulse = -sliding / (W + kappa)
+        size = float(np.linalg.norm(impulse))
+        if size <= limit * (1 + 1e-14):
+            break
+    return impulse * (limit / size)

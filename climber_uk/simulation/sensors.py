@@ -1,0 +1,108 @@
+"""Odometry as a robot's sensors tell it: late, noisy, biased, or counted by its wheels."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.parameter import check, parameter
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What is between the truth and the odometry; all of it off."""
+
+    odometry_source: str = parameter(
+        "truth", "", "what odometry measures", choices=("truth", "wheels")
+    )
+    odometry_delay: float = parameter(
+        0.0, "s", "from measuring, which is the stamp, to publishing", at_least=0
+    )
+    position_noise: float = parameter(0.0, "m", "standard deviation of x and y", at_least=0)
+    heading_noise: float = parameter(0.0, "rad", "standard deviation", at_least=0)
+    speed_noise: float = parameter(0.0, "m/s", "standard deviation", at_least=0)
+    yaw_rate_noise: float = parameter(0.0, "rad/s", "standard deviation", at_least=0)
+    x_bias: float = parameter(0.0, "m", "added to x")
+    y_bias: float = parameter(0.0, "m", "added to y")
+    heading_bias: float = parameter(0.0, "rad", "added to the heading")
+    speed_bias: float = parameter(0.0, "m/s", "added to the forward speed")
+    yaw_rate_bias: float = parameter(0.0, "rad/s", "added to the yaw rate")
+    encoder_resolution: float = parameter(
+        0.0, "rad", "of the wheels' encoders, for odometry from wheels; 0: exact", at_least=0
+    )
+    seed: int = parameter(0, "", "of all noise", at_least=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def delay_in(self, period: float) -> int:
+        """Odometry's delay in periods of `period` [s]; `ValueError` if it is no multiple."""
+        periods = round(self.odometry_delay / period)
+        if abs(periods * period - self.odometry_delay) > 1e-9:
+            raise ValueError(
+                f"odometry_delay={self.odometry_delay} must be a multiple of "
+                f"control_period={period} [s]"
+            )
+        return periods
+
+
+class Odometer:
+    """The sensors at work, from a start at `state`; the same seed, the same noise."""
+
+    def __init__(self, sensors: Sensors, climber: Climber, period: float, state: State) -> None:
+        self.sensors, self.climber, self.period = sensors, climber, period
+        self._random = np.random.default_rng(sensors.seed)
+        self._counted: Array = np.zeros(2)  # [rad] right, left
+        self._pose: Array = state.pose
+        late = sensors.delay_in(period)
+        first = self._measured(state)
+        # before the start the climber was where it is
+        self._on_its_way = deque([(-number, first) for number in range(late, -1, -1)])
+
+    def latest(self) -> tuple[int, State]:
+        """Period, counted from the start, in which the odometry due now was measured, and it."""
+        return self._on_its_way[0]
+
+    def measure(self, state: State, wheels: State, angles: Array) -> None:
+        """Take a new measurement; `wheels` is the state as they tell it, and their `angles`."""
+        if self.sensors.odometry_source == "wheels":
+            state = self._reckoned(wheels, angles)
+        number, _ = self._on_its_way[-1]
+        self._on_its_way.append((number + 1, self._measured(state)))
+        self._on_its_way.popleft()
+
+    def _reckoned(self, wheels: State, angles: Array) -> State:
+        """State that wheels at `angles` (2,) have rolled to since the last measurement."""
+        resolution, climber = self.sensors.encoder_resolution, self.climber
+        if resolution > 0:
+            angles = resolution * np.floor(angles / resolution)
+        right, left = (climber.wheel_radius * (angles - self._counted)).tolist()
+        self._counted = angles
+        way, turn = (right + left) / 2, (right - left) / (2 * climber.half_track)
+        x, y, heading = self._pose.tolist()
+        middle = heading + turn / 2
+        self._pose = np.array(
+            [x + way * math.cos(middle), y + way * math.sin(middle), heading + turn]
+        )
+        if resolution > 0:
+            return State.rolling(self._pose, way / self.period, turn / self.period)
+        return State.rolling(self._pose, float(wheels.forward_speed), float(wheels.yaw_rate))
+
+    def _measured(self, state: State) -> State:
+        sensors = self.sensors
+        pose_noise = sensors.position_noise, sensors.position_noise, sensors.heading_noise
+        pose_bias = np.array([sensors.x_bias, sensors.y_bias, sensors.heading_bias])
+        twist_noise = sensors.speed_noise, sensors.yaw_rate_noise
+        twist_bias = sensors.speed_bias, sensors.yaw_rate_bias
+        if not (any(pose_noise) or any(twist_noise) or any(twist_bias) or pose_bias.any()):
+            return state
+        noise = self._random.normal(size=5)
+        pose = state.pose + pose_bias + noise[:3] * pose_noise
+        forward, turning = noise[3:] * twist_noise + twist_bias
+        speed, yaw_rate = state.forward_speed + forward, state.yaw_rate + turning
+        cosine, sine, aside = math.cos(pose[2]), math.sin(pose[2]), float(state.side_slip)
+        velocity = [speed * cosine - aside * sine, speed * sine + aside * cosine, yaw_rate]
+        return State(pose, np.array(velocity))

@@ -1,0 +1,200 @@
+"""A climber whose contacts may stick and slip in every direction: implicit, never gaining energy.
+
+    ν⁺ = ν + M⁻¹ (h Q + Σ Hᵢ λᵢ),   λᵢ opposes Hᵢᵀ ν⁺,  |λᵢ| <= h cᵢ
+
+Implicit Euler on the friction cones (Moreau 1988; here their loads are known, so that ν⁺ is the
+minimum of a convex function and unique). ν = (v, u, ω, ρR, ρL): forward, to the left, turning, and
+the speed of each wheel's rim. Contacts: two wheels, the ring of the seal, tracks that scrub. First
+order in the step, against four while nothing changes; so steps are short, and taken only here.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.friction import LuGre, Stribeck
+from climber_uk.simulation.body import Body, forward_speed
+from climber_uk.simulation.cones import Cone, opposed
+from climber_uk.simulation.inputs import Given
+
+PARTS = 8  # of a step
+AT_REST = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """Steps of a body whose wheels slip, if `slip`, where their load does not suffice.
+
+    (11) and (15) count the inertia of rolling wheels into m and J; where wheels slip it is taken
+    out again. Raises `ValueError` if it is more than there is.
+    """
+
+    body: Body
+    slip: bool
+
+    def __post_init__(self) -> None:
+        if self.slip and min(self.mass, self.yaw_inertia) <= 0:
+            inertia = self.body.contact.grip.wheel_inertia
+            raise ValueError(
+                f"wheel_inertia={inertia!r} must be < what mass and yaw_inertia count it into"
+            )
+
+    @cached_property
+    def rim(self) -> float:
+        """Mass of a wheel's rim: its inertia over r² [kg]."""
+        return self.body.contact.grip.wheel_inertia / self.body.climber.wheel_radius**2
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass [kg] without what turns with the wheels."""
+        return self.body.climber.mass - 2 * self.rim * self.slip
+
+    @cached_property
+    def yaw_inertia(self) -> float:
+        """Yaw inertia [kg m²] without what turns with the wheels."""
+        climber = self.body.climber
+        return climber.yaw_inertia - 2 * self.rim * climber.half_track**2 * self.slip
+
+    def wheels_hold(
+        self, y: Array, given: Given, accelerations: tuple[float, float], load: float
+    ) -> bool:
+        """Whether wheels that share `load` [N] do what rolling on asks of them."""
+        d, (v_1, omega_1) = self.body.climber.half_track, accelerations
+        most = self.body.contact.grip.wheel_friction_coefficient * load / 2
+        right = (given.drive + given.turn / d) / 2 - self.rim * (v_1 + d * omega_1)
+        left = (given.drive - given.turn / d) / 2 - self.rim * (v_1 - d * omega_1)
+        if max(abs(right), abs(left)) > most:
+            return False
+        sideways = math.sqrt(most**2 - right**2) + math.sqrt(most**2 - left**2)
+        return abs(self.body.lateral(y, given, self.mass)) <= sideways
+
+    def advance(self, y: Array, slip: Array, given: Given, load: float) -> tuple[Array, Array]:
+        """(y, rims' slip) after a step under `load` [N] on the wheels."""
+        caught = False
+        for _ in range(PARTS):
+            before = y
+            y, slip, caught = self._part(y, slip, given, load, self.body.step / PARTS)
+            if caught and (y == before).all():
+                break  # it rests, and goes on doing so
+        return self._rolling_on(y, slip) if caught else (y, slip)
+
+    def _part(
+        self, y: Array, slip: Array, given: Given, load: float, h: float
+    ) -> tuple[Array, Array, bool]:
+        """(y, rims' slip) after `h` [s], and whether no wheel slips any more."""
+        d = self.body.climber.half_track
+        x, height, heading, v_x, v_y, omega, *bent = y.tolist()
+        middle = heading + h / 2 * omega if self.slip else heading
+        cosine, sine = math.cos(middle), math.sin(middle)
+        v, rolls = v_x * cosine + v_y * sine, forward_speed(y)
+        u = v_y * cosine - v_x * sine if self.slip else 0.0
+        sliding = np.array([v, u, self.body.contact.grip.seal_radius * omega])
+
+        f_x, f_y = self.body.outside(height, given)
+        pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, given.push_turn])
+        against, drag = self._smooth_friction(sliding, np.array(bent), h)
+        masses = np.array([self.mass, self.mass, self.yaw_inertia])
+        free = masses * [v, u, omega] + h * (pull - against)
+        if self.slip:
+            right, left = (given.drive + given.turn / d) / 2, (given.drive - given.turn / d) / 2
+            rims = slip + np.array([rolls + d * omega, rolls - d * omega])
+            free = np.concatenate([free, self.rim * rims + h * np.array([right, left])])
+            masses = np.concatenate([masses + h * drag, [self.rim, self.rim]])
+            lightness = 1 / masses
+        else:
+            free += h * np.array([given.drive, 0.0, given.turn])
+            lightness = 1 / (masses + h * drag)
+            free[1] = lightness[1] = 0.0
+        cones = self._cones(load, float(np.linalg.norm(sliding)), h)
+        found, holds = opposed(free * lightness, lightness, cones)
+        v, u, omega = self._at_rest(found[:3], holds)
+
+        bent_1 = self._bent(sliding, np.array([v, u, omega * self._radius]), np.array(bent), h)
+        x, height = x + h * (v * cosine - u * sine), height + h * (v * sine + u * cosine)
+        heading += h * omega
+        if not self.slip:
+            cosine, sine = math.cos(heading), math.sin(heading)
+        v_x, v_y = v * cosine - u * sine, v * sine + u * cosine
+        end = np.array([x, height, heading, v_x, v_y, omega, *bent_1])
+        if not self.slip:
+            return end, slip, False
+        rolls = forward_speed(end)
+        caught = max(abs(s) for cone in cones[:2] for s in cone.rows @ found) < AT_REST
+        return end, found[3:] - [rolls + d * omega, rolls - d * omega], caught
+
+    @property
+    def _radius(self) -> float:
+        return self.body.contact.grip.seal_radius
+
+    @property
+    def _drag(self) -> float:
+        """Part of friction with an edge that goes with the speed [N s/m]."""
+        law = self.body.contact.friction
+        return law.viscous * self.body.friction if isinstance(law, Stribeck) else 0.0
+
+    def _cones(self, load: float, sliding: float, h: float) -> list[Cone]:
+        """The wheels first, if they may slip; then the seal, and what resists turning."""
+        contact, d = self.body.contact, self.body.climber.half_track
+        cones, n = [], 5 if self.slip else 3
+        if self.slip:
+            most = h * contact.grip.wheel_friction_coefficient * load / 2
+            for side, rim in ((d, 3), (-d, 4)):
+                rows = np.zeros((2, n))
+                rows[0, [0, 2, rim]] = 1.0, side, -1.0
+                rows[1, 1] = 1.0
+                cones.append(Cone(rows, most))
+        if contact.friction.stiction(1.0) > 0:
+            rows = np.eye(3, n)
+            rows[2, 2] = self._radius
+            level = float(contact.friction.level(self.body.friction, sliding))
+            level -= self._drag * sliding  # that is implicit
+            cones.append(Cone(rows, h * level))
+        else:
+            cones.append(Cone(np.eye(1, n), 0.0))
+        turning = float(contact.locomotion.turning_resistance(load))
+        cones.append(Cone(np.eye(1, n, 2), h * turning))
+        return cones
+
+    def _at_rest(self, found: Array, holds: list[bool]) -> tuple[float, float, float]:
+        """(v, u, ω), 0 and not merely small where friction holds it."""
+        v, u, omega = found.tolist()
+        seal_holds, turn_is_held = holds[-2:]
+        if seal_holds and math.hypot(v, u, self._radius * omega) < AT_REST:
+            v, u, omega = 0.0, 0.0, 0.0 if self._radius > 0 else omega
+        return v, u, 0.0 if turn_is_held and abs(omega) < AT_REST else omega
+
+    # Friction without an edge: a + D s⁺ against the sliding s⁺ = (v, u, R ω) after h
+
+    def _smooth_friction(self, sliding: Array, bent: Array, h: float) -> tuple[Array, Array]:
+        """Force (3,) that is there already [N, N, N m], and drag (3,) [N s/m, N s/m, N m s]."""
+        law, f = self.body.contact.friction, self.body.friction
+        lever = np.array([1.0, 1.0, self._radius])
+        speed = float(np.linalg.norm(sliding))
+        if isinstance(law, LuGre):
+            q, stiffness, T = 1 + h * law.relaxation(speed), law.stiffness(f), law.damping_time
+            there = stiffness * (bent / q + T * (bent / q - bent) / h)
+            drag = stiffness * (h + T) / q + f * law.viscous
+            return lever * there, lever**2 * drag
+        if law.stiction(1.0) > 0:
+            return np.zeros(3), lever**2 * self._drag
+        share = law.level(f, speed) / speed if speed > 0 else law.steepness(f)
+        return np.zeros(3), lever**2 * share
+
+    def _bent(self, before: Array, after: Array, bent: Array, h: float) -> Array:
+        """Bristles after `h`, in which they slid at `before` (3,), and at last `after` (3,)."""
+        law = self.body.contact.friction
+        if not isinstance(law, LuGre):
+            return bent
+        return (bent + h * after) / (1 + h * law.relaxation(float(np.linalg.norm(before))))
+
+    def _rolling_on(self, y: Array, slip: Array) -> tuple[Array, Array]:
+        """(y, no slip) with the momentum of rims and climber together: they roll on as one."""
+        climber, d = self.body.climber, self.body.climber.half_track
+        v = forward_speed(y) + self.rim * float(slip.sum()) / climber.mass
+        omega = float(y[5]) + self.rim * d * float(slip[0] - slip[1]) / climber.yaw_inertia
+        heading, end = float(y[2]), y.copy()
+        end[3:6] = v * math.cos(heading), v * math.sin(heading), omega
+        return end, np.zeros(2)
