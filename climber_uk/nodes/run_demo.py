@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import ExternalShutdownException
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
@@ -26,6 +27,7 @@ from climber_uk.nodes.running import ClimberNode
 
 # One topic of each node that only the recorder subscribes, and does once it has found the node.
 FOUND = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")
+FELL = "fell off"
 START_TIMEOUT = 60.0  # [s]
 STOP_TIMEOUT = 20.0  # [s]
 
@@ -49,12 +51,20 @@ class Demo(ClimberNode):
         self.parameters.refuse_unknown()
         self.duration = self.parameters.read(Options).duration
         self.time: float | None = None  # [s] of the plant
+        self.fall = ""  # what the plant said of it
         self.subscription(FluidPressure, "suction_pressure", self.on_pressure)
+        self.subscription(DiagnosticArray, "/diagnostics", self.on_diagnostics)
         self.starter = self.create_client(Trigger, "trajectory_publisher/start")
 
     def on_pressure(self, message: FluidPressure) -> None:
         """Keep the time of what is published least often."""
         self.time = reading.nanoseconds(message.header.stamp) / SECOND
+
+    def on_diagnostics(self, message: DiagnosticArray) -> None:
+        """Note that the climber fell."""
+        for status in message.status:
+            if FELL in status.message:
+                self.fall = status.message
 
     def recorder_has_found_all(self) -> bool:
         """Whether the recorder knows every node, and there is a start to ask for."""
@@ -86,13 +96,19 @@ class Demo(ClimberNode):
         wait(lambda: self.time is not None, "the plant", START_TIMEOUT)
         first = self.time or 0.0
         begin = shown = time.monotonic()
-        while (passed := (self.time or 0.0) - first) < self.duration:
-            wait(lambda: (self.time or 0.0) - first > passed, "the plant", START_TIMEOUT)
+        while (passed := (self.time or 0.0) - first) < self.duration and not self.fall:
+            wait(
+                lambda: (self.time or 0.0) - first > passed or bool(self.fall),
+                "the plant",
+                START_TIMEOUT,
+            )
             now = time.monotonic()
             if now > shown + 0.5:
                 shown = now
                 print(f"\r{self.progress(passed, now - begin)}", end="", flush=True)
         print(f"\r{self.progress(passed, time.monotonic() - begin)}")
+        if self.fall:
+            print(self.fall)
 
     def progress(self, passed: float, wall_time: float) -> str:
         """Return a line about the time [s] that has passed, and on the wall clock."""

@@ -1,5 +1,6 @@
 """Answers each odometry with the wheel torques that keep the climber on its reference."""
 
+import math
 from dataclasses import dataclass, replace
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
@@ -16,7 +17,7 @@ from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import Timing, Tracker
-from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import ADHESION, Alarm, Contact, Grip
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.wall import Plane
@@ -143,7 +144,8 @@ class UkTorqueController(ClimberNode):
             self.publish_torques(answer)
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command)
-                self.publish_margins(answer.stamp, answer.command)
+            if self.follower.state is not None:
+                self.publish_margins(answer, self.follower.state)
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
@@ -168,20 +170,23 @@ class UkTorqueController(ClimberNode):
             error = tracking_error(follower.state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
 
-    def publish_margins(self, stamp: int, command: Command) -> None:
+    def publish_margins(self, answer: Answer, state: State) -> None:
         """Publish how near the torques bring the climber to slipping, and how near it is to tip."""
         climber, read = self.follower.tracker.controller.climber, self.parameters.read
         name = self.options.adhesion
         contact = Contact(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
-        drive, _ = climber.drive_and_turn(command.torques)
-        lateral = float(command.constraint_force[1])
+        drive, _ = climber.drive_and_turn(answer.torques)
+        if answer.command is not None:
+            lateral = float(answer.command.constraint_force[1])
+        else:
+            lateral = climber.weight_along_wall * math.cos(state.heading)
         into_wall = Plane().into(climber.inclination, 0.0, 0.0)
         along_wall = climber.weight_along_wall / climber.mass
         self.margins.publish(
             contact.slip_margin(climber, into_wall, drive, lateral),
             contact.tip_margin(climber, into_wall, along_wall),
             contact.wheel_load(climber, into_wall),
-            stamp,
+            answer.stamp,
         )
 
     def diagnose(self) -> None:

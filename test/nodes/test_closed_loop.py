@@ -10,9 +10,12 @@ from world import CONFIG, executable
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.recorded_run import read_run
+from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 
 pytestmark = pytest.mark.nodes
+
+ERROR = 2  # a level of diagnostic_msgs/DiagnosticStatus
 
 
 def demo(world, output, config, *arguments, **how):
@@ -71,6 +74,35 @@ def test_a_realistic_climber_goes_from_rest_to_rest(world, tmp_path):
     assert run.time[-1] > 56
     assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
+
+
+def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_end(world, tmp_path):
+    """At 5 s the pump's pressure is lost, with 1 s to the volume: P = 8 kPa exp(5 - t)."""
+    config = tmp_path / "lost.yaml"
+    lost = "initial_y: 3.0\n    pressure_loss_time: 5.0\n    suction:\n      pump_time: 1.0"
+    config.write_text((CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", lost))
+    said = finished(demo(world, tmp_path / "run", config, "--duration", "12"))
+    assert "fell off: tip margin" in said
+    states, stopped, errors = {}, [], []
+    for topic, _, message in read_messages(
+        tmp_path / "run" / "bag", ["/ground_truth", "/diagnostics"]
+    ):
+        time = reading.nanoseconds(message.header.stamp) / SECOND - 1.0
+        if topic == "/ground_truth":
+            states[time] = message.twist.twist.linear.x
+            continue
+        for status in message.status:
+            if status.level == ERROR:
+                errors.append(status.name)
+                if "suction pressure too low" in status.message:
+                    stopped.append(time)
+    # at 5 kPa, told every 0.1 s; by hand: 8 exp(5 - t) = 5
+    assert stopped[0] == pytest.approx(5.0 + np.log(8 / 5), abs=0.11)
+    assert {"/uk_torque_controller", "/plant_simulator"} <= set(errors)
+    # by hand: P S l/2 = m g h
+    falls = 5.0 + np.log(8000 * 0.06 * 0.125 / (5 * 9.81 * 0.05))
+    assert max(states) == pytest.approx(falls, abs=0.01)
+    assert states[max(time for time in states if time < falls - 1.0)] == 0.0  # it stood by then
 
 
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
