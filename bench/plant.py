@@ -37,14 +37,9 @@ from climber_uk.simulation.sensors import Sensors
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+from robustness import BUILT
 
 PAPER = Climber()
-BUILT = Climber(
-    seal_friction_coefficient=0.6,
-    wheel_load_share=0.8,
-    suction_pressure=8000.0,
-    max_wheel_torque=4.0,
-)
 
 
 def stribeck_curve() -> Figure:

@@ -170,17 +170,14 @@ def main() -> None:
     ros = ["--ros-args", "--params-file", str(options.config)]
     simulated = options.clock == "sim"
     use_sim_time = ["-p", f"use_sim_time:={str(simulated).lower()}"]
-    # On the wall clock a climber that starts in motion needs everybody ready, and a torque takes
-    # its time to the wheels.
+    # on the wall clock a climber that starts in motion needs everybody ready
     extra = {
         "record_bag": ["--output", str(bag)],
         "trajectory_publisher": [
             *(*ros, *use_sim_time, "-p", "autostart:=false"),
             *("-p", f"start_delay:={0.0 if simulated else 0.2}"),
         ],
-        "uk_torque_controller": [
-            *(*ros, *use_sim_time, "-p", f"transport_delay:={0.0 if simulated else 0.003}")
-        ],
+        "uk_torque_controller": [*ros, *use_sim_time],
         "plant_simulator": [*ros, "-p", f"simulated_time:={str(simulated).lower()}"],
     }
     here = Path(sys.argv[0]).parent
