@@ -212,6 +212,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--figures", type=Path, help="directory for plant_*.png")
     options = parser.parse_args()
+    if options.figures:
+        options.figures.mkdir(parents=True, exist_ok=True)
     for name, draw in FIGURES.items():
         figure = draw()
         if options.figures:
