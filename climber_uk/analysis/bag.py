@@ -88,7 +88,7 @@ def _mend_mcap(torn: Path, mended: Path) -> None:
         for record in _whole_records(source):
             match record:
                 case Header():
-                    writer.start(record.profile, record.library)
+                    writer.start(record.profile)
                 case Schema() if record.id not in schemas:
                     schemas[record.id] = writer.register_schema(
                         record.name, record.encoding, record.data

@@ -95,8 +95,12 @@ class Stribeck:
 
     def level(self, f: Any, speed: Any) -> Any:
         """See `Friction`."""
+        return f * (self.gamma(speed) + self.viscous * speed)
+
+    def gamma(self, speed: Any) -> Any:
+        """γ(v) (...)."""
         part = speed / self.speed
-        return f * (1 + (self.ratio - 1) * exp(-part * part) + self.viscous * speed)
+        return 1 + (self.ratio - 1) * exp(-part * part)
 
     def steepness(self, f: Any) -> Any:
         """See `Friction`: √(2/e) at v_s/√2 is that of the Gaussian."""
@@ -121,11 +125,6 @@ class LuGre(Stribeck):
     def relaxation(self, speed: Any) -> Any:
         """Rate σ₀ |v| / g(v) (...) [1/s] at which the bristles tend to where they end up."""
         return speed / (self.deflection * self.gamma(speed))
-
-    def gamma(self, speed: Any) -> Any:
-        """γ(v) (...)."""
-        part = speed / self.speed
-        return 1 + (self.ratio - 1) * exp(-part * part)
 
     def stiffness(self, f: Any) -> Any:
         """σ₀ (...) [N/m]."""

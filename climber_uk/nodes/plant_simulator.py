@@ -158,9 +158,7 @@ class PlantSimulator(ClimberNode):
         self.held = self.held and not torques.any()
         if not self.options.simulated_time:
             self.commands.add(self.get_clock().now().nanoseconds, torques)
-        elif reading.nanoseconds(message.header.stamp) == self.asked and not (
-            self.answered or self.held  # its time begins with its motion
-        ):
+        elif reading.nanoseconds(message.header.stamp) == self.asked and not self.answered:
             self.commands.add(self.stamp, torques)
             self.answered = True
             self.say("lock-step", "")

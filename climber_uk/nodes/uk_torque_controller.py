@@ -54,6 +54,7 @@ class UkTorqueController(ClimberNode):
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
+        self.contact = self.contact_now()
         self.pressure: float | None = None  # [Pa] as last measured
         self.follower = Follower(Tracker(*self.settings()), self.parameters.read(Safety))
         self.answers = self.saturations = 0
@@ -82,9 +83,15 @@ class UkTorqueController(ClimberNode):
         controller = Controller(climber, read(CONSTRAINTS[name], f"{name}."), read(Law))
         return controller, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
 
+    def contact_now(self) -> Contact:
+        """What the parameters say that holds the climber on its wall."""
+        read, name = self.parameters.read, self.options.adhesion
+        return Contact(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
+
     def on_parameters(self) -> None:
         """Take up changed parameters."""
         self.margins.alarm = self.parameters.read(Alarm)
+        self.contact = self.contact_now()
         self.follower.tracker.retune(*self.settings())
 
     def on_odometry(self, message: Odometry) -> None:
@@ -172,9 +179,7 @@ class UkTorqueController(ClimberNode):
 
     def publish_margins(self, answer: Answer, state: State) -> None:
         """Publish how near the torques bring the climber to slipping, and how near it is to tip."""
-        climber, read = self.follower.tracker.controller.climber, self.parameters.read
-        name = self.options.adhesion
-        contact = Contact(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
+        climber, contact = self.follower.tracker.controller.climber, self.contact
         drive, _ = climber.drive_and_turn(answer.torques)
         if answer.command is not None:
             lateral = float(answer.command.constraint_force[1])

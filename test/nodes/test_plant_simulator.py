@@ -44,6 +44,19 @@ def test_in_simulated_time_it_steps_once_for_each_torque_that_answers_it(world):
     assert wrenched.twist.twist.angular.z == pytest.approx(turning * 0.02, rel=1e-9)
 
 
+def test_in_simulated_time_a_start_in_motion_waits_while_time_goes_on(world):
+    """A planner with a start delay needs the time; without it nobody would ever begin."""
+    world.start_node("plant_simulator", "simulated_time:=true", "initial_speed:=1.0")
+    odometry = world.listen(Odometry, "odom")
+    answers = world.speak(JointState, "wheel_torques")
+    for step, torque in enumerate([0.0, 0.0, 0.0, 1.0, 1.0]):
+        now = 1_000_000_000 + step * 5_000_000
+        world.wait(lambda now=now: odometry and stamp(odometry[-1]) == now, f"odometry {step}")
+        answers.publish(torques(torque, torque, now))
+    places = {stamp(m): m.pose.pose.position.x for m in odometry}
+    assert places[1_015_000_000] == 0.0 < places[1_020_000_000]
+
+
 def test_a_torque_that_does_not_come_is_asked_for_again_and_reported(world):
     world.start_node("plant_simulator", "simulated_time:=true", "lockstep_timeout:=0.5")
     odometry = world.listen(Odometry, "odom")
