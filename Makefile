@@ -2,7 +2,8 @@
 # Python 3.11 to 3.13. On a ROS 2 installation use colcon instead; see README.md.
 
 PYTHON ?= python3
-CONFIG ?= config/paper.yaml
+CLIMBERS ?=
+CONFIG ?= config/$(if $(CLIMBERS),four_climbers,paper).yaml
 CLOCK ?= sim
 OUTPUT ?= demo_output/$(basename $(notdir $(CONFIG)))-$(CLOCK)-$(shell date +%Y%m%d-%H%M%S)
 PAPER_OUTPUT ?= demo_output/paper
@@ -13,7 +14,8 @@ SET_UP := $(VENV)/set-up
 .PHONY: demo paper test lint unit soak colcon clean
 
 demo: $(SET_UP)
-	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT)
+	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
+		$(if $(CLIMBERS),--climbers $(CLIMBERS))
 	@$(BIN)/analyze_bag $(OUTPUT)/bag --figures $(OUTPUT)/figures
 
 paper: $(SET_UP)

@@ -1,9 +1,13 @@
 """A climber on its wall in a robot's place: wheel torques in, odometry out."""
 
+import argparse
+import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
+from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
@@ -13,8 +17,9 @@ from climber_uk.mechanics.contact import Alarm, Contact, Grip
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 from climber_uk.nodes.margins import Margins
+from climber_uk.nodes.plant_time import PlantTime
 from climber_uk.nodes.plant_topics import PlantTopics
-from climber_uk.nodes.running import WALL_CLOCK, ClimberNode, run
+from climber_uk.nodes.running import ClimberNode, run
 from climber_uk.simulation.inputs import FellOff, NotFinite
 from climber_uk.simulation.machine import NONE, VARIANTS, Machine, Parts, Physics, Push
 from climber_uk.simulation.motors import Motors
@@ -23,19 +28,15 @@ from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.schedule import Schedule
 from climber_uk.simulation.sensors import Sensors
 
-ASK_AGAIN = 0.2  # [s] of wall-clock time, for a torque that does not come
-FALLEN_BEHIND = 1.0  # [s] from which lost wall-clock time is not made up for
-CATCH_UP = 0.1  # [s] of the wall clock that simulated time may make up for
-
 
 class PlantSimulator(ClimberNode):
-    """The plant with its time: the wall clock's, or its own that waits for every torque.
+    """A climber in a time of its own, or that it shares with others of the same process.
 
     A run that starts in motion starts when the first torque other than zero arrives.
     """
 
-    def __init__(self) -> None:
-        super().__init__("plant_simulator")
+    def __init__(self, namespace: str = "", time: PlantTime | None = None) -> None:
+        super().__init__("plant_simulator", namespace)
         for kind in (Options, Climber, Physics, Grip, Motors, Sensors, Alarm):
             self.parameters.declare(kind)
         for variants in VARIANTS.values():
@@ -44,28 +45,18 @@ class PlantSimulator(ClimberNode):
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
-        self.period = round(self.options.control_period * SECOND)  # [ns]
-        self.paused = self.granted = False
-        simulated = self.options.simulated_time
-        # 0 would mean that there is no time yet
-        self.stamp = SECOND if simulated else self.get_clock().now().nanoseconds
+        self.time = time or PlantTime(self, self.options)
+        self.time.join(self)
         self.place_at_start()
 
-        self.topics = PlantTopics(self, self.period, simulated)
+        self.topics = PlantTopics(self, self.time.period)
         self.subscription(JointState, "wheel_torques", self.on_torques)
         self.subscription(WrenchStamped, "push", self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
         self.create_service(SetBool, "~/pause", self.on_pause)
         self.create_service(Trigger, "~/step", self.on_step)
         self.start_diagnostics(self.values, alone_on=("odom", "wheel_torques"))
-        self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
-        if simulated:
-            self.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
-            if self.options.real_time_factor > 0:
-                self.create_timer(self.pace / SECOND, self.go_on, clock=WALL_CLOCK)
-        else:
-            self.create_timer(self.options.control_period, self.keep_up)
-        self.publish_state()
+        self.time.publish([self])
 
     def parts(self) -> Parts:
         """What the parameters say that the climber is made of."""
@@ -92,7 +83,7 @@ class PlantSimulator(ClimberNode):
         start = self.options.initial_state
         self.machine = Machine(self.parts(), start, self.options.control_period)
         self.held = bool(start.velocity.any())
-        self.origin = self.stamp  # of the first odometry [ns]
+        self.origin = self.time.stamp  # of the first odometry [ns]
         timeout = 0.0 if self.options.simulated_time else self.options.command_timeout
         self.commands: Schedule[Array] = Schedule(round(timeout * SECOND))
         self.pushes: Schedule[Push] = Schedule(round(self.options.push_timeout * SECOND))
@@ -101,22 +92,18 @@ class PlantSimulator(ClimberNode):
     def on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start again from the initial state; time goes on."""
         late = self.parameters.read(Sensors).delay_in(self.options.control_period)
-        self.stamp += self.period * (1 + late)  # no odometry has the stamp of one before
-        self.catch_up()
+        self.time.leave_out(self, periods=1 + late)  # no odometry has the stamp of one before
         self.place_at_start()
         self.say("climber", "")
-        self.publish_state()
-        response.success, response.message = True, f"at the start at {self.stamp * 1e-9:.3f} s"
+        self.time.publish(self.time.standing)
+        response.success, response.message = True, f"at the start at {self.now}"
         return response
 
     def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """Stop the climber's time, or let it go on."""
-        if self.paused and not request.data:
-            self.catch_up()
-        self.paused, self.granted = bool(request.data), False
+        """Stop time, or let it go on."""
+        self.time.pause(bool(request.data))
         response.success = True
-        response.message = f"{'paused' if self.paused else 'going on'} at {self.stamp * 1e-9:.3f} s"
-        self.go_on()
+        response.message = f"{'paused' if request.data else 'going on'} at {self.now}"
         return response
 
     def on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -124,11 +111,9 @@ class PlantSimulator(ClimberNode):
         response.success, response.message = False, "not paused"
         if self.fallen:
             response.message = "fallen: reset first"
-        elif self.paused:
-            response.success, response.message = True, f"from {self.stamp * 1e-9:.3f} s"
-            self.granted = True
-            self.catch_up()
-            self.go_on()
+        elif self.time.paused:
+            response.success, response.message = True, f"from {self.now}"
+            self.time.grant()
         return response
 
     def on_push(self, message: WrenchStamped) -> None:
@@ -139,7 +124,7 @@ class PlantSimulator(ClimberNode):
             self.say("push", "refused", str(error))
             return
         self.say("push", "")
-        begin = reading.nanoseconds(message.header.stamp) or self.stamp
+        begin = reading.nanoseconds(message.header.stamp) or self.time.stamp
         self.pushes.add(begin, Push(*wrench))
 
     def on_torques(self, message: JointState) -> None:
@@ -159,10 +144,10 @@ class PlantSimulator(ClimberNode):
         if not self.options.simulated_time:
             self.commands.add(self.get_clock().now().nanoseconds, torques)
         elif reading.nanoseconds(message.header.stamp) == self.asked and not self.answered:
-            self.commands.add(self.stamp, torques)
+            self.commands.add(self.time.stamp, torques)
             self.answered = True
             self.say("lock-step", "")
-            self.go_on()
+            self.time.go_on()
 
     def command_at(self, time: int) -> Array:
         """Torques that act at `time` [ns]: the last to arrive, unless they are too old."""
@@ -177,63 +162,18 @@ class PlantSimulator(ClimberNode):
     def asked(self) -> int:
         """Stamp of the odometry that is published last [ns]."""
         number, _ = self.machine.odometer.latest()
-        return self.origin + number * self.period
+        return self.origin + number * self.time.period
 
     @property
-    def pace(self) -> float:
-        """Of the wall clock for a control period [ns]."""
-        return self.period / self.options.real_time_factor
+    def now(self) -> str:
+        """Time, to be read."""
+        return f"{self.time.stamp / SECOND:.3f} s"
 
-    def ask_again(self) -> None:
-        """Publish the odometry once more to whom missed it; report who does not answer."""
-        waited = WALL_CLOCK.now().nanoseconds - self.stepped_at
-        if self.answered or self.fallen:
-            return
-        if waited > ASK_AGAIN * SECOND:
-            self.publish_state()
-        if waited > self.options.lockstep_timeout * SECOND:
-            self.say("lock-step", f"no torque for the odometry of {self.asked * 1e-9:.3f} s")
-
-    def go_on(self) -> None:
-        """Step if nothing speaks against it: no answer yet, a pause, the pace of time."""
-        if self.fallen or (self.paused and not self.granted):
-            return
-        if self.options.simulated_time:
-            if not self.answered:
-                return
-            if self.options.real_time_factor > 0:
-                now = WALL_CLOCK.now().nanoseconds
-                if now < self.due:
-                    return
-                late = now - self.due > CATCH_UP * SECOND
-                self.due = (now if late else self.due) + self.pace
-        elif not self.granted:
-            return
-        self.granted = self.answered = False
-        self.step()
-
-    def keep_up(self) -> None:
-        """Step until the clock's time is reached."""
-        now = self.get_clock().now().nanoseconds
-        if self.paused or self.fallen:
-            return
-        if now - self.stamp > FALLEN_BEHIND * SECOND:
-            self.get_logger().warning(f"{(now - self.stamp) * 1e-9:.1f} s behind: left out")
-            self.catch_up()
-        while self.stamp + self.period <= now and not self.fallen:
-            self.step()
-
-    def catch_up(self) -> None:
-        """Leave out what has passed on the wall clock, but for the last period."""
-        if not self.options.simulated_time:
-            missed = max(0, self.get_clock().now().nanoseconds - self.period - self.stamp)
-            self.stamp, self.origin = self.stamp + missed, self.origin + missed
-
-    def step(self) -> None:
-        """Advance by a control period and publish; a climber that falls is heard of no more."""
+    def advance(self) -> None:
+        """Go on by a control period; a climber that falls is heard of no more."""
         try:
             for number in range(0 if self.held else self.options.steps):
-                time = self.stamp + number * self.period // self.options.steps
+                time = self.time.stamp + number * self.time.period // self.options.steps
                 push, _ = self.pushes.at(time)
                 self.machine.advance(self.command_at(time), push or NONE)
         except (FellOff, NotFinite) as error:
@@ -241,17 +181,22 @@ class PlantSimulator(ClimberNode):
             self.say("climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error))
             return
         self.machine.measure()
-        self.stamp += self.period
-        self.stepped_at = WALL_CLOCK.now().nanoseconds
-        self.publish_state()
+
+    def no_answer(self) -> None:
+        """Report that nobody answers the last odometry."""
+        self.say("lock-step", f"no torque for the odometry of {self.asked / SECOND:.3f} s")
 
     # What it tells
 
-    def publish_state(self) -> None:
-        """Publish all that a robot would tell, and the margins."""
-        self.topics.publish(self.machine, self.stamp, self.asked)
+    def publish_odometry(self) -> None:
+        """Publish what torques are to answer."""
+        self.topics.publish_odometry(self.machine, self.asked)
+
+    def publish_others(self) -> None:
+        """Publish all else that a robot would tell, and the margins."""
+        self.topics.publish_others(self.machine, self.time.stamp)
         load = self.machine.plant.wheel_load(self.machine.state)
-        self.margins.publish(*self.machine.margins(), load, self.stamp)
+        self.margins.publish(*self.machine.margins(), load, self.time.stamp)
 
     def diagnose(self) -> None:
         """Publish troubles and values, and how near to slipping and tipping it has been."""
@@ -261,13 +206,25 @@ class PlantSimulator(ClimberNode):
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
         return {
-            "time [s]": self.stamp * 1e-9,
+            "time [s]": self.time.stamp / SECOND,
             "suction pressure [Pa]": self.machine.pressure,
             "side slip [m/s]": float(self.machine.state.side_slip),
-            "paused": self.paused,
+            "paused": self.time.paused,
         }
 
 
+def in_one_time(namespaces: Sequence[str]) -> list[PlantSimulator]:
+    """Climbers of some namespaces, whose time is the first one's."""
+    first, *others = namespaces
+    leader = PlantSimulator(first)
+    return [leader, *(PlantSimulator(namespace, leader.time) for namespace in others)]
+
+
 def main() -> None:
-    """Run the node."""
-    run(PlantSimulator)
+    """Run a climber, or one in each of some namespaces."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--climbers", nargs="+", default=[""], metavar="NAMESPACE", help="of each (default: one)"
+    )
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    run(lambda: in_one_time(options.climbers))

@@ -1,7 +1,6 @@
 """The topics on which a simulated climber tells what a robot would tell, and the truth."""
 
 from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import FluidPressure, JointState
 
 from climber_uk.mechanics.preview import SECOND
@@ -18,26 +17,27 @@ PRESSURE_PERIOD = SECOND // 10  # [ns] of the suction pressure, which changes sl
 
 
 class PlantTopics:
-    """The publishers of a node; /clock only if its time is simulated."""
+    """The publishers of a node."""
 
-    def __init__(self, node: ClimberNode, period: int, simulated: bool) -> None:
+    def __init__(self, node: ClimberNode, period: int) -> None:
         self.names, self.period = node.names, period
         self.odometry = node.publisher(Odometry, "odom")
         self.truth = node.publisher(Odometry, "ground_truth")
         self.joints = node.publisher(JointState, "joint_states")
         self.pressure = node.publisher(FluidPressure, "suction_pressure")
         self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
-        self.clock = node.publisher(ClockMessage, "/clock") if simulated else None
 
-    def publish(self, machine: Machine, now: int, measured_at: int) -> None:
-        """Publish the odometry first: it is waited for. Times in ns."""
-        names, stamp = self.names, writing.time(now)
-        frames = names.odom_frame, names.base_frame
+    def publish_odometry(self, machine: Machine, measured_at: int) -> None:
+        """Publish what the sensors tell, measured at a time [ns]."""
+        names = self.names
         _, measured = machine.odometer.latest()
-        self.odometry.publish(writing.odometry(measured, measured_at, *frames))
-        if self.clock is not None:
-            self.clock.publish(ClockMessage(clock=stamp))
-        truth = writing.odometry(machine.state, now, *frames)
+        message = writing.odometry(measured, measured_at, names.odom_frame, names.base_frame)
+        self.odometry.publish(message)
+
+    def publish_others(self, machine: Machine, now: int) -> None:
+        """Publish how things are now [ns]."""
+        names, stamp = self.names, writing.time(now)
+        truth = writing.odometry(machine.state, now, names.odom_frame, names.base_frame)
         self.truth.publish(truth)
         joints = writing.wheel_torques(
             machine.torques, now, names.left_wheel_joint, names.right_wheel_joint

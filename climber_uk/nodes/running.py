@@ -3,7 +3,7 @@
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +39,25 @@ class Names:
     base_frame: str = parameter("base_link", "", "frame fixed to the climber")
     left_wheel_joint: str = parameter("left_wheel_joint", "", "joint of the left wheel")
     right_wheel_joint: str = parameter("right_wheel_joint", "", "joint of the right wheel")
+    prefix_frames: bool = parameter(True, "", "put the node's namespace before both frames")
+
+    def within(self, namespace: str) -> "Names":
+        """Names as a node in `namespace` uses them."""
+        prefix = namespace.strip("/") + "/"
+        if not self.prefix_frames or prefix == "/":
+            return self
+        odom_frame, base_frame = prefix + self.odom_frame, prefix + self.base_frame
+        return replace(self, odom_frame=odom_frame, base_frame=base_frame)
 
 
 class ClimberNode(Node):
     """A node with checked parameters, and topics whose QoS parameters can override."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
+    def __init__(self, name: str, namespace: str = "") -> None:
+        super().__init__(name, namespace=namespace)
         self.parameters = Parameters(self, self.on_parameters)
         self.parameters.declare(Names)
-        self.names = self.parameters.read(Names)
+        self.names = self.parameters.read(Names).within(self.get_namespace())
         self._troubles: dict[str, tuple[str, bool]] = {}
         self._alone_on: Sequence[str] = ()
         self._values: Callable[[], Mapping[str, object]] = dict
@@ -122,30 +131,31 @@ class ClimberNode(Node):
             self._diagnostics.publish(writing.diagnostics(name, level, text, values, now))
 
 
-def run(make_node: Callable[[], Node]) -> None:
-    """Spin a node until SIGINT or SIGTERM; exit with one line and status 1 if it cannot start.
+def run(make_nodes: Callable[[], Sequence[Node]]) -> None:
+    """Spin nodes until SIGINT or SIGTERM; exit with one line and status 1 if they cannot start.
 
     rclpy's own signal handling takes the publishers away from under a running callback. Here the
     callback is finished first. The executor is the one that takes half the CPU; its `spin` never
     ends in rclpy 7.1, and it sees signals only between callbacks, hence the idle timer.
     """
-    node = None
+    nodes: Sequence[Node] = ()
     end = Future()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: end.set_result(None))
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        node = make_node()
-        node.create_timer(SIGNAL_PERIOD, lambda: None, clock=WALL_CLOCK)
+        nodes = make_nodes()
+        nodes[0].create_timer(SIGNAL_PERIOD, lambda: None, clock=WALL_CLOCK)
         executor = EventsExecutor()
-        executor.add_node(node)
+        for node in nodes:
+            executor.add_node(node)
         while not end.done():
             executor.spin_until_future_complete(end, timeout_sec=3600.0)
     except (ValueError, RCLError) as error:
-        if node is not None:
+        if nodes:
             raise
         sys.exit(f"{Path(sys.argv[0]).name}: {error}")
     finally:
-        if node is not None:
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()

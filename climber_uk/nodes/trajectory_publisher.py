@@ -161,4 +161,4 @@ class TrajectoryPublisher(ClimberNode):
 
 def main() -> None:
     """Run the node."""
-    run(TrajectoryPublisher)
+    run(lambda: [TrajectoryPublisher()])

@@ -1,13 +1,16 @@
-"""Answers each odometry with the wheel torques that keep the climber on its reference."""
+"""Answers each odometry with the wheel torques that keep the climber on its reference.
+
+Inactive, it answers with its safe output: a climber that hangs on a wall must be held all the same.
+"""
 
 import math
 from dataclasses import dataclass, replace
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
-from std_srvs.srv import SetBool
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.control.constraints import CONSTRAINTS, tracking_error
@@ -22,8 +25,9 @@ from climber_uk.mechanics.contact import ADHESION, Alarm, Contact, Grip
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.wall import Plane
 from climber_uk.messages import reading, writing
+from climber_uk.nodes.managed import ManagedNode
 from climber_uk.nodes.margins import Margins
-from climber_uk.nodes.running import BEST_EFFORT, WALL_CLOCK, ClimberNode, run
+from climber_uk.nodes.running import BEST_EFFORT, WALL_CLOCK, run
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class Options:
         check(self)
 
 
-class UkTorqueController(ClimberNode):
+class UkTorqueController(ManagedNode):
     """Messages to and from a `Follower`, which decides."""
 
     def __init__(self) -> None:
@@ -56,7 +60,7 @@ class UkTorqueController(ClimberNode):
         self.margins = Margins(self, self.parameters.read(Alarm))
         self.contact = self.contact_now()
         self.pressure: float | None = None  # [Pa] as last measured
-        self.follower = Follower(Tracker(*self.settings()), self.parameters.read(Safety))
+        self.follower = self.new_follower()
         self.answers = self.saturations = 0
 
         self.torques = self.publisher(JointState, "wheel_torques")
@@ -64,15 +68,32 @@ class UkTorqueController(ClimberNode):
         self.error = self.publisher(Vector3Stamped, "~/tracking_error")
         self.force = self.publisher(WrenchStamped, "~/constraint_force")
         self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
-        self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
-        self.subscription(MultiDOFJointTrajectory, "reference", self.on_reference)
-        self.subscription(FluidPressure, "suction_pressure", self.on_pressure, BEST_EFFORT)
-        self.create_service(SetBool, "~/enable", self.on_enable)
         safety = self.follower.safety
         shortest = min(safety.odometry_timeout, safety.reference_timeout)
         # on the wall clock: one in simulated time would not notice that there is no clock
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
         self.start_diagnostics(self.values, alone_on=("odom", "reference", "wheel_torques"))
+        self.start_life()
+
+    def listen(self) -> list[Subscription]:
+        """Start from nothing with the safe output, and listen to all inputs."""
+        self.follower = self.new_follower()
+        self.follower.enable(False)
+        return [
+            self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT),
+            self.subscription(MultiDOFJointTrajectory, "reference", self.on_reference),
+            self.subscription(FluidPressure, "suction_pressure", self.on_pressure, BEST_EFFORT),
+        ]
+
+    def act(self, active: bool) -> None:
+        """Follow the reference, or give the safe output."""
+        self.follower.enable(active)
+
+    # Parameters
+
+    def new_follower(self) -> Follower:
+        """Follower as the parameters say, that has seen nothing yet."""
+        return Follower(Tracker(*self.settings()), self.parameters.read(Safety))
 
     def settings(self) -> tuple[Controller, Observer, Timing, Pacing]:
         """What the parameters, and the measured pressure, say now."""
@@ -93,6 +114,8 @@ class UkTorqueController(ClimberNode):
         self.margins.alarm = self.parameters.read(Alarm)
         self.contact = self.contact_now()
         self.follower.tracker.retune(*self.settings())
+
+    # Messages
 
     def on_odometry(self, message: Odometry) -> None:
         """Answer an odometry."""
@@ -126,15 +149,10 @@ class UkTorqueController(ClimberNode):
             self.pressure = pressure
             self.on_parameters()
 
-    def on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """Follow the reference, or give the safe output."""
-        self.follower.enable(request.data)
-        response.success, response.message = True, "enabled" if request.data else "disabled"
-        return response
-
     def look(self) -> None:
         """Give the safe output if odometry or reference have stopped."""
-        self.tell(self.follower.look(self.now()))
+        if self.inputs:
+            self.tell(self.follower.look(self.now()))
 
     def now(self) -> int:
         """Time of the node's clock [ns]; 0 while there is none."""
@@ -204,6 +222,7 @@ class UkTorqueController(ClimberNode):
         tracker = self.follower.tracker
         drive, turn = tracker.disturbance
         return {
+            "state": self.life,
             "mode": self.follower.mode.value,
             "constraints": self.options.constraints,
             "answers": self.answers,
@@ -218,4 +237,4 @@ class UkTorqueController(ClimberNode):
 
 def main() -> None:
     """Run the node."""
-    run(UkTorqueController)
+    run(lambda: [UkTorqueController()])

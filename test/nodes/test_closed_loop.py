@@ -105,6 +105,31 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
     assert states[max(time for time in states if time < falls - 1.0)] == 0.0  # it stood by then
 
 
+def test_four_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
+    finished(
+        demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "4", "--duration", "4")
+    )
+    bag, names = tmp_path / "run" / "bag", [f"climber_{number}" for number in (1, 2, 3, 4)]
+    stamps, frames, tellers = {name: set() for name in names}, set(), set()
+    for topic, _, message in read_messages(bag):
+        if topic.endswith("/odom"):
+            frames.add((topic, message.header.frame_id, message.child_frame_id))
+            stamps[topic.split("/")[1]].add(reading.nanoseconds(message.header.stamp))
+        elif topic == "/diagnostics":
+            tellers |= {status.name for status in message.status}
+    assert frames == {(f"/{n}/odom", f"{n}/odom", f"{n}/base_link") for n in names}
+    nodes = "plant_simulator", "uk_torque_controller"
+    assert {f"/{name}/{node}" for name in names for node in nodes} <= tellers
+    assert all(teller.split("/")[1] in names for teller in tellers)
+    assert len({tuple(sorted(stamps[name])[:800]) for name in names}) == 1  # one time, 4 s of it
+    ways = []
+    for name in names:
+        run = read_run(bag, name)
+        assert np.abs(run.error[:, 1]).max() < 2e-3
+        ways.append(tuple(run.pose[-1] - run.pose[0]))
+    assert len(set(ways)) == 4
+
+
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     # the machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`
     finished(demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6"))

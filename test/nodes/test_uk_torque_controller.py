@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -27,7 +29,8 @@ class Loop:
 
     def __init__(self, world, *parameters):
         self.world = world
-        world.start_node(NAME, *parameters)
+        if NAME not in world.processes:
+            world.start_node(NAME, *parameters)
         self.torques = world.listen(JointState, "wheel_torques")
         self.odometry = world.speak(Odometry, "odom")
         self.reference = world.speak(MultiDOFJointTrajectory, "reference")
@@ -144,6 +147,34 @@ def test_disabled_it_gives_the_safe_output_until_it_is_enabled(world):
     assert world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=True)).success
     loop.follows()
     world.wait(lambda: status[-1].status[0].level == DiagnosticStatus.OK, "all well")
+
+
+def test_a_manager_of_nodes_decides_when_it_listens_and_when_it_follows(world):
+    def change(transition):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert world.call(ChangeState, f"{NAME}/change_state", request).success
+
+    world.start_node(NAME, "autostart:=false", "odometry_timeout:=1.0")
+    response = world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=True))
+    assert (response.success, response.message) == (False, "unconfigured")
+    assert world.node.count_subscribers("odom") == 0
+    change(Transition.TRANSITION_CONFIGURE)
+    loop = Loop(world)
+    loop.plan()
+    loop.is_safe()
+    change(Transition.TRANSITION_ACTIVATE)
+    loop.follows()
+    change(Transition.TRANSITION_DEACTIVATE)
+    loop.is_safe()
+    change(Transition.TRANSITION_CLEANUP)
+    world.wait(lambda: world.node.count_subscribers("odom") == 0, "silence")
+    change(Transition.TRANSITION_CONFIGURE)
+    world.wait(loop.odometry.get_subscription_count, "subscriber again")
+    assert world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=True)).success
+    loop.plan()
+    loop.follows()
+    change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert world.end(NAME) == 0
 
 
 def test_a_reference_without_accelerations_is_refused_and_the_last_one_kept(world):
