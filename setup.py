@@ -13,6 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
         (f"share/{package_name}", ["package.xml"]),
         (f"share/{package_name}/config", glob("config/*")),
+        (f"share/{package_name}/launch", glob("launch/*.launch.py")),
     ],
     python_requires=">=3.11",
     install_requires=["setuptools", "numpy", "scipy", "pyyaml"],

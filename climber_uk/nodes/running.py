@@ -156,6 +156,8 @@ def run(make_nodes: Callable[[], Sequence[Node]]) -> None:
             raise
         sys.exit(f"{Path(sys.argv[0]).name}: {error}")
     finally:
+        for number in (signal.SIGINT, signal.SIGTERM):  # the terminal and launch may both send one
+            signal.signal(number, signal.SIG_IGN)
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
