@@ -11,7 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 
-.PHONY: demo paper test lint unit soak colcon clean
+.PHONY: demo paper docs test lint unit soak colcon clean
 
 demo: $(SET_UP)
 	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
@@ -20,6 +20,10 @@ demo: $(SET_UP)
 
 paper: $(SET_UP)
 	@$(BIN)/reproduce_paper --output $(PAPER_OUTPUT)
+
+# The references of parameters, topics and services, from the nodes
+docs: $(SET_UP)
+	$(BIN)/python docs/generate.py
 
 test: lint unit colcon
 

@@ -35,6 +35,11 @@ class Parameters:
         self._fields: dict[str, tuple[str, type, Field]] = {}
         node.add_on_set_parameters_callback(self._change)
 
+    @property
+    def declared(self) -> list[tuple[str, type, Field]]:
+        """Prefix, class and field of every parameter, in the order in which they were declared."""
+        return list(self._fields.values())
+
     def declare(self, kind: type[T], prefix: str = "") -> None:
         """Declare the fields of `kind` as `prefix` + name.
 

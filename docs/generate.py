@@ -1,0 +1,162 @@
+"""Write parameters.md and interfaces.md, from the nodes: `python docs/generate.py [DIRECTORY]`."""
+
+import dataclasses
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from climber_uk.nodes.plant_simulator import PlantSimulator
+from climber_uk.nodes.running import ClimberNode
+from climber_uk.nodes.trajectory_publisher import TrajectoryPublisher
+from climber_uk.nodes.uk_torque_controller import UkTorqueController
+
+NODES: list[Callable[[], ClimberNode]] = [TrajectoryPublisher, UkTorqueController, PlantSimulator]
+EVERY_NODE = ("/rosout", "/parameter_events", "_type_description", "_parameters", "parameter_types")
+
+CONTENTS = {
+    "odom": "pose in `odom`, twist in `base_link`: forward, to the left (0), about z",
+    "reference": "the next second: per point pose, velocity and acceleration, in `odom`; the "
+    "stamp plus `time_from_start` is its time",
+    "reference_path": "the whole path, for display",
+    "wheel_torques": "`effort` [N m] by joint name; the stamp is that of the odometry it answers",
+    "effort_controller/commands": "the torques again, in the order of `effort_order`",
+    "suction_pressure": "pressure difference [Pa]",
+    "joint_states": "angle [rad], rate [rad/s] and torque [N m] of the wheels",
+    "ground_truth": "the simulated climber without its sensors' errors",
+    "push": "force [N] and moment [N m] on the simulated climber, in `odom` or `base_link`",
+    "/clock": "simulated time, if `simulated_time`",
+    "/tf": "the true pose, where tf2_msgs is installed",
+    "/diagnostics": "every second and when something changes: troubles and values",
+    "~/tracking_error": "along-track [m], cross-track [m], heading [rad]",
+    "~/constraint_force": "Udwadia-Kalaba: drive [N], lateral [N], about z [N m], in `base_link`",
+    "~/disturbance": "force [N] and moment [N m] that the model did not expect, in `base_link`",
+    "~/margins": "slip margin, tip margin (below 1 it slips, tips), load on the wheels [N]",
+    "~/transition_event": "changes of the managed node's state",
+    "~/start": "start, or start again, at the next odometry",
+    "~/stop": "come to rest on the path",
+    "~/enable": "become active or inactive",
+    "~/change_state": "managed node: configure, activate, deactivate, clean up, shut down",
+    "~/get_state": "managed node",
+    "~/get_available_states": "managed node",
+    "~/get_available_transitions": "managed node",
+    "~/get_transition_graph": "managed node",
+    "~/reset": "back to the initial state; time goes on",
+    "~/pause": "stop time, of all climbers that share it, or let it go on",
+    "~/step": "one control period, while paused",
+}
+
+HEAD = "# {}\n\n<!-- made by docs/generate.py -->\n"
+
+
+def parameters(nodes: list[ClimberNode]) -> str:
+    """Reference of all parameters."""
+    lines = [
+        HEAD.format("Parameters"),
+        "The same name means the same in every node. Those of a part have its name before them, as "
+        "in `guidance.cross_track_gain`. *Runtime* ones can be changed while the node runs; the "
+        "others only at its start. Every topic's QoS is a parameter besides: "
+        "`qos_overrides.<topic>.publisher.reliability`, ….",
+    ]
+    for node in nodes:
+        lines.append(f"\n## {node.get_name()}\n")
+        for (prefix, kind), fields in by_class(node):
+            lines.append(f"\n{first_sentence(kind)}\n")
+            lines.append("| parameter | default | unit | bounds | runtime | meaning |")
+            lines.append("|---|---|---|---|---|---|")
+            lines += [row(prefix, field) for field in fields]
+    return "\n".join(lines) + "\n"
+
+
+def by_class(node: ClimberNode) -> Iterator[tuple[tuple[str, type], list[Any]]]:
+    """Prefix and class of a node's parameters, with its fields, as they were declared."""
+    for prefix, kind in dict.fromkeys((p, k) for p, k, _ in node.parameters.declared):
+        yield (prefix, kind), list(dataclasses.fields(kind))
+
+
+def first_sentence(kind: type) -> str:
+    """What a class says it is."""
+    return (kind.__doc__ or "").split("\n")[0]
+
+
+def row(prefix: str, field: "dataclasses.Field[Any]") -> str:
+    """Line of the table for a field."""
+    rule = field.metadata
+    bounds = [f"> {rule['above']:g}"] if rule["above"] is not None else []
+    bounds += [f"≥ {rule['at_least']:g}"] if rule["at_least"] is not None else []
+    bounds += [f"≤ {rule['at_most']:g}"] if rule["at_most"] is not None else []
+    bounds += [f"`{choice}`" for choice in rule["choices"] or ()]
+    default = str(field.default).lower() if isinstance(field.default, bool) else field.default
+    cells = (
+        f"`{prefix}{field.name}`",
+        f"`{default}`" if default != "" else "",
+        rule["unit"],
+        ", ".join(bounds),
+        "yes" if rule["runtime"] else "",
+        rule["description"],
+    )
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def interfaces(nodes: list[ClimberNode]) -> str:
+    """Reference of all topics and services."""
+    lines = [
+        HEAD.format("Topics and services"),
+        "Names are relative: in a namespace, all but those with a slash before them are in it. "
+        "Units are SI. `odom` is fixed to the wall, x horizontal and y up; `base_link` is the climber, x "
+        "forward and y left; in a namespace both have its name before them (`prefix_frames`).",
+    ]
+    for node in nodes:
+        lines.append(f"\n## {node.get_name()}\n")
+        lines.append("| | name | type | QoS | contents |")
+        lines.append("|---|---|---|---|---|")
+        for word, ends in (("publishes", node.publishers), ("subscribes", node.subscriptions)):
+            for end in ends:
+                kind = type_name(end.msg_type)
+                lines += entry(node, word, end.topic_name, kind, qos(end.qos_profile))
+        for service in node.services:
+            lines += entry(node, "serves", service.service_name, type_name(service.srv_type), "")
+    return "\n".join(lines) + "\n"
+
+
+def entry(node: ClimberNode, word: str, name: str, kind: str, quality: str) -> list[str]:
+    """Line of the table for a topic or service, unless every node has it; `KeyError`: no words."""
+    if any(part in name for part in EVERY_NODE):
+        return []
+    short = name.replace(node.get_fully_qualified_name(), "~") if name.count("/") > 1 else name
+    short = short if short in CONTENTS else short.lstrip("/")
+    return [f"| {word} | `{short}` | {kind} | {quality} | {CONTENTS[short]} |"]
+
+
+def type_name(kind: type) -> str:
+    """Name as messages have it, as in nav_msgs/Odometry."""
+    return f"{kind.__module__.split('.')[0]}/{kind.__name__}"
+
+
+def qos(profile: QoSProfile) -> str:
+    """Short words for a profile."""
+    kept = f"last {profile.depth}"
+    reliable = profile.reliability == ReliabilityPolicy.RELIABLE
+    latched = profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    return f"{'reliable' if reliable else 'best effort'}, {kept}{', latched' if latched else ''}"
+
+
+def documents() -> dict[str, str]:
+    """Texts by file name, of nodes as they are."""
+    rclpy.init()
+    nodes = [make() for make in NODES]
+    try:
+        return {"parameters.md": parameters(nodes), "interfaces.md": interfaces(nodes)}
+    finally:
+        for node in nodes:
+            node.destroy_node()
+        rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    directory = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
+    for name, text in documents().items():
+        (directory / name).write_text(text)
