@@ -39,11 +39,14 @@ unit: $(SET_UP)
 soak: $(SET_UP)
 	$(BIN)/python -m pytest -m soak
 
-# As in a ROS workspace, the tests of the mathematics and of what was installed
+# As in a ROS workspace: both ways to build, without a warning, and the tests of the mathematics and
+# of what was installed
 colcon: $(SET_UP)
 	rm -rf build install log
-	. $(BIN)/activate && colcon build --packages-select climber_uk \
-		--event-handlers console_cohesion+
+	. $(BIN)/activate && for how in "--symlink-install" ""; do rm -rf build install log && \
+		env -u PYTHONDONTWRITEBYTECODE colcon build --packages-select climber_uk $$how \
+		--event-handlers console_cohesion+ && ! grep . log/latest_build/climber_uk/stderr.log \
+		|| exit 1; done
 	. $(BIN)/activate && . install/setup.sh && colcon test --packages-select climber_uk \
 		--event-handlers console_cohesion+ --return-code-on-test-failure \
 		--pytest-args -m "installed or not (nodes or slow or soak)"

@@ -106,8 +106,9 @@ def interfaces(nodes: list[ClimberNode]) -> str:
     lines = [
         HEAD.format("Topics and services"),
         "Names are relative: in a namespace, all but those with a slash before them are in it. "
-        "Units are SI. `odom` is fixed to the wall, x horizontal and y up; `base_link` is the climber, x "
-        "forward and y left; in a namespace both have its name before them (`prefix_frames`).",
+        "Units are SI. `odom` is fixed to the wall, x horizontal and y up; `base_link` is the "
+        "climber, x forward and y left; in a namespace both have its name before them "
+        "(`prefix_frames`).",
     ]
     for node in nodes:
         lines.append(f"\n## {node.get_name()}\n")
