@@ -44,18 +44,14 @@ def comparison(results: Results, extent: Extent) -> list[tuple[str, ...]]:
         for name in BOTH
     ]
     driven = motion.driven_by(CONSISTENT, results["as printed", "(30)"], extent.step)
-    rows.append(table.row("torques of (25) fed to the climber", driven))
     rows += [
+        table.row("torques of (25) fed to the climber", driven),
         table.row("consistent, uncorrected (26)", results["consistent", "(26)"]),
         table.row("consistent, corrected (30)", results["consistent", "(30)"]),
         table.row("consistent τ(t), plant open-loop, RK4 5 ms", results["open loop",]),
+        table.row("closed loop through the nodes", results.get(("nodes",), "left out by --quick")),
     ]
-    cells = [table.PRINTED_UNCORRECTED, table.PRINTED_CORRECTED, *(row.cells for row in rows)]
-    nodes = results.get(("nodes",), "left out by --quick")
-    if isinstance(nodes, str):
-        blank = ("",) * (len(table.COLUMNS) - 1)
-        return [*cells, (f"closed loop through the nodes: skipped, {nodes}", *blank)]
-    return [*cells, table.recorded_row("closed loop through the nodes", nodes).cells]
+    return [table.PRINTED_UNCORRECTED, table.PRINTED_CORRECTED, *(row.cells for row in rows)]
 
 
 def drift_cells(results: Results, extent: Extent) -> list[tuple[str, ...]]:

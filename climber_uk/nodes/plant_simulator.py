@@ -226,5 +226,5 @@ def main() -> None:
     parser.add_argument(
         "--climbers", nargs="+", default=[""], metavar="NAMESPACE", help="of each (default: one)"
     )
-    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    run(lambda: in_one_time(options.climbers))
+    # what is wrong with the arguments of ROS is said by `run`
+    run(lambda: in_one_time(parser.parse_args(remove_ros_args(sys.argv)[1:]).climbers))

@@ -227,6 +227,15 @@ def test_a_run_that_got_lost_has_no_finite_error():
 # --- tables and the command ---
 
 
+def test_steps_that_went_astray_are_a_row_that_says_so(monkeypatch):
+    def stuck(*_):
+        raise RuntimeError("stuck at 11.464 s: required step size is less than spacing")
+
+    monkeypatch.setattr(motion, "dormand_prince", stuck)
+    cells = table.row("as printed", study.coarse(corrected=False)).cells
+    assert cells == ("as printed: stuck at 11.464 s", *[""] * (len(table.COLUMNS) - 1))
+
+
 def test_growth_is_the_slope_of_the_errors_size():
     time = np.linspace(0, 20, 50)
     assert table.growth(time, -0.03 * time) == pytest.approx(0.03)
@@ -272,6 +281,6 @@ def test_quick_writes_every_figure_and_table(tmp_path):
         assert all(len(line) == len(header) for line in lines)
     with Path(tmp_path, "comparison.csv").open(encoding="utf-8") as file:
         by_name = {line[0]: line for line in csv.reader(file)}
-    assert float(by_name["as printed, default tolerance 1e-3, (26)"][7]) > 9  # side slip
+    assert float(by_name["as printed, tolerance 1e-06, (26)"][7]) > 9  # side slip
     assert by_name["torques of (25) fed to the climber"][1]
-    assert "closed loop through the nodes: skipped, left out by --quick" in by_name
+    assert "closed loop through the nodes: left out by --quick" in by_name

@@ -45,18 +45,17 @@ class Row:
         return self.name, *("" if n is None else f"{n:.3g}" for n in self.numbers)
 
 
-def row(name: str, motion: Motion) -> Row:
-    """Numbers of a motion."""
-    errors = (n for error in motion.error.T for n in _error_numbers(motion.time, error))
-    rest = (_largest(part) for part in (motion.side_slip, motion.third, motion.torques))
-    return Row(name, (*errors, *rest))
-
-
-def recorded_row(name: str, run: RecordedRun) -> Row:
-    """Numbers of a recorded run; a bag holds no accelerations, and so no third component."""
-    offset = (run.pose - run.reference)[:, :2]
-    errors = (n for error in offset.T for n in _error_numbers(run.time, error))
-    return Row(name, (*errors, _largest(run.side_slip), None, _largest(run.torques)))
+def row(name: str, motion: Motion | RecordedRun | str) -> Row:
+    """Numbers of a motion, or why there is none."""
+    if isinstance(motion, str):
+        return Row(f"{name}: {motion}", (None,) * (len(COLUMNS) - 1))
+    if isinstance(motion, RecordedRun):  # a bag holds no accelerations, and so no third component
+        error: Array = (motion.pose - motion.reference)[:, :2]
+        third = None
+    else:
+        error, third = motion.error, _largest(motion.third)
+    errors = (n for axis in error.T for n in _error_numbers(motion.time, axis))
+    return Row(name, (*errors, _largest(motion.side_slip), third, _largest(motion.torques)))
 
 
 def growth(time: Array, error: Array) -> float:
