@@ -25,6 +25,8 @@ from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.trajectory import Reference
 
+EXACT = np.diag([1e-12] * 6).ravel()
+EXACT.setflags(write=False)  # messages share it
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -44,8 +46,7 @@ def odometry(state: State, stamp: int, odom_frame: str, base_frame: str) -> Odom
     message.twist.twist.linear.x = float(state.forward_speed)
     message.twist.twist.linear.y = float(state.side_slip)
     message.twist.twist.angular.z = float(state.velocity[2])
-    message.pose.covariance = np.diag([1e-12] * 6).ravel().tolist()
-    message.twist.covariance = np.diag([1e-12] * 6).ravel().tolist()
+    message.pose.covariance = message.twist.covariance = EXACT
     return message
 
 

@@ -4,26 +4,30 @@ from geometry_msgs.msg import Vector3Stamped
 
 from climber_uk.mechanics.contact import AMPLE, Alarm
 from climber_uk.messages import writing
-from climber_uk.nodes.running import ClimberNode
+from climber_uk.nodes.running import SLOW, ClimberNode, Rhythm
 
 LEVELS = writing.OK, writing.WARN, writing.ERROR
 
 
 class Margins:
-    """Tells every margin, and in diagnostics the lowest ones since the last time."""
+    """Tells the lowest margins since the last time, on a topic of their own and in diagnostics."""
 
     def __init__(self, node: ClimberNode, alarm: Alarm) -> None:
         self.node, self.alarm = node, alarm
         self.publisher = node.publisher(Vector3Stamped, "~/margins")
-        self.last = self.lowest = AMPLE, AMPLE  # slip, tip
+        self.is_due = Rhythm(SLOW)
+        self.last = self.lowest = self.unpublished = AMPLE, AMPLE  # slip, tip
         self.told = 0  # level of alarm
 
-    def publish(self, slip: float, tip: float, load: float, stamp: int) -> None:
-        """Publish slip margin, tip margin and the wheels' load [N]; diagnose if they worsen."""
-        frame = self.node.names.base_frame
-        self.publisher.publish(writing.vector((slip, tip, load), stamp, frame))
+    def take(self, slip: float, tip: float, load: float, stamp: int) -> None:
+        """Take in slip margin, tip margin and the wheels' load [N]; diagnose if they worsen."""
         self.last = slip, tip
         self.lowest = min(slip, self.lowest[0]), min(tip, self.lowest[1])
+        self.unpublished = min(slip, self.unpublished[0]), min(tip, self.unpublished[1])
+        if self.is_due(stamp):
+            frame = self.node.names.base_frame
+            self.publisher.publish(writing.vector((*self.unpublished, load), stamp, frame))
+            self.unpublished = AMPLE, AMPLE
         if self.alarm.level(min(self.last)) > self.told:
             self.node.diagnose()
 

@@ -49,7 +49,7 @@ class PlantSimulator(ClimberNode):
         self.time.join(self)
         self.place_at_start()
 
-        self.topics = PlantTopics(self, self.time.period)
+        self.topics = PlantTopics(self)
         self.subscription(JointState, "wheel_torques", self.on_torques)
         self.subscription(WrenchStamped, "push", self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
@@ -196,7 +196,7 @@ class PlantSimulator(ClimberNode):
         """Publish all else that a robot would tell, and the margins."""
         self.topics.publish_others(self.machine, self.time.stamp)
         load = self.machine.plant.wheel_load(self.machine.state)
-        self.margins.publish(*self.machine.margins(), load, self.time.stamp)
+        self.margins.take(*self.machine.margins(), load, self.time.stamp)
 
     def diagnose(self) -> None:
         """Publish troubles and values, and how near to slipping and tipping it has been."""

@@ -10,12 +10,13 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import writing
-from climber_uk.nodes.running import WALL_CLOCK, ClimberNode
+from climber_uk.nodes.running import WALL_CLOCK, ClimberNode, Rhythm
 from climber_uk.simulation.options import Options
 
 ASK_AGAIN = 0.2  # [s] of wall-clock time, for a torque that does not come
 FALLEN_BEHIND = 1.0  # [s] from which lost wall-clock time is not made up for
 CATCH_UP = 0.1  # [s] of the wall clock that simulated time may make up for
+TICK = SECOND // 100  # [ns] of simulated time between two messages on /clock, at least
 SHARED = ("simulated_time", "control_period", "real_time_factor")  # options of all or none
 
 
@@ -51,7 +52,7 @@ class PlantTime:
         # 0 would mean that there is no time yet
         self.stamp: int = SECOND if options.simulated_time else self.clock.now().nanoseconds
         self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
-        self.topic = None
+        self.topic, self.is_due = None, Rhythm(TICK)
         if options.simulated_time:
             self.topic = node.publisher(ClockMessage, "/clock")
             node.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
@@ -103,6 +104,7 @@ class PlantTime:
         silent = [climber for climber in self.standing if not climber.answered]
         if waited > ASK_AGAIN * SECOND:
             self.publish(silent)
+            self.publish_time()
         if waited > self.options.lockstep_timeout * SECOND:
             for climber in silent:
                 climber.no_answer()
@@ -158,10 +160,15 @@ class PlantTime:
         self.stepped_at = WALL_CLOCK.now().nanoseconds
 
     def publish(self, climbers: Sequence[Simulated]) -> None:
-        """Publish what is waited for first, and the time after it."""
+        """Publish what is waited for first, and after it the time and what nobody waits for."""
         for climber in climbers:
             climber.publish_odometry()
-        if self.topic is not None and climbers:
-            self.topic.publish(ClockMessage(clock=writing.time(self.stamp)))
+        if self.is_due(self.stamp):
+            self.publish_time()
         for climber in climbers:
             climber.publish_others()
+
+    def publish_time(self) -> None:
+        """Publish the simulated time: not each step, as to receive it is dear for many nodes."""
+        if self.topic is not None:
+            self.topic.publish(ClockMessage(clock=writing.time(self.stamp)))

@@ -3,9 +3,8 @@
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, JointState
 
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import writing
-from climber_uk.nodes.running import ClimberNode
+from climber_uk.nodes.running import SLOW, ClimberNode, Rhythm
 from climber_uk.simulation.machine import Machine
 
 try:
@@ -13,14 +12,12 @@ try:
 except ImportError:  # it comes with a ROS installation, not with the wheels
     TFMessage = None
 
-PRESSURE_PERIOD = SECOND // 10  # [ns] of the suction pressure, which changes slowly
-
 
 class PlantTopics:
     """The publishers of a node."""
 
-    def __init__(self, node: ClimberNode, period: int) -> None:
-        self.names, self.period = node.names, period
+    def __init__(self, node: ClimberNode) -> None:
+        self.names, self.is_due = node.names, Rhythm(SLOW)
         self.odometry = node.publisher(Odometry, "odom")
         self.truth = node.publisher(Odometry, "ground_truth")
         self.joints = node.publisher(JointState, "joint_states")
@@ -47,7 +44,7 @@ class PlantTopics:
         self.joints.publish(joints)
         if self.transform is not None:
             self.transform.publish(TFMessage(transforms=[writing.transform(truth)]))
-        if now % PRESSURE_PERIOD < self.period:
+        if self.is_due(now):
             pressure = FluidPressure(fluid_pressure=machine.pressure)
             pressure.header.stamp = stamp
             self.pressure.publish(pressure)

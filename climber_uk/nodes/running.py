@@ -21,12 +21,14 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from climber_uk.mechanics.parameter import parameter
+from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import writing
 from climber_uk.nodes.parameters import Parameters
 
 RELIABLE = QoSProfile(depth=10)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
+SLOW = SECOND // 20  # [ns] from one message to the next of what need not be told each time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -48,6 +50,18 @@ class Names:
             return self
         odom_frame, base_frame = prefix + self.odom_frame, prefix + self.base_frame
         return replace(self, odom_frame=odom_frame, base_frame=base_frame)
+
+
+class Rhythm:
+    """Says of the first stamp in each `period` [ns] that it is."""
+
+    def __init__(self, period: int) -> None:
+        self.period, self.number = period, -1
+
+    def __call__(self, stamp: int) -> bool:
+        """Whether no stamp of its period came right before."""
+        before, self.number = self.number, stamp // self.period
+        return before != self.number
 
 
 class ClimberNode(Node):

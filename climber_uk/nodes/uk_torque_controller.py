@@ -27,7 +27,7 @@ from climber_uk.mechanics.wall import Plane
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.managed import ManagedNode
 from climber_uk.nodes.margins import Margins
-from climber_uk.nodes.running import BEST_EFFORT, WALL_CLOCK, run
+from climber_uk.nodes.running import BEST_EFFORT, SLOW, WALL_CLOCK, Rhythm, run
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,7 @@ class UkTorqueController(ManagedNode):
         self.pressure: float | None = None  # [Pa] as last measured
         self.follower = self.new_follower()
         self.answers = self.saturations = 0
+        self.is_due = Rhythm(SLOW)  # to tell the disturbance
 
         self.torques = self.publisher(JointState, "wheel_torques")
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
@@ -170,7 +171,7 @@ class UkTorqueController(ManagedNode):
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command)
             if self.follower.state is not None:
-                self.publish_margins(answer, self.follower.state)
+                self.take_margins(answer, self.follower.state)
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
@@ -188,15 +189,16 @@ class UkTorqueController(ManagedNode):
         self.saturations += int(command.missing.any())
         follower, base_frame = self.follower, self.names.base_frame
         self.force.publish(writing.wrench(command.constraint_force, stamp, base_frame))
-        drive, turn = follower.tracker.disturbance
-        self.disturbance.publish(writing.wrench((drive, 0.0, turn), stamp, base_frame))
+        if self.is_due(stamp):
+            drive, turn = follower.tracker.disturbance
+            self.disturbance.publish(writing.wrench((drive, 0.0, turn), stamp, base_frame))
         desired = follower.preview.at(stamp) if follower.preview else None
         if follower.state is not None and desired is not None:
             error = tracking_error(follower.state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
 
-    def publish_margins(self, answer: Answer, state: State) -> None:
-        """Publish how near the torques bring the climber to slipping, and how near it is to tip."""
+    def take_margins(self, answer: Answer, state: State) -> None:
+        """Tell how near the torques bring the climber to slipping, and how near it is to tip."""
         climber, contact = self.follower.tracker.controller.climber, self.contact
         drive, _ = climber.drive_and_turn(answer.torques)
         if answer.command is not None:
@@ -205,7 +207,7 @@ class UkTorqueController(ManagedNode):
             lateral = climber.weight_along_wall * math.cos(state.heading)
         into_wall = Plane().into(climber.inclination, 0.0, 0.0)
         along_wall = climber.weight_along_wall / climber.mass
-        self.margins.publish(
+        self.margins.take(
             contact.slip_margin(climber, into_wall, drive, lateral),
             contact.tip_margin(climber, into_wall, along_wall),
             contact.wheel_load(climber, into_wall),
