@@ -38,7 +38,7 @@ def test_in_simulated_time_it_steps_once_for_each_torque_that_answers_it(world):
     states = {stamp(m): m for m in odometry}
     assert len(states) >= 5
     told = {max(states), *(time for time in states if time % 10_000_000 == 0)}
-    world.wait(lambda: {reading.nanoseconds(m.clock) for m in clock} >= told, "100 Hz, and the last")
+    world.wait(lambda: {reading.nanoseconds(m.clock) for m in clock} >= told, "clock")
     wrenched = states[1_000_000_000 + 4 * 5_000_000]
     # (τR - τL) d / (r J) for 20 ms
     turning = -0.2 * 0.3 / 0.027 / 0.33
