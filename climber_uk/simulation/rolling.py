@@ -5,11 +5,11 @@ value up to its stiction holds the climber still; the instant of change is locat
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.friction import LuGre
@@ -113,7 +113,7 @@ class Rolling:
             end = self.body.runge_kutta(y, given, direction, duration)
             return self._margin(end, given, direction)
 
-        until = brentq(margin, 0.0, step, xtol=1e-15) if margin(0.0) > 0 else 0.0
+        until = _zero(margin, 0.0, step) if margin(0.0) > 0 else 0.0
         changed = self.body.runge_kutta(y, given, direction, until)
         changed[3:5] = 0.0  # not merely small: at rest is what friction can hold
         return changed, until
@@ -156,3 +156,26 @@ class Rolling:
             around = body.contact.grip.seal_radius * float(y[5])
             y[6:] = np.array([forward_speed(y), 0.0, around]) / law.relaxation(speed)
         return y
+
+
+def _zero(function: Callable[[float], float], low: float, high: float) -> float:
+    """Where `function` changes its sign, by the Illinois method (doi 10.1007/BF01934364).
+
+    `scipy.optimize` finds it too, but takes longer to import than the rest of a node to start.
+    """
+    at_low, at_high = function(low), function(high)
+    moved = None
+    for _ in range(100):
+        middle = low + (high - low) * at_low / (at_low - at_high)
+        value = function(middle) if low < middle < high else 0.0
+        if value == 0.0:
+            break
+        if (value > 0) == (at_low > 0):
+            low, at_low = middle, value
+            at_high /= 2 if moved == "low" else 1
+            moved = "low"
+        else:
+            high, at_high = middle, value
+            at_low /= 2 if moved == "high" else 1
+            moved = "high"
+    return middle
