@@ -33,7 +33,7 @@ lint: $(SET_UP)
 	$(BIN)/mypy
 
 unit: $(SET_UP)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 # Longer tests than CI has time for
 soak: $(SET_UP)
@@ -49,7 +49,7 @@ colcon: $(SET_UP)
 		|| exit 1; done
 	. $(BIN)/activate && . install/setup.sh && colcon test --packages-select climber_uk \
 		--event-handlers console_cohesion+ --return-code-on-test-failure \
-		--pytest-args -m "installed or not (nodes or slow or soak)"
+		--pytest-args -n 2 --dist loadfile -m "installed or not (nodes or slow or soak)"
 	. $(BIN)/activate && colcon test-result --all
 	rm -rf build install log
 

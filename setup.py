@@ -22,7 +22,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
         "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib"],
-        "test": ["pytest<9", "pytest-timeout", "hypothesis"],
+        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis"],
     },
     zip_safe=False,
     maintainer="The climber_uk maintainers",

@@ -26,6 +26,8 @@ from climber_uk.messages import writing
 from climber_uk.nodes.parameters import Parameters
 
 RELIABLE = QoSProfile(depth=10)
+# what is kept for those who are behind: a recorder that the machine held up for half a second
+SENT = QoSProfile(depth=1000)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 SLOW = SECOND // 20  # [ns] from one message to the next of what need not be told each time
@@ -80,7 +82,7 @@ class ClimberNode(Node):
     def on_parameters(self) -> None:
         """Take up changed parameters."""
 
-    def publisher(self, kind: type, topic: str, qos: QoSProfile = RELIABLE) -> Publisher:
+    def publisher(self, kind: type, topic: str, qos: QoSProfile = SENT) -> Publisher:
         """Publisher whose QoS the parameters `qos_overrides.<topic>.publisher.*` override."""
         options = QoSOverridingOptions.with_default_policies()
         return self.create_publisher(kind, topic, qos, qos_overriding_options=options)

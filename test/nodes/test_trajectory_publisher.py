@@ -1,15 +1,19 @@
+import itertools
+
 import numpy as np
 import pytest
-from nav_msgs.msg import Path
+from nav_msgs.msg import Odometry, Path
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from climber_uk.mechanics.preview import joined
+from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.preview import SECOND, joined
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.messages import reading
+from climber_uk.messages import reading, writing
 
 pytestmark = pytest.mark.nodes
 
@@ -65,3 +69,24 @@ def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(w
         for point in message.points:
             time = reading.nanoseconds(point.time_from_start)
             assert points.setdefault(time, point) == point
+
+
+def test_where_the_clock_goes_back_the_trajectory_starts_again(world):
+    references = start(world, "use_sim_time:=true")
+    clock, odometry = world.speak(Clock, "/clock"), world.speak(Odometry, "odom")
+    at_rest = State(np.zeros(3), np.zeros(3))
+
+    def starts_with_a_time_from(begin):
+        stamps = itertools.count(begin * SECOND, SECOND // 50)
+
+        def is_started():
+            stamp = next(stamps)
+            clock.publish(Clock(clock=writing.time(stamp)))
+            odometry.publish(writing.odometry(at_rest, stamp, "odom", "base_link"))
+            starts = [reading.nanoseconds(message.header.stamp) for message in references]
+            return any(begin * SECOND <= start <= stamp for start in starts)
+
+        world.wait(is_started, f"start after {begin} s")
+
+    starts_with_a_time_from(200)
+    starts_with_a_time_from(1)

@@ -17,12 +17,14 @@ from rclpy.node import Node
 TIMEOUT = 60.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
 # above 101, ports may be taken by others; two test runs at a time should not meet
-DOMAINS = itertools.count(os.getpid())
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+DOMAINS = itertools.count(os.getppid() * WORKERS + WORKER, WORKERS)
 
 
 def new_domain():
     """Return a ROS domain that no other test of this run has."""
-    return next(DOMAINS) % 100 + 1
+    return next(DOMAINS) % (100 - 100 % WORKERS) + 1
 
 
 def executable(name):
