@@ -21,7 +21,7 @@ from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
-from climber_uk.nodes.running import BEST_EFFORT, SLOW, ClimberNode, Rhythm, run
+from climber_uk.nodes.running import BEST_EFFORT, RELIABLE, SLOW, ClimberNode, Rhythm, run
 
 T = TypeVar("T")
 REFERENCE, TORQUES = "reference", "wheel_torques"
@@ -64,7 +64,7 @@ class Markers(ClimberNode):
         self.latest: dict[str, Any] = {}
         self.way: deque[Place] = deque(maxlen=self.options.path_points)
         self.is_due, self.last = Rhythm(SLOW), 0
-        self.markers = self.publisher(MarkerArray, "markers")
+        self.markers = self.publisher(MarkerArray, "markers", RELIABLE)
         self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
         for topic, kind in SEEN.items():
             self.subscription(kind, topic, partial(self.latest.__setitem__, topic), BEST_EFFORT)
