@@ -46,8 +46,8 @@ class Options:
     wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0)
     torque_scale: float = parameter(0.3, "m/(N m)", "length of a torque's arrow", above=0)
     force_scale: float = parameter(0.005, "m/N", "length of a force's arrow", above=0)
-    path_spacing: float = parameter(0.05, "m", "between two points of the way", above=0)
-    path_points: int = parameter(400, "", "of the way that are kept", above=0)
+    way_spacing: float = parameter(0.05, "m", "between two points of the way", above=0)
+    way_points: int = parameter(400, "", "of the way that are kept", above=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -62,7 +62,7 @@ class Markers(ClimberNode):
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
         self.latest: dict[str, Any] = {}
-        self.way: deque[Place] = deque(maxlen=self.options.path_points)
+        self.way: deque[Place] = deque(maxlen=self.options.way_points)
         self.is_due, self.last = Rhythm(SLOW), 0
         self.markers = self.publisher(MarkerArray, "markers", RELIABLE)
         self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
@@ -113,7 +113,7 @@ class Markers(ClimberNode):
 
     def draw_way(self, drawing: Drawing, here: Place) -> None:
         """Draw the way to `here`."""
-        if not self.way or dist(here, self.way[-1]) >= self.options.path_spacing:
+        if not self.way or dist(here, self.way[-1]) >= self.options.way_spacing:
             self.way.append(here)
         drawing.line("way", [*self.way, here], GREY)
 
