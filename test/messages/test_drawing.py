@@ -28,8 +28,13 @@ def test_a_margin_that_is_no_number_is_red():
     assert colour_of(math.nan) == (1, 0, 0, 1)
 
 
-def test_forward_and_left_of_a_climber_that_goes_up_are_up_and_against_x():
-    np.testing.assert_allclose(place(UP, 0.5, 0.3, 0.05), [1.7, 3.5, 0.05])
+@pytest.mark.parametrize(
+    ("heading", "expected"),
+    [(0, (2.5, 3.3)), (math.pi / 2, (1.7, 3.5)), (math.pi / 6, (2 + 0.283, 3 + 0.51))],
+)
+def test_a_place_on_the_climber_turns_with_it(heading, expected):
+    x, y, off_wall = place(np.array([2.0, 3.0, heading]), 0.5, 0.3, 0.05)
+    assert ((x, y), off_wall) == (pytest.approx(expected, abs=1e-3), 0.05)
 
 
 def test_a_box_is_moved_and_turned_with_the_climber():
