@@ -9,12 +9,18 @@ from typing import Any
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from climber_uk.nodes.markers import Markers
 from climber_uk.nodes.plant_simulator import PlantSimulator
 from climber_uk.nodes.running import ClimberNode
 from climber_uk.nodes.trajectory_publisher import TrajectoryPublisher
 from climber_uk.nodes.uk_torque_controller import UkTorqueController
 
-NODES: list[Callable[[], ClimberNode]] = [TrajectoryPublisher, UkTorqueController, PlantSimulator]
+NODES: list[Callable[[], ClimberNode]] = [
+    TrajectoryPublisher,
+    UkTorqueController,
+    PlantSimulator,
+    Markers,
+]
 EVERY_NODE = ("/rosout", "/parameter_events", "_type_description", "_parameters", "parameter_types")
 
 CONTENTS = {
@@ -28,6 +34,9 @@ CONTENTS = {
     "joint_states": "angle [rad], rate [rad/s] and torque [N m] of the wheels",
     "ground_truth": "the simulated climber without its sensors' errors",
     "push": "force [N] and moment [N m] on the simulated climber, in `odom` or `base_link`",
+    "markers": "climber, reference, way, torques and force for RViz and Foxglove, in `odom`; 20 Hz",
+    "uk_torque_controller/constraint_force": "what the controller publishes",
+    "uk_torque_controller/margins": "what the controller publishes",
     "/clock": "simulated time, if `simulated_time`; 100 Hz of it, or each control period if longer",
     "/tf": "the true pose, where tf2_msgs is installed",
     "/diagnostics": "every second and when something changes: troubles and values",

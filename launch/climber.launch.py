@@ -24,7 +24,7 @@ ARGUMENTS = {
     "namespace": ("", "of the climber"),
     "record": ("false", "record all topics with rosbag2, as MCAP"),
     "use_sim_time": ("false", "take time from /clock; the simulator, if any, then is in lock-step"),
-    "rviz": ("false", "show it in RViz, which is to be installed"),
+    "rviz": ("false", "show it in RViz"),
 }
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import xml.etree.ElementTree as ElementTree
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -35,6 +36,20 @@ def test_every_file_of_the_package_is_there_and_installed():
     for file in files:
         assert (ROOT / file).is_file()
         assert f'"share/{{package_name}}/{file.parent}"' in set_up
+
+
+def test_every_package_whose_nodes_are_started_is_depended_on():
+    depended = {
+        depend.text for depend in ElementTree.parse(ROOT / "package.xml").iter("exec_depend")
+    }
+    packages = {
+        keyword.value.value
+        for call in calls("Node")
+        for keyword in call.keywords
+        if keyword.arg == "package"
+    }
+    assert packages - {"climber_uk"} == {"robot_state_publisher", "rviz2"}
+    assert packages - {"climber_uk"} <= depended
 
 
 def test_every_argument_is_declared_and_used():

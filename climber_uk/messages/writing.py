@@ -42,7 +42,7 @@ def odometry(state: State, stamp: int, odom_frame: str, base_frame: str) -> Odom
     message.header.frame_id = odom_frame
     message.pose.pose.position.x = float(state.pose[0])
     message.pose.pose.position.y = float(state.pose[1])
-    message.pose.pose.orientation = _quaternion(float(state.heading))
+    message.pose.pose.orientation = quaternion(float(state.heading))
     message.twist.twist.linear.x = float(state.forward_speed)
     message.twist.twist.linear.y = float(state.side_slip)
     message.twist.twist.angular.z = float(state.velocity[2])
@@ -71,7 +71,7 @@ def reference_point(reference: Reference, time: float) -> MultiDOFJointTrajector
     """Point of a trajectory: one reference, `time` [s] after its start."""
     x, y, heading = reference.pose.tolist()
     point = MultiDOFJointTrajectoryPoint()
-    point.transforms = [Transform(translation=Vector3(x=x, y=y), rotation=_quaternion(heading))]
+    point.transforms = [Transform(translation=Vector3(x=x, y=y), rotation=quaternion(heading))]
     point.velocities = [_twist(reference.velocity)]
     point.accelerations = [_twist(reference.acceleration)]
     since = round(time * SECOND)
@@ -97,7 +97,7 @@ def path(poses: Array, stamp: int, odom_frame: str) -> Path:
     for x, y, heading in poses.tolist():
         pose = PoseStamped(header=path.header)
         pose.pose.position.x, pose.pose.position.y = x, y
-        pose.pose.orientation = _quaternion(heading)
+        pose.pose.orientation = quaternion(heading)
         path.poses.append(pose)
     return path
 
@@ -136,7 +136,8 @@ def diagnostics(
     return message
 
 
-def _quaternion(heading: float) -> Quaternion:
+def quaternion(heading: float) -> Quaternion:
+    """Turn about z."""
     return Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
 
 

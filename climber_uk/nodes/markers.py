@@ -1,0 +1,148 @@
+"""Draws a climber for RViz and Foxglove: where it is and should be, its way, torques and force.
+
+All is drawn in the wall's frame, at the pose that odometry tells: no /tf is needed.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import dist
+from typing import Any, TypeVar
+
+from geometry_msgs.msg import Vector3Stamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.preview import SECOND
+from climber_uk.messages import reading
+from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
+from climber_uk.nodes.running import BEST_EFFORT, RELIABLE, SLOW, ClimberNode, Rhythm, run
+
+T = TypeVar("T")
+REFERENCE, TORQUES = "reference", "wheel_torques"
+FORCE, MARGINS = "uk_torque_controller/constraint_force", "uk_torque_controller/margins"
+SEEN = {
+    REFERENCE: MultiDOFJointTrajectory,
+    TORQUES: JointState,
+    FORCE: WrenchStamped,
+    MARGINS: Vector3Stamped,
+}
+AGE = SECOND  # [ns] of what is no longer drawn
+ABOVE = 0.05  # [m] off the wall: arrows hide nothing there, and nothing hides them
+ORANGE, BLUE = (1.0, 0.6, 0.1, 1.0), (0.2, 0.6, 1.0, 1.0)
+GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Options:
+    """How large it is drawn."""
+
+    half_track: float = parameter(0.3, "m", "distance d of a wheel from the centre", above=0)
+    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0)
+    torque_scale: float = parameter(0.3, "m/(N m)", "length of a torque's arrow", above=0)
+    force_scale: float = parameter(0.005, "m/N", "length of a force's arrow", above=0)
+    way_spacing: float = parameter(0.05, "m", "between two points of the way", above=0)
+    way_points: int = parameter(400, "", "of the way that are kept", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Markers(ClimberNode):
+    """Keeps the latest message of each topic, and draws them with odometry, 20 times a second."""
+
+    def __init__(self) -> None:
+        super().__init__("markers")
+        self.parameters.declare(Options)
+        self.parameters.refuse_unknown()
+        self.options = self.parameters.read(Options)
+        self.latest: dict[str, Any] = {}
+        self.way: deque[Place] = deque(maxlen=self.options.way_points)
+        self.is_due, self.last = Rhythm(SLOW), 0
+        self.markers = self.publisher(MarkerArray, "markers", RELIABLE)
+        self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
+        for topic, kind in SEEN.items():
+            self.subscription(kind, topic, partial(self.latest.__setitem__, topic), BEST_EFFORT)
+
+    def on_odometry(self, message: Odometry) -> None:
+        """Draw, if it is time to."""
+        stamp = reading.nanoseconds(message.header.stamp)
+        if not self.is_due(stamp):
+            return
+        odom_frame, base_frame = self.names.odom_frame, self.names.base_frame
+        state = self.understood("odom", message, lambda m: reading.state(m, odom_frame, base_frame))
+        if state is not None:
+            if stamp < self.last:
+                self.way.clear()
+            self.last = stamp
+            self.markers.publish(self.drawing(stamp, state.pose).array)
+
+    def understood(self, topic: str, message: Any, read: Callable[[Any], T]) -> T | None:
+        """What a message says; None, and a word about it, if it is not fit."""
+        try:
+            meaning = read(message)
+        except ValueError as error:
+            self.say(topic, "refused", str(error))
+            return None
+        self.say(topic, "")
+        return meaning
+
+    def fresh(self, topic: str, stamp: int, read: Callable[[Any], T]) -> T | None:
+        """What the latest message of a topic says, unless it is of another time than `stamp`."""
+        message = self.latest.get(topic)
+        if message is None or abs(stamp - reading.nanoseconds(message.header.stamp)) > AGE:
+            return None
+        return self.understood(topic, message, read)
+
+    def drawing(self, stamp: int, pose: Array) -> Drawing:
+        """All that is known at a time [ns], of a climber at `pose` (3,)."""
+        prefix = self.get_namespace().strip("/")
+        drawing = Drawing(stamp, self.names.odom_frame, f"{prefix}/" if prefix else "")
+        margin = self.fresh(MARGINS, stamp, lambda message: float(message.vector.x))
+        colour = GREY if margin is None else colour_of(margin)
+        drawing.climber("climber", pose, self.options.half_track, self.options.wheel_radius, colour)
+        self.draw_way(drawing, place(pose, 0.0, 0.0, WALL))
+        self.draw_reference(drawing, stamp)
+        self.draw_arrows(drawing, stamp, pose)
+        return drawing
+
+    def draw_way(self, drawing: Drawing, here: Place) -> None:
+        """Draw the way to `here`."""
+        if not self.way or dist(here, self.way[-1]) >= self.options.way_spacing:
+            self.way.append(here)
+        drawing.line("way", [*self.way, here], GREY)
+
+    def draw_reference(self, drawing: Drawing, stamp: int) -> None:
+        """Draw an outline of the climber where it should be."""
+        message, odom_frame = self.latest.get(REFERENCE), self.names.odom_frame
+        if message is None:
+            return
+        preview = self.understood(REFERENCE, message, lambda m: reading.preview(m, odom_frame))
+        desired = preview.at(stamp) if preview is not None else None
+        if desired is not None:
+            drawing.outline(REFERENCE, desired.pose, self.options.half_track, VIOLET)
+
+    def draw_arrows(self, drawing: Drawing, stamp: int, pose: Array) -> None:
+        """Draw torques at the wheels, and drive and lateral force at the centre."""
+        names, options = self.names, self.options
+        left, right = names.left_wheel_joint, names.right_wheel_joint
+        torques = self.fresh(TORQUES, stamp, lambda m: reading.wheel_torques(m, left, right))
+        if torques is not None:
+            for side, torque in zip((-1, 1), torques.tolist(), strict=True):
+                start = (0.0, side * options.half_track, ABOVE)
+                drawing.arrow(TORQUES, pose, start, (torque * options.torque_scale, 0.0), ORANGE)
+        frames = names.odom_frame, names.base_frame
+        force = self.fresh(FORCE, stamp, lambda message: reading.wrench(message, *frames))
+        if force is not None:
+            drive, lateral, _ = (force[0] * options.force_scale).tolist()
+            drawing.arrow("constraint_force", pose, (0.0, 0.0, ABOVE), (drive, lateral), BLUE)
+
+
+def main() -> None:
+    """Run the node."""
+    run(lambda: [Markers()])
