@@ -109,13 +109,11 @@ class Transport:
             *lines, rest = (rest[-100:] + received).split(b"\n")  # no line is longer
             for line in lines:
                 try:
-                    time, left, right, left_current, right_current, flags, refused = unpacked(
-                        line, "E"
-                    )
+                    time, left, right, left_mA, right_mA, flags, refused = unpacked(line, "E")
                 except ValueError:
                     self.spoilt += 1
                     continue
-                currents = forward(1e-3 * left_current, 1e-3 * right_current)
+                currents = forward(1e-3 * left_mA, 1e-3 * right_mA)
                 yield Frame(time, forward(left, right), currents, flags, refused)
 
     def command(self, left: float, right: float) -> None:
@@ -227,10 +225,8 @@ class Driver(Node):
         start = value["initial_x"], value["initial_y"], value["initial_heading"]
         self.reckoning = DeadReckoning(count, value["half_track"], start)
         self.board_clock = BoardClock(self.get_parameter("use_sim_time").value)
-        prefix = self.get_namespace().strip("/") + "/" if value["prefix_frames"] else ""
-        self.odom_frame, self.base_frame = (
-            (prefix + frame).lstrip("/") for frame in ("odom", "base_link")
-        )
+        prefix = f"{self.get_namespace()}/".lstrip("/") if value["prefix_frames"] else ""
+        self.odom_frame, self.base_frame = prefix + "odom", prefix + "base_link"
         self.stamp = self.answered = 0  # [ns] of the last odometry, of the last torque
         self.acting = False  # whether that torque is sent, and not yet too old
         self.refused = 0  # lines that the board could not read
@@ -279,10 +275,7 @@ class Driver(Node):
         self.refused = frame.refused
         self.reckoning.take(frame)
         now = self.get_clock().now().nanoseconds
-        stamp = self.board_clock.stamp(frame.time, now)
-        if stamp < self.stamp:
-            return  # stamps never go back: the clocks' offset is being learnt
-        self.stamp = stamp
+        self.stamp = stamp = self.board_clock.stamp(frame.time, now)
         if self.acting and stamp - self.answered > self.timeout * SECOND:
             self.say("wheel_torques", f"none for {self.timeout:g} s; zero torque instead")
             self.let_go()  # when this driver has stopped, too, the board does it
@@ -306,7 +299,7 @@ class Driver(Node):
         self.say("wheel_torques", fault and f"{fault}; zero torque instead")
         if fault:
             self.let_go()
-        elif stamp > self.answered:  # else it was sent twice, or overtaken
+        elif stamp != self.answered:  # else it was sent twice
             self.answered, self.acting = stamp, True
             torques = dict(zip(message.name, message.effort, strict=True))
             self.transport.command(self.current(torques[LEFT]), self.current(torques[RIGHT]))

@@ -3,6 +3,7 @@
 import math
 import os
 import pty
+import re
 import select
 import signal
 import tty
@@ -14,7 +15,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
-from world import TIMEOUT
+from world import CONFIG, TIMEOUT
 
 from climber_uk.mechanics.preview import SECOND, joined
 from climber_uk.messages import reading, writing
@@ -36,6 +37,13 @@ def line(content):
     return f"${content}*{crc:04X}\n".encode()
 
 
+def test_the_lines_in_the_documents_have_their_checksums():
+    text = (CONFIG.parent / "docs" / "hardware.md").read_text()
+    contents = re.findall(r"`\$(.*?)\*[0-9A-F]{4}`", text)
+    assert {content[0] for content in contents} == {"E", "C"}
+    assert all(line(content).decode().strip() in text for content in contents)
+
+
 def stamp(message):
     return reading.nanoseconds(message.header.stamp)
 
@@ -47,15 +55,18 @@ def now(world):
 class Board:
     """A motor board that the test plays, and the driver that runs on it."""
 
-    def __init__(self, world, *parameters):
+    def __init__(self, world, *parameters, namespace=""):
         self.world = world
         self.port, self.line = pty.openpty()
         tty.setraw(self.line)
         self.received = b""
         self.time = 0  # [µs]
-        world.start_node(DRIVER, f"device:={os.ttyname(self.line)}", *parameters)
-        self.odometry = world.listen(Odometry, "odom")
-        self.joints = world.listen(JointState, "joint_states")
+        given = [part for value in parameters for part in ("-p", value)]
+        device = f"device:={os.ttyname(self.line)}"
+        where = f"__ns:={namespace or '/'}"
+        world.start(DRIVER, "--ros-args", "-r", where, "-p", device, *given)
+        self.odometry = world.listen(Odometry, f"{namespace}/odom")
+        self.joints = world.listen(JointState, f"{namespace}/joint_states")
 
     def send(self, *numbers, time=5000):
         """Send a frame, `time` [µs] after the last one."""
@@ -116,6 +127,7 @@ def test_odometry_is_what_the_encoders_say_when_they_say_it(world):
         world,
         *("wheel_radius:=0.1", "half_track:=0.5", "encoder_counts:=1000"),
         *("initial_x:=1.0", "initial_y:=2.0", "initial_heading:=0.5"),
+        namespace="/north",
     )
     # counters of 32 bits overflow; the right motor is mounted the other way round
     board.time = 2**32 - 6000
@@ -132,7 +144,8 @@ def test_odometry_is_what_the_encoders_say_when_they_say_it(world):
     # by hand: wheels of 0.2 π m around, 1000 counts each; 100 counts left, 300 right, 1 m apart
     way = turn = 0.04 * math.pi
     start, end, rest = (
-        reading.state(message, "odom", "base_link") for message in (first, second, third)
+        reading.state(message, "north/odom", "north/base_link")
+        for message in (first, second, third)
     )
     np.testing.assert_allclose(start.pose, [1.0, 2.0, 0.5], atol=1e-12)
     # the arc that it rolled has a radius of 1 m; the midpoint rule is off by way turn² / 24
