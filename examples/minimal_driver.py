@@ -228,6 +228,7 @@ class Driver(Node):
         prefix = f"{self.get_namespace()}/".lstrip("/") if value["prefix_frames"] else ""
         self.odom_frame, self.base_frame = prefix + "odom", prefix + "base_link"
         self.stamp = self.answered = 0  # [ns] of the last odometry, of the last torque
+        self.looked_at = 0  # [ns] of the last odometry by the last look
         self.acting = False  # whether that torque is sent, and not yet too old
         self.refused = 0  # lines that the board could not read
         self.troubles: dict[str, str] = {}
@@ -236,7 +237,7 @@ class Driver(Node):
         self.joint_states = self.create_publisher(JointState, "joint_states", 10)
         self.transport = Transport(value["device"])
         self.create_subscription(JointState, "wheel_torques", self.on_torques, 10)
-        self.create_timer(1.0, self.tell_spoilt)
+        self.create_timer(1.0, self.look)
         self.listener = threading.Thread(target=self.listen)
         self.listener.start()
 
@@ -321,8 +322,10 @@ class Driver(Node):
         self.acting = False
         self.transport.command(0.0, 0.0)
 
-    def tell_spoilt(self) -> None:
-        """Log how many lines have not arrived as they were sent."""
+    def look(self) -> None:
+        """Log that there are no frames, and how many lines have not arrived as they were sent."""
+        self.say("frames", "none for 1 s" if self.stamp == self.looked_at else "")
+        self.looked_at = self.stamp
         if self.transport.spoilt or self.refused:
             spoilt = f"{self.transport.spoilt} lines from the board, {self.refused} to it"
             self.say("serial line", f"spoilt: {spoilt}")

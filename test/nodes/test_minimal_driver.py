@@ -212,6 +212,7 @@ def test_torques_that_do_not_come_any_more_are_dropped(world):
     world.wait(lambda: board.tell(0, 0, 0, 0, 1, 0) and (0, 0) in board.commands(), "zero currents")
     board.says("wheel_torques: none for 0.1 s; zero torque instead")
     board.says("board: no command, currents cut")
+    board.says("frames: none for 1 s")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
