@@ -226,13 +226,14 @@ def test_an_end_sends_zero_currents_even_if_the_signal_comes_twice(world, number
     assert "Traceback" not in world.log(DRIVER)
 
 
-def test_a_board_that_is_unplugged_is_one_line_and_a_failure(world):
+def test_a_board_that_is_unplugged_is_told_in_one_line_and_a_failure(world):
     board = Controlled(world)
     os.close(board.line)
     os.close(board.port)
     assert world.processes.pop(DRIVER).wait(TIMEOUT) == 1
-    (said,) = world.log(DRIVER).splitlines()
-    assert said.startswith("minimal_driver: the board is lost: ")
+    said = world.log(DRIVER)
+    assert said.splitlines()[-1].startswith("minimal_driver: the board is lost: ")
+    assert "Traceback" not in said
 
 
 @pytest.mark.parametrize(
@@ -273,7 +274,8 @@ class StandIn:
             f"initial_heading:={heading}",
         ]
         self.start_driver()
-        self.odometry = world.listen(Odometry, "odom")
+        self.odometry = []  # all of it, even if this test is slower than the driver
+        world.node.create_subscription(Odometry, "odom", self.odometry.append, 20_000)
 
     def start_driver(self):
         self.world.start_node(DRIVER, *self.driver, config="climber.yaml")
@@ -336,16 +338,17 @@ def test_in_the_plants_place_it_stays_within_5_mm_rms(world, planner, heading, r
     world.wait(lambda: previews, "reference")
     start = stamp(previews[0])
     times = range(start, start + round((2 * math.pi / rate + 3.0) * SECOND), SECOND // 200)
-    world.wait(lambda: stamp(board.odometry[-1]) > times[-1], "end of the lap")
+    world.wait(lambda: board.odometry and stamp(board.odometry[-1]) > times[-1], "end of the lap")
 
     reference = joined(reading.preview(message, "odom") for message in previews)
     rows = board.rows()
     told = {stamp(m): reading.state(m, "odom", "base_link").pose for m in board.odometry}
     true = {round(row[0] * 1e3) * (SECOND // 1000): row[1:4] for row in rows}
-    wanted = np.array([reference.at(time).pose for time in times])
     for name, poses in (("odometry", told), ("truth", true)):
-        found = np.array([poses[time] for time in times])
-        distance = np.hypot(*(found - wanted)[:, :2].T)
+        heard = [time for time in times if time in poses]
+        assert len(heard) > 0.99 * len(times)
+        off = np.array([poses[time] - reference.at(time).pose for time in heard])
+        distance = np.hypot(*off[:, :2].T)
         rms = np.sqrt(np.mean(distance**2))
         print(f"{name}: RMS {1e3 * rms:.4f} mm, maximum {1e3 * distance.max():.4f} mm")
         assert rms <= 5e-3
