@@ -15,6 +15,7 @@ setup(
         (f"share/{package_name}/config", glob("config/*")),
         (f"share/{package_name}/launch", glob("launch/*.launch.py")),
         (f"share/{package_name}/urdf", glob("urdf/*")),
+        (f"share/{package_name}/examples", glob("examples/*.py")),
     ],
     python_requires=">=3.11",
     install_requires=["setuptools", "numpy", "scipy", "pyyaml"],

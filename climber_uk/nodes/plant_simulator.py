@@ -3,7 +3,6 @@
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
@@ -12,19 +11,17 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import Alarm, Contact, Grip
+from climber_uk.mechanics.contact import Alarm
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
+from climber_uk.nodes import plant_parts
 from climber_uk.nodes.margins import Margins
 from climber_uk.nodes.plant_time import PlantTime
 from climber_uk.nodes.plant_topics import PlantTopics
 from climber_uk.nodes.running import ClimberNode, run
 from climber_uk.simulation.inputs import FellOff, NotFinite
-from climber_uk.simulation.machine import NONE, VARIANTS, Machine, Parts, Physics, Push
-from climber_uk.simulation.motors import Motors
+from climber_uk.simulation.machine import NONE, Machine, Push
 from climber_uk.simulation.options import Options
-from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.schedule import Schedule
 from climber_uk.simulation.sensors import Sensors
 
@@ -37,11 +34,7 @@ class PlantSimulator(ClimberNode):
 
     def __init__(self, namespace: str = "", time: PlantTime | None = None) -> None:
         super().__init__("plant_simulator", namespace)
-        for kind in (Options, Climber, Physics, Grip, Motors, Sensors, Alarm):
-            self.parameters.declare(kind)
-        for variants in VARIANTS.values():
-            for name, variant in variants.items():
-                self.parameters.declare(variant, f"{name}.")
+        plant_parts.declare(self.parameters)
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
@@ -58,22 +51,9 @@ class PlantSimulator(ClimberNode):
         self.start_diagnostics(self.values, alone_on=("odom", "wheel_torques"))
         self.time.publish([self])
 
-    def parts(self) -> Parts:
-        """What the parameters say that the climber is made of."""
-        read = self.parameters.read
-        physics, step = read(Physics), self.options.integration_step
-        chosen: dict[str, Any] = {}
-        for group, variants in VARIANTS.items():
-            name = getattr(physics, group)
-            chosen[group] = read(variants[name], f"{name}.")
-        wall = chosen.pop("wall")
-        contact = Contact(**chosen, grip=read(Grip))
-        plant = Plant(read(Climber), step, contact, wall, physics.slip)
-        return Parts(plant, read(Motors), read(Sensors), physics)
-
     def on_parameters(self) -> None:
         """Take up what was changed: the pump's pressure, a magnet's gap, levels of alarm."""
-        self.machine.take(self.parts())
+        self.machine.take(plant_parts.parts(self.parameters))
         self.margins.alarm = self.parameters.read(Alarm)
 
     # Commands
@@ -81,7 +61,9 @@ class PlantSimulator(ClimberNode):
     def place_at_start(self) -> None:
         """Go back to the initial state, with no torque yet."""
         start = self.options.initial_state
-        self.machine = Machine(self.parts(), start, self.options.control_period)
+        self.machine = Machine(
+            plant_parts.parts(self.parameters), start, self.options.control_period
+        )
         self.held = bool(start.velocity.any())
         self.origin = self.time.stamp  # of the first odometry [ns]
         timeout = 0.0 if self.options.simulated_time else self.options.command_timeout

@@ -16,6 +16,7 @@ from rclpy.node import Node
 
 TIMEOUT = 60.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 # above 101, ports may be taken by others; two test runs at a time should not meet
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
@@ -33,6 +34,12 @@ def executable(name):
         return Path(get_package_prefix("climber_uk")) / "lib" / "climber_uk" / name
     except (PackageNotFoundError, OSError):  # OSError: there is no installation at all
         return Path(sys.executable).parent / name
+
+
+def command(name):
+    """How an executable of the package, or an example, is started."""
+    example = EXAMPLES / f"{name}.py"
+    return [sys.executable, example] if example.is_file() else [executable(name)]
 
 
 class World:
@@ -53,7 +60,7 @@ class World:
         """Start an executable of the package; its output is `log(name)`."""
         with (self.directory / f"{name}.log").open("wb") as log:
             self.processes[name] = subprocess.Popen(
-                [executable(name), *arguments],
+                [*command(name), *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 env=self.environment,
