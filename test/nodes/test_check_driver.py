@@ -1,0 +1,136 @@
+"""check_driver finds no fault in the plant, and each one that is planted, by its name."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from world import CONFIG, TIMEOUT, executable
+
+pytestmark = pytest.mark.nodes
+
+FAULTY = Path(__file__).parent / "faulty_driver.py"
+PARAMETERS = "--ros-args", "--params-file", str(CONFIG / "climber.yaml")
+WHEELS_SWAPPED = "left and right are swapped"
+# fault: what finds it, a word of what it says
+FAULTS = {
+    "swapped wheels": ("wheels", WHEELS_SWAPPED),
+    "wrong sign": ("wheels", "both wheels turn the wrong way"),
+    "swapped wheels and wrong sign": ("wheels", f"{WHEELS_SWAPPED}, and both turn the wrong way"),
+    "right wheel reversed": ("wheels", "the right wheel turns the wrong way"),
+    "left wheel reversed": ("wheels", "the left wheel turns the wrong way"),
+    "right wheel dead": ("wheels", "the right wheel does nothing"),
+    "left wheel dead": ("wheels", "the left wheel does nothing"),
+    "no torque": ("wheels", "no reaction"),
+    "twice the torque": ("gain", "drives 2.0"),
+    "half the torque": ("gain", "drives 0.5"),
+    "degrees": ("heading", "in degrees"),
+    "clockwise": ("heading", "opposite ways"),
+    "degrees per second": ("heading", "in degrees per second"),
+    "no twist": ("heading", "is zero"),
+    "world-frame twist": ("twist", "twist.linear is in odom, not in base_link"),
+    "centimetres": ("twist", "100 times"),
+    "sideways": ("slip", "sideways"),
+    "not a number": ("finite", "nan"),
+    "no orientation": ("finite", "unit turn about z"),
+    "no covariance": ("covariance", "all zero"),
+    "negative covariance": ("covariance", "negative"),
+    "covariance not a number": ("covariance", "not finite"),
+    "wrong frame": ("frames", "'map'"),
+    "wrong child frame": ("frames", "'base_footprint'"),
+}
+WALL_CLOCK_FAULTS = {
+    "no watchdog": ("watchdog", "still pushes"),
+    "stale stamps": ("age", "1000."),
+    "stamps of the future": ("age", "ahead of the clock"),
+    "zero stamps": ("clock", "zero"),
+    "stamps since boot": ("clock", "time since boot"),
+    "stuck stamps": ("order", "the same as"),
+    "stamps that go back": ("order", "older than"),
+    "uneven stamps": ("jitter", "40.0% of a period"),
+    "wrong type": ("topic", "geometry_msgs/msg/PoseStamped"),
+    "two publishers": ("publishers", "2 publish"),
+    "nobody listens": ("commands", "nobody"),
+    "listens to another type": ("commands", "Float64MultiArray"),
+    "listens to latched torques": ("commands", "would not get"),
+}
+WARNINGS = {
+    "half the rate": ("rate", "100.0 Hz"),
+    "best effort": ("qos", "best effort"),
+    "late torque": ("latency", "ms from a torque"),
+}
+IN_BRIEF = ("swapped wheels", "wrong sign", "degrees", "world-frame twist")
+IN_BRIEF_ON_WALL_CLOCK = ("no watchdog", "stale stamps")
+
+
+def some(faults, brief):
+    """Faults as parameters of a test: all of them in soak, some in brief."""
+    marks = {name: () if name in brief else (pytest.mark.soak,) for name in faults}
+    return [pytest.param(name, *faults[name], marks=marks[name], id=name) for name in faults]
+
+
+def check(world, *arguments, parameters=PARAMETERS):
+    """Run check_driver to its end; return its exit status, rows by check, and stderr."""
+    done = subprocess.run(
+        [executable("check_driver"), "--json", *arguments, *parameters],
+        env=world.environment,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+    )
+    rows = json.loads(done.stdout)["rows"] if done.stdout else []
+    return done.returncode, {row["check"]: row for row in rows}, done.stderr
+
+
+def those(rows, verdict):
+    return [name for name, row in rows.items() if row["verdict"] == verdict]
+
+
+def drive(world, fault, *parameters):
+    world.run("driver", sys.executable, FAULTY, fault, *PARAMETERS, *parameters)
+
+
+def test_the_plant_passes_all_checks(world):
+    world.start_node("plant_simulator", config="climber.yaml")
+    status, rows, _ = check(world, "--move", "--duration", "1")
+    assert status == 0, rows
+    assert those(rows, "pass") == list(rows), rows
+    assert rows["gain"]["values"]["drive"] == pytest.approx(1.0, abs=0.1)
+    assert rows["gain"]["values"]["turn"] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("fault", "check_name", "said"), some(FAULTS, IN_BRIEF))
+def test_a_planted_fault_is_found_by_name_and_nothing_else(world, fault, check_name, said):
+    """In lock-step, which the check itself answers."""
+    drive(world, fault, "-p", "simulated_time:=true")
+    sim_time = (*PARAMETERS, "-p", "use_sim_time:=true")
+    status, rows, _ = check(world, "--move", "--duration", "0.5", parameters=sim_time)
+    assert those(rows, "fail") == [check_name], rows
+    assert said in rows[check_name]["said"]
+    assert rows[check_name]["hint"]
+    assert not those(rows, "warn"), rows
+    assert status == 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "check_name", "said"), some(WALL_CLOCK_FAULTS, IN_BRIEF_ON_WALL_CLOCK)
+)
+def test_a_fault_in_time_is_found_by_name_and_nothing_else(world, fault, check_name, said):
+    """On the wall clock, with --move: a driver that is not fit for it is not moved."""
+    drive(world, fault)
+    status, rows, _ = check(world, "--move", "--duration", "1")
+    assert those(rows, "fail") == [check_name], rows
+    assert said in rows[check_name]["said"]
+    assert status == 1
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(("fault", "check_name", "said"), some(WARNINGS, WARNINGS))
+def test_what_is_only_unusual_is_a_warning(world, fault, check_name, said):
+    drive(world, fault)
+    status, rows, _ = check(world, "--move", "--duration", "1")
+    assert those(rows, "warn") == [check_name], rows
+    assert not those(rows, "fail"), rows
+    assert said in rows[check_name]["said"]
+    assert status == 0
