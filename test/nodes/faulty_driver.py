@@ -150,7 +150,7 @@ ODOMETRY = {
     "stamps since boot": lambda _, m: stamp(m, time.monotonic_ns()),
     "stuck stamps": lambda d, m: stamp(m, d.origin),
     "stamps that go back": lambda d, m: stamp(m, stamped(m) - 20_000_000 * (d.count % 10 == 0)),
-    "uneven stamps": lambda d, m: stamp(m, stamped(m) + 2_000_000 * (d.count % 2)),
+    "uneven stamps": lambda d, m: stamp(m, stamped(m) + 4_000_000 * (d.count % 2)),
     "half the rate": lambda d, m: [m] if d.count % 2 else [],
     "not a number": every(7, not_a_number),
     "no orientation": no_orientation,

@@ -53,7 +53,6 @@ class Graph:
     topic: str  # full name of odom
     odometry: Sequence[Endpoint]  # publishers
     commanded: Sequence[Endpoint]  # subscribers of wheel_torques
-    commanding: Sequence[str]  # nodes that publish wheel_torques, but for the one that checks
     elsewhere: Sequence[str]  # other topics with odometry
     has_clock: bool  # whether somebody publishes /clock
 

@@ -54,13 +54,9 @@ class Trial:
         self.silence: tuple[int, int] | None = None
         self.trouble = ""
         self.start: State | None = None
-        moves = np.median(np.abs(motion_of(heard[-RECENT:]).reaction), axis=0)
-        still = thresholds.STANDING_SPEED, thresholds.STANDING_RATE
         self.stages = self.in_order()
         self.stage: Stage | None = next(self.stages)
         self.begun_at = 0  # [ns] stamp at which the stage began
-        if (moves > still).any():
-            self.stop(f"it moves already, with {moves[0]:.2f} m/s and {moves[1]:.2f} rad/s")
 
     def in_order(self) -> Iterator[Stage]:
         """Stages, each made when the one before is over."""
@@ -92,7 +88,9 @@ class Trial:
 
     def torques(self, stamp: int, now: int, state: State) -> Array | None:
         """Torques (2,) right, left [N m] that answer an odometry; None: say nothing."""
-        self.start = self.start or state
+        if self.start is None:
+            self.start = state
+            self.stop_if_moving()
         way = state.pose - self.start.pose
         gone, turned = float(np.hypot(*way[:2])), abs(wrapped(float(way[2])))
         if gone > self.bounds.max_travel:
@@ -103,6 +101,12 @@ class Trial:
         if torques is not None:
             self.commands.append(Command(max(stamp, now), torques))
         return torques
+
+    def stop_if_moving(self) -> None:
+        """Do not begin unless it has stood for a while."""
+        speed, rate = np.median(np.abs(motion_of(self.heard[-RECENT:]).reaction), axis=0)
+        if speed > thresholds.STANDING_SPEED or rate > thresholds.STANDING_RATE:
+            self.stop(f"it moves already, with {speed:.2f} m/s and {rate:.2f} rad/s")
 
     def _of_stage(self, stamp: int, state: State) -> Array | None:
         assert self.stage is not None
