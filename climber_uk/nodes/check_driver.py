@@ -30,7 +30,7 @@ from climber_uk.nodes.driver_node import DriverNode
 from climber_uk.nodes.running import Names
 
 PATIENCE = 10.0  # [s] for a publisher to be found
-STANDSTILL = 0.5  # [s] of simulated time that waits for torques
+COPIES = 3  # of an odometry that waits for torques
 CATCH_UP = 0.2  # [s] to hear what came while the first report was made, and is old
 
 
@@ -48,9 +48,9 @@ def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
             for name, section in (yaml.safe_load(Path(path).read_text()) or {}).items():
                 where, _, node = name.rpartition("/")
                 if node == "uk_torque_controller":
-                    given = section.get("ros__parameters", {})
-                    values = {key: value for key, value in given.items() if key in known}
-                    sections[f"{where}/check_driver"] = {"ros__parameters": values}
+                    mine = sections.setdefault(f"{where}/check_driver", {"ros__parameters": {}})
+                    given = section["ros__parameters"].items()
+                    mine["ros__parameters"].update({k: v for k, v in given if k in known})
     with NamedTemporaryFile("w", suffix=".yaml") as file:
         yaml.safe_dump(sections, file)
         file.flush()
@@ -102,7 +102,7 @@ def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None
         spin.until(lambda: node.hears, PATIENCE / 2)
     node.arrivals.clear()  # when they came says nothing
     if options.move and node.has_clock():
-        spin.until(lambda: node.simulated_for > 0, STANDSTILL)
+        spin.until(lambda: node.simulated_for > 0 or len(node.arrivals) > COPIES, PATIENCE / 2)
         if node.simulated_for == 0:  # in lock-step, and nobody answers
             node.speak()
     spin.until(lambda: node.simulated_for > options.duration, options.duration)

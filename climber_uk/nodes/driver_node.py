@@ -20,7 +20,9 @@ from climber_uk.nodes.driver_graph import graph, others_commanding
 from climber_uk.nodes.running import BEST_EFFORT, ClimberNode
 
 MANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-SILENT = 1.0  # [s] without odometry at which a trial is stopped
+SILENT = 0.5  # [s] without odometry at which a trial is stopped
+PATIENT = 10 * SILENT  # [s] in simulated time, in which nothing moves meanwhile
+RECENT = 100  # messages that tell the period
 
 
 class DriverNode(ClimberNode):
@@ -104,10 +106,10 @@ class DriverNode(ClimberNode):
 
     def begin_trial(self) -> Trial:
         """Begin one, or not: then its `trouble` says why."""
-        seen = self.evidence()
-        period = float(np.median(np.diff(seen.motion.time)))
-        bounds = self.parameters.read(Bounds)
-        self.trial = Trial(seen.climber, bounds, self.arrivals, period, not self.use_sim_time)
+        stamps = [reading.nanoseconds(a.message.header.stamp) for a in self.arrivals[-RECENT:]]
+        period = float(np.median(np.diff(np.unique(stamps)))) / SECOND
+        climber, bounds = self.parameters.read(Climber), self.parameters.read(Bounds)
+        self.trial = Trial(climber, bounds, self.arrivals, period, not self.use_sim_time)
         self.watch(self.trial)
         return self.trial
 
@@ -117,8 +119,9 @@ class DriverNode(ClimberNode):
             trial.stop(f"{', '.join(others)} publishes wheel_torques")
         elif not self.is_heard:
             trial.stop("nobody receives wheel_torques")
-        elif time.monotonic_ns() - self.heard_at > SILENT * SECOND:
-            trial.stop(f"no odometry for {SILENT:g} s")
+        patience = PATIENT if self.use_sim_time else SILENT
+        if time.monotonic_ns() - self.heard_at > patience * SECOND:
+            trial.stop(f"no odometry for {patience:g} s")
 
     def let_go(self) -> None:
         """Command no torque, as the last word."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from driven import NOBODY, arrived, evidence, odometry
 
-from climber_uk.analysis.driver import checks, listening, moving, report
+from climber_uk.analysis.driver import checks, listening, moving, report, timing
 from climber_uk.analysis.driver.evidence import Endpoint, Expected
 from climber_uk.analysis.driver.report import Verdict
 from climber_uk.mechanics.preview import SECOND
@@ -135,7 +135,7 @@ def test_best_effort_is_a_warning():
     [(5_000_000, PASS), (10_000_000, WARN), (100_000_000, FAIL), (500_000, FAIL)],
 )
 def test_rates_are_judged_by_stamps(period, wanted):
-    found = listening.rate(evidence(standing(stamps(50, period)), graph=ALONE))
+    found = timing.rate(evidence(standing(stamps(50, period)), graph=ALONE))
     assert found.verdict is wanted
     assert found.values["rate"] == pytest.approx(1e9 / period)
 
@@ -143,7 +143,7 @@ def test_rates_are_judged_by_stamps(period, wanted):
 @pytest.mark.parametrize(("uneven", "wanted"), [(0.05, PASS), (0.3, WARN), (0.8, FAIL)])
 def test_jitter_is_that_of_the_stamps(uneven, wanted):
     moved = [s + round(uneven * 5_000_000) * (n % 2) for n, s in enumerate(stamps())]
-    found = listening.jitter(evidence(standing(moved), graph=ALONE))
+    found = timing.jitter(evidence(standing(moved), graph=ALONE))
     assert found.verdict is wanted
     assert found.values["stamps"] == pytest.approx(uneven * 0.005, rel=0.05)
 
@@ -184,7 +184,7 @@ FAR = 1e5  # [s]
     ],
 )
 def test_the_stamps_clock_is_told(seen, wanted, said):
-    found = listening.clock(seen)
+    found = timing.clock(seen)
     assert (found.verdict, said in found.said) == (wanted, True), found.said
 
 
@@ -192,19 +192,19 @@ def test_the_stamps_clock_is_told(seen, wanted, said):
     ("age", "wanted"), [(0.001, PASS), (0.07, WARN), (0.2, FAIL), (-0.05, WARN), (-0.2, FAIL)]
 )
 def test_odometry_must_be_fresh(age, wanted):
-    found = listening.age(with_arrivals(age, graph=ALONE))
+    found = timing.age(with_arrivals(age, graph=ALONE))
     assert found.verdict is wanted
     assert found.values["age"] == pytest.approx(age)
     patient = Expected(odometry_timeout=10.0)
-    assert listening.age(with_arrivals(abs(age), expected=patient)).verdict is PASS
+    assert timing.age(with_arrivals(abs(age), expected=patient)).verdict is PASS
 
 
 def test_stamps_must_increase_but_for_odometry_that_waits_for_torques():
     one, two, three = stamps(3)
-    assert listening.order(evidence(standing([one, two, three]))).verdict is PASS
-    assert listening.order(evidence(standing([one, three, two]))).verdict is FAIL
-    assert listening.order(evidence(standing([one, two, two]))).verdict is FAIL
-    assert listening.order(evidence(standing([one, two, two]), graph=CLOCK)).verdict is PASS
+    assert timing.order(evidence(standing([one, two, three]))).verdict is PASS
+    assert timing.order(evidence(standing([one, three, two]))).verdict is FAIL
+    assert timing.order(evidence(standing([one, two, two]))).verdict is FAIL
+    assert timing.order(evidence(standing([one, two, two]), graph=CLOCK)).verdict is PASS
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from climber_uk.analysis.driver import listening, moving, reacting
+from climber_uk.analysis.driver import listening, moving, reacting, timing
 from climber_uk.analysis.driver.evidence import Evidence
 from climber_uk.analysis.driver.report import Finding, Report, Verdict, skipped
 
@@ -25,11 +25,11 @@ CHECKS: Mapping[str, Check] = {
     "publishers": Check(listening.publishers, COMES),
     "qos": Check(listening.qos, COMES),
     "commands": Check(listening.commands),
-    "clock": Check(listening.clock, COMES),
-    "order": Check(listening.order, (*COMES, "publishers", "clock")),
-    "rate": Check(listening.rate, (*COMES, "publishers", "clock", "order")),
-    "jitter": Check(listening.jitter, (*COMES, "publishers", "clock", "order", "rate")),
-    "age": Check(listening.age, (*COMES, "clock", "order")),
+    "clock": Check(timing.clock, COMES),
+    "order": Check(timing.order, (*COMES, "publishers", "clock")),
+    "rate": Check(timing.rate, (*COMES, "publishers", "clock", "order")),
+    "jitter": Check(timing.jitter, (*COMES, "publishers", "clock", "order", "rate")),
+    "age": Check(timing.age, (*COMES, "clock", "order")),
     "frames": Check(listening.frames, COMES),
     "finite": Check(listening.finite, COMES),
     "covariance": Check(listening.covariance, COMES),

@@ -17,10 +17,8 @@ from climber_uk.mechanics.elementary import clipped, wrapped
 
 GOALS = np.array([0.05, 0.4])  # [m/s], [rad/s] at which torques fall again: some 1 cm, 0.1 rad
 PLACES = np.array([0.01, 0.1])  # [m], [rad] at which they do if no speed is told
-RISE_TIMES = (
-    0.06,
-    0.1,
-)  # [s] from the first motion to those goals, by the model; friction brakes one
+# [s] from the first motion to those goals, by the model: friction helps to stop a drive
+RISE_TIMES = 0.06, 0.1
 RISE_PERIODS = 4.0  # and at least so many odometry messages
 LOWEST = 1.5  # times the highest level: √2 stops what nothing else brakes
 STOPPED = 0.1  # of the highest speed, at which what is left is damped
@@ -36,6 +34,9 @@ class Stage(Protocol):
 
     def torques(self, time: float, state: State) -> Array | None:
         """Torques (2,) right, left [N m] at a time since the stage's begin; None: say nothing."""
+
+    def finish(self) -> None:
+        """Do nothing more but damp what motion there is."""
 
     @property
     def done(self) -> bool:
@@ -58,7 +59,7 @@ class Pulse:
         self.damping = float(needed[channel]) / max(DAMPING_TIME, RISE_PERIODS * period)
         self.longest_step, self.last = 2 * period, 0.0
         self.start: State | None = None
-        self.rested_at = 0.0  # 0: not yet
+        self.rested_at: float | None = None
         self.top = self.level = self.highest = 0.0
         self.reacts, self.sign = int(turns), sign  # which speed reacts, and which way
         self.falls = self.done = False
@@ -69,7 +70,7 @@ class Pulse:
         # what was missed is not made up for: nobody saw what the torque did meanwhile
         step, self.last = min(time - self.last, self.longest_step), time
         shares = np.array([float(state.forward_speed), float(state.yaw_rate)]) / self.goals
-        if self.rested_at:
+        if self.rested_at is not None:
             level = self.rest(shares)
         elif self.falls:
             level = self.fall(shares, step)
@@ -100,14 +101,16 @@ class Pulse:
         return self.rest(shares) if stopped or level < -LOWEST * self.top else level
 
     def finish(self) -> None:
-        """Go on with damping, whatever comes."""
-        self.rested_at, self.top = self.rested_at or self.last, max(self.top, abs(self.level))
+        """Do nothing more but damp what motion there is."""
+        self.top = max(self.top, abs(self.level))
+        if self.rested_at is None:
+            self.rested_at = self.last
 
     def rest(self, shares: Array) -> float:
         """Level that takes away what motion is left, little by little."""
         self.finish()
-        at_rest = np.abs(shares).max() < AT_REST
-        self.done = bool(at_rest) or self.last - self.rested_at > REST_TIME
+        at_rest = bool(np.abs(shares).max() < AT_REST)
+        self.done = at_rest or self.last - (self.rested_at or 0.0) > REST_TIME
         level = -self.sign * float(shares[self.reacts]) * self.damping
         return 0.0 if self.done else clipped(level, -self.top, self.top)
 
@@ -115,17 +118,25 @@ class Pulse:
 class Silence:
     """A small turning torque, then none is commanded any more; at last the turn is damped."""
 
-    def __init__(self, torque: float, climber: Climber, watchdog_time: float) -> None:
-        self.torque, self.gain = torque, float(expected_gain(climber)[1])
+    def __init__(self, torque: float, watchdog_time: float, after: Pulse) -> None:
+        self.torque, self.after = torque, after
+        self.after.top = self.after.damping
         self.speaks_at = PUSH_TIME + watchdog_time + LOOK_TIME
-        self.done = False
 
     def torques(self, time: float, state: State) -> Array | None:
         """Torques of now."""
-        if time < PUSH_TIME:
+        if time < min(PUSH_TIME, self.speaks_at):
             return self.torque * PAIR[1]
         if time < self.speaks_at:
             return None
-        self.done = time > self.speaks_at + REST_TIME
-        level = -float(state.yaw_rate) / (self.gain * DAMPING_TIME)
-        return 0.0 * PAIR[1] if self.done else clipped(level, -1.0, 1.0) * PAIR[1]
+        self.after.finish()
+        return self.after.torques(time - self.speaks_at, state)
+
+    def finish(self) -> None:
+        """Do nothing more but damp what motion there is."""
+        self.speaks_at = 0.0
+
+    @property
+    def done(self) -> bool:
+        """Whether the stage is over."""
+        return self.after.done

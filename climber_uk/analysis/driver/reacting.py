@@ -1,5 +1,7 @@
 """Checks of how a driver takes torques, from a trial of small pulses."""
 
+import math
+
 import numpy as np
 
 from climber_uk.analysis.driver import thresholds
@@ -47,17 +49,15 @@ def gain(seen: Evidence) -> Finding:
     response = response_of(seen)
     if response is None:
         return NOT_MOVED
-    drive, turn = response.gains[0, 0], response.gains[1, 1]
-    off = max(max(value, 1 / value) for value in (drive, turn) if np.isfinite(value))
-    if abs(np.log(drive / turn)) < np.log(thresholds.GAIN_OFF):
+    drive, turn = np.diag(response.gains).tolist()
+    off_drive, off_turn = (max(g, 1 / g) if math.isfinite(g) else 1.0 for g in (drive, turn))
+    if max(drive / turn, turn / drive) < thresholds.GAIN_OFF:
         hint = "see wheel_radius, here and in the driver, and its N m per ampere"
     else:
-        hint = (
-            "see mass" if abs(np.log(drive)) > abs(np.log(turn)) else "see yaw_inertia, half_track"
-        )
-    said = f"drives {drive:.2f} times, turns {turn:.2f} times as the parameters say"
+        hint = "see mass" if off_drive > off_turn else "see yaw_inertia and half_track"
+    said = f"drives {drive:.2f} times, turns {turn:.2f} times as fast as the parameters say"
     bounds = thresholds.GAIN_OFF, thresholds.GAIN_WRONG
-    return graded(off, bounds, said, hint, drive=float(drive), turn=float(turn))
+    return graded(max(off_drive, off_turn), bounds, said, hint, drive=drive, turn=turn)
 
 
 def latency(seen: Evidence) -> Finding:

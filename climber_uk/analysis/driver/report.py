@@ -1,6 +1,7 @@
 """What the checks found: a verdict, a line and, where something is wrong, one hint."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -81,7 +82,10 @@ def as_json(report: Report) -> str:
             "verdict": finding.verdict.value,
             "said": finding.said,
             "hint": finding.hint,
-            "values": dict(finding.values),
+            "values": {
+                key: value if math.isfinite(value) else None
+                for key, value in finding.values.items()
+            },
         }
         for name, finding in report.items()
     ]

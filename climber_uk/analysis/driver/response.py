@@ -61,8 +61,8 @@ class Response:
     def wiring(self) -> tuple[str, float]:
         """Key of WIRINGS that is most like it, and how like (cosine)."""
         found = self.gains.copy()
-        # what does not turn is not turned; a drive may not have overcome the friction
-        found[:, 1] = np.nan_to_num(found[:, 1])
+        # where it drives, it does not turn; a drive may be less than the friction
+        found[np.isnan(found[:, 1]) & np.isfinite(found[:, 0]), 1] = 0.0
         known = np.isfinite(found)
         likeness = {
             name: _cosine((PAIR @ np.array(wheels).T @ PAIR)[known], found[known])

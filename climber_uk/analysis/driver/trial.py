@@ -61,14 +61,18 @@ class Trial:
     def in_order(self) -> Iterator[Stage]:
         """Stages, each made when the one before is over."""
         for turns, sign in ((True, 1.0), (False, 1.0), (False, -1.0), (True, -1.0)):
-            yield Pulse(turns, sign, self.climber, self.period, self.limit)
+            yield self.pulse(turns, sign)
         response = respond(motion_of(self.heard), self.record(), self.climber)
         name, likeness = response.wiring
         gain, offset = response.gains[1, 1], response.offsets[1, 1]
         if self.with_silence and not name and likeness > thresholds.LIKENESS and gain > 0:
             torque = (PUSHED_BY - offset) / (gain * expected_gain(self.climber)[1])
             if 0 < torque <= self.limit:
-                yield Silence(float(torque), self.climber, self.bounds.watchdog_time)
+                yield Silence(float(torque), self.bounds.watchdog_time, self.pulse(True, 1.0))
+
+    def pulse(self, turns: bool, sign: float) -> Pulse:
+        """Pulse of this climber."""
+        return Pulse(turns, sign, self.climber, self.period, self.limit)
 
     def record(self) -> evidence.Trial:
         """What was done so far."""
@@ -81,10 +85,8 @@ class Trial:
     def finish(self, why: str) -> None:
         """Let this be the last stage, and damp what motion there is."""
         self.trouble, self.stages = self.trouble or why, iter(())
-        if isinstance(self.stage, Pulse):
+        if self.stage is not None:
             self.stage.finish()
-        else:
-            self.stage = None
 
     def torques(self, stamp: int, now: int, state: State) -> Array | None:
         """Torques (2,) right, left [N m] that answer an odometry; None: say nothing."""
