@@ -98,8 +98,9 @@ def check(options: argparse.Namespace, ended: Callable[[], bool]) -> report.Repo
 def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None:
     """Hear odometry for a while, by the wall clock or by its stamps."""
     spin.until(lambda: bool(node.count_publishers("odom")), PATIENCE)
-    if node.count_publishers("odom"):
-        spin.until(lambda: node.hears, PATIENCE / 2)
+    if not node.count_publishers("odom"):
+        return
+    spin.until(lambda: node.hears, PATIENCE / 2)
     node.arrivals.clear()  # when they came says nothing
     if options.move and node.has_clock():
         spin.until(lambda: node.simulated_for > 0 or len(node.arrivals) > COPIES, PATIENCE / 2)

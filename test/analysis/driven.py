@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from climber_uk.analysis.driver.evidence import Arrival, Evidence, Expected, Graph
+from climber_uk.analysis.driver import listening
+from climber_uk.analysis.driver.evidence import Arrival, Endpoint, Evidence, Expected, Graph
 from climber_uk.analysis.driver.trial import Bounds, Trial
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
@@ -23,7 +24,9 @@ CLIMBER = Climber(
 START = State.rolling(np.array([0.0, 3.0, 0.785]), 0.0, 0.0)
 FRAMES = "odom", "base_link"
 PERIOD = 0.005  # [s]
-NOBODY = Graph("/odom", (), (), (), False)
+DRIVER = Endpoint("/driver", listening.ODOMETRY, fits=True, reliable=True)
+MOTOR = Endpoint("/driver", listening.TORQUES, fits=True, reliable=True)
+ALONE = Graph("/odom", odometry=(DRIVER,), commanded=(MOTOR,), elsewhere=(), has_clock=False)
 
 
 def odometry(pose, twist, stamp, frames=FRAMES, covariance=1e-6):
@@ -59,7 +62,7 @@ def arrived(message, age=0):
     return Arrival(message, wall=now, boot=now - 1000 * SECOND, simulated=0)
 
 
-def evidence(arrivals, trial=None, graph=NOBODY, **others):
+def evidence(arrivals, trial=None, graph=ALONE, **others):
     given = {"expected": Expected(), "frames": FRAMES, "use_sim_time": False, **others}
     return Evidence(CLIMBER, graph=graph, arrivals=arrivals, trial=trial, **given)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from driven import CLIMBER, START, arrived, evidence, odometry, tried
 
-from climber_uk.analysis.driver import checks, reacting
+from climber_uk.analysis.driver import checks, reacting, report
 from climber_uk.analysis.driver.evidence import Command, Pulse, Trial
 from climber_uk.analysis.driver.report import Verdict
 from climber_uk.analysis.driver.response import WIRINGS, expected_gain, response_of
@@ -60,9 +60,7 @@ def test_gains_are_found_under_other_friction(law):
 def test_gains_are_found_with_imperfect_sensors(sensors):
     seen = tried(RIGHT, sensors=sensors)
     assert np.diag(response_of(seen).gains) == pytest.approx([1.0, 1.0], rel=0.1)
-    failed = [n for n, f in checks.report(seen).items() if f.verdict is Verdict.FAIL]
-    # there is no graph in this test
-    assert failed == ["topic", "commands"]
+    assert not report.has_failed(checks.report(seen))
 
 
 def test_the_delay_of_torques_is_found():

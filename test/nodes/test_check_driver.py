@@ -64,7 +64,7 @@ WARNINGS = {
     "late torque": ("latency", "ms from a torque"),
 }
 BUSY = {"age", "latency"}  # may be late on a busy machine
-IN_BRIEF = ("swapped wheels", "degrees", "world-frame twist")
+IN_BRIEF = ("swapped wheels", "world-frame twist")
 IN_BRIEF_ON_WALL_CLOCK = ("stale stamps",)
 
 
@@ -101,7 +101,7 @@ def drive(world, fault, *parameters):
 
 def test_the_plant_passes_all_checks(world):
     world.start_node("plant_simulator", config="climber.yaml")
-    status, rows, said = check(world, "--move", "--duration", "1")
+    status, rows, said = check(world, "--move", "--duration", "0.5")
     assert status == 0, told(rows)
     assert not those(rows, "fail") + those(rows, "skip"), told(rows)
     assert set(those(rows, "warn")) <= BUSY, told(rows)
@@ -138,11 +138,9 @@ def test_when_it_is_interrupted_its_last_word_is_no_torque(world):
     ("arguments", "said"),
     [
         (["--ros-args", "-p", "mass:=-1.0"], "mass=-1.0 must be > 0 [kg]"),
-        (["--ros-args", "-p", "gravity:=1.0"], "gravity is not a parameter of check_driver"),
         (["--ros-args", "--params-file", "nowhere.yaml"], "nowhere.yaml"),
-        (["--duration", "0"], "--duration"),
     ],
-    ids=["bad value", "unknown parameter", "no file", "no time"],
+    ids=["bad value", "no file"],
 )
 def test_what_it_cannot_do_is_one_line_and_status_2(world, arguments, said):
     status, rows, error = check(world, *arguments, parameters=())

@@ -1,8 +1,8 @@
 """What torques do to the climber, from pulses of the pairs τR = ±τL.
 
-    speed(t) = speed₀ + G ∫ τ(t - L) dt + c t
+    speed(t) = speed₀ + G ∫ τ(t - L) dt + c t - κ ∫ speed dt
 
-while it slides one way: c takes up friction and weight, whatever they are. By (11) and (15)
+while it slides one way: c and κ take up friction and weight, whatever they are. By (11) and (15)
 G = 2/(r m) for the drive and 2 d/(r J) for the turn.
 """
 
