@@ -106,7 +106,11 @@ def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None
         spin.until(lambda: node.simulated_for > 0 or len(node.arrivals) > COPIES, PATIENCE / 2)
         if node.simulated_for == 0:  # in lock-step, and nobody answers
             node.speak()
-    spin.until(lambda: node.simulated_for > options.duration, options.duration)
+    duration = options.duration
+    spin.until(lambda: node.simulated_for > duration or node.disturbs, duration)
+    if node.disturbs:
+        node.hush()
+        spin.until(lambda: node.simulated_for > duration, duration)
 
 
 def move(node: DriverNode, spin: Spinner) -> None:

@@ -20,8 +20,7 @@ from climber_uk.nodes.driver_graph import graph, others_commanding
 from climber_uk.nodes.running import BEST_EFFORT, ClimberNode
 
 MANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-SILENT = 0.5  # [s] without odometry at which a trial is stopped
-PATIENT = 10 * SILENT  # [s] in simulated time, in which nothing moves meanwhile
+SILENT, PATIENT = 0.5, 5.0  # [s] without odometry: no torque more; no trial more
 RECENT = 100  # messages that tell the period
 
 
@@ -100,6 +99,17 @@ class DriverNode(ClimberNode):
             self.torques = self.publisher(JointState, "wheel_torques")
 
     @property
+    def disturbs(self) -> bool:
+        """Whether another commands as well, who was found late."""
+        return self.torques is not None and bool(others_commanding(self))
+
+    def hush(self) -> None:
+        """Command no more, and forget what was heard meanwhile."""
+        self.destroy_publisher(self.torques)
+        self.torques = None
+        self.arrivals.clear()
+
+    @property
     def is_heard(self) -> bool:
         """Whether somebody receives what this node commands."""
         return self.torques is not None and self.torques.get_subscription_count() > 0
@@ -119,15 +129,22 @@ class DriverNode(ClimberNode):
             trial.stop(f"{', '.join(others)} publishes wheel_torques")
         elif not self.is_heard:
             trial.stop("nobody receives wheel_torques")
-        patience = PATIENT if self.use_sim_time else SILENT
-        if time.monotonic_ns() - self.heard_at > patience * SECOND:
-            trial.stop(f"no odometry for {patience:g} s")
+        silent = (time.monotonic_ns() - self.heard_at) / SECOND
+        if silent > PATIENT:
+            trial.stop(f"no odometry for {PATIENT:g} s")
+        elif silent > SILENT and not self.use_sim_time:
+            self.release()
 
-    def let_go(self) -> None:
-        """Command no torque, as the last word."""
+    def release(self) -> None:
+        """Command no torque."""
         if self.torques is not None and self.trial is not None:
             stamp = reading.nanoseconds(self.arrivals[-1].message.header.stamp)
             self.torques.publish(self.message(np.zeros(2), stamp))
+
+    def let_go(self) -> None:
+        """Command no torque, as the last word."""
+        self.release()
+        if self.torques is not None:
             self.torques.wait_for_all_acked(Duration(seconds=1.0))
 
     def evidence(self) -> Evidence:

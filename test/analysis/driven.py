@@ -67,23 +67,34 @@ def evidence(arrivals, trial=None, graph=ALONE, **others):
     return Evidence(CLIMBER, graph=graph, arrivals=arrivals, trial=trial, **given)
 
 
-def tried(wheels, climber=CLIMBER, law=None, sensors=None, late=0, start=START, bounds=None):
-    """Trial of a driver whose wheels get `wheels` (2, 2) times the torques, `late` periods late."""
+def tried(
+    wheels, climber=CLIMBER, law=None, sensors=None, late=0, start=START, bounds=None, stall=None
+):
+    """Trial of a driver whose wheels get `wheels` (2, 2) times the torques, `late` periods late.
+
+    In the range of messages `stall` nothing is heard until its end, and the last torque acts on.
+    """
     contact = Contact() if law is None else Contact(friction=law)
     parts = Parts(Plant(climber, PERIOD / 2, contact), Motors(), sensors or Sensors(), Physics())
     machine = Machine(parts, start, PERIOD)
     heard, coming, trial = [], [np.zeros(2)] * late, None
+    missed = []
     for number in range(4000):
         _, state = machine.odometer.latest()
         stamp = SECOND + number * 5_000_000
         twist = state.forward_speed, state.side_slip, state.yaw_rate
         heard.append(arrived(odometry(state.pose, twist, stamp)))
         if number == 50:
-            trial = Trial(CLIMBER, bounds or Bounds(), heard, PERIOD, with_silence=False)
-        torques = trial.torques(stamp, stamp, state) if trial else np.zeros(2)
+            trial = Trial(CLIMBER, bounds or Bounds(), heard, PERIOD, stall is not None)
+        missed.append((stamp, state))
+        if stall is None or number not in stall:
+            torques = np.zeros(2)
+            for past, at in missed if trial else ():
+                torques = trial.torques(past, stamp, at)
+            missed.clear()
         if trial is not None and trial.stage is None:
             break
-        coming.append(np.array(wheels) @ torques)
+        coming.append(np.array(wheels) @ (np.zeros(2) if torques is None else torques))
         acting = coming.pop(0)
         for _ in range(2):
             machine.advance(acting)

@@ -78,6 +78,15 @@ def test_a_trial_stays_within_its_torque_and_ends_at_rest_where_it_began():
     assert list(seen.trial.commands[-1].torques) == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("begin", range(60, 400, 34))
+def test_a_pulse_in_which_a_busy_machine_missed_something_is_tried_again(begin):
+    seen = tried(RIGHT, stall=range(begin, begin + 20))
+    assert seen.trial.trouble == ""
+    assert np.diag(response_of(seen).gains) == pytest.approx([1.0, 1.0], rel=0.02)
+    assert reacting.watchdog(seen).verdict is Verdict.PASS
+    assert np.ptp(seen.motion.pose[:, 2]) < 0.6
+
+
 def test_a_trial_ends_at_its_bounds():
     seen = tried(RIGHT, bounds=Bounds(max_turn=0.05))
     assert "more than max_turn" in seen.trial.trouble

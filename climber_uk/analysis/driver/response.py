@@ -74,7 +74,7 @@ class Response:
 
 def respond(motion: Motion, trial: Trial, climber: Climber) -> Response:
     """Response that explains the pulses, with the delay that explains them best."""
-    at_rest = motion.stamp < trial.pulses[0].begin
+    at_rest = motion.stamp < trial.commands[0].time
     noise = np.std(motion.reaction[at_rest], axis=0) if at_rest.sum() > 1 else np.zeros(2)
     still = np.array([thresholds.STANDING_SPEED, thresholds.STANDING_RATE]) / 2
     floor = np.maximum(still, thresholds.NOISES * noise)
