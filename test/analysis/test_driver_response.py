@@ -78,7 +78,7 @@ def test_a_trial_stays_within_its_torque_and_ends_at_rest_where_it_began():
     assert list(seen.trial.commands[-1].torques) == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("begin", range(60, 400, 34))
+@pytest.mark.parametrize("begin", range(60, 400, 68))
 def test_a_pulse_in_which_a_busy_machine_missed_something_is_tried_again(begin):
     seen = tried(RIGHT, stall=range(begin, begin + 20))
     assert seen.trial.trouble == ""

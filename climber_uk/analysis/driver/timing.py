@@ -32,7 +32,8 @@ def rate(seen: Evidence) -> Finding:
 def jitter(seen: Evidence) -> Finding:
     """Odometry is measured evenly, by its stamps; how evenly it comes is the machine's affair."""
     steps = np.diff(np.unique(seen.stamps))
-    period = float(np.mean(steps))
+    # neither a gap nor two kinds of steps shall decide
+    period = float(np.mean(np.sort(steps)[len(steps) // 20 : -(len(steps) // 20) or None]))
     uneven = float(np.median(np.abs(steps.astype(float) - period))) / period
     gaps = np.diff([arrival.wall for arrival in seen.arrivals]) / SECOND
     late = float(np.median(np.abs(gaps - np.median(gaps))))
