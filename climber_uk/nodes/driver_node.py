@@ -19,7 +19,7 @@ from climber_uk.messages import reading, writing
 from climber_uk.nodes.driver_graph import graph, others_commanding
 from climber_uk.nodes.running import BEST_EFFORT, ClimberNode
 
-MANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+MANY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 SILENT, PATIENT = 0.5, 5.0  # [s] without odometry: no torque more; no trial more
 RECENT = 100  # messages that tell the period
 

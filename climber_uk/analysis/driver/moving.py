@@ -38,6 +38,10 @@ def ways(motion: Motion) -> Ways:
     gone = np.vstack([np.zeros((1, 3)), gone])
     block = max(1, round(thresholds.BLOCK / float(np.median(steps))))
     whole = len(gone) // block * block
+    # what was not heard was not integrated
+    gaps = np.append(np.greater(steps, thresholds.GAP * float(np.median(steps))), False)
+    deaf = gaps[:whole].reshape(-1, block).any(axis=1)
+    heard = ~(deaf[1:] | deaf[:-1])
     # means over blocks, of both alike: noise averages out
     places = motion.pose[:whole].reshape(-1, block, 3).mean(axis=1)
     by_twist, by_pose = (
@@ -48,7 +52,8 @@ def ways(motion: Motion) -> Ways:
     cosine, sine = np.cos(middle), np.sin(middle)
     x, y = by_pose[:, 0], by_pose[:, 1]
     in_body = np.stack([x * cosine + y * sine, y * cosine - x * sine], axis=-1)
-    return Ways(by_pose[:, 2], by_twist[:, 2], by_pose[:, :2], in_body, by_twist[:, :2])
+    all_ways = by_pose[:, 2], by_twist[:, 2], by_pose[:, :2], in_body, by_twist[:, :2]
+    return Ways(*(way[heard] for way in all_ways))
 
 
 def span(steps: Array) -> float:

@@ -15,8 +15,8 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import clipped, wrapped
 
-GOALS = np.array([0.05, 0.4])  # [m/s], [rad/s] at which torques fall again: some 1 cm, 0.1 rad
-PLACES = np.array([0.01, 0.1])  # [m], [rad] at which they do if no speed is told
+GOALS = np.array([0.05, 0.2])  # [m/s], [rad/s] at which torques fall again: some 1 cm, 0.1 rad
+PLACES = np.array([0.01, 0.05])  # [m], [rad] at which they do if no speed is told
 # [s] from the first motion to those goals, by the model: friction helps to stop a drive
 RISE_TIMES = 0.06, 0.1
 RISE_PERIODS = 4.0  # and at least so many odometry messages
@@ -59,7 +59,7 @@ class Pulse:
         self.damping = float(needed[channel]) / max(DAMPING_TIME, RISE_PERIODS * period)
         self.longest_step, self.last = 2 * period, 0.0
         self.start: State | None = None
-        self.rested_at: float | None = None
+        self.rests, self.rested_at = False, 0.0
         self.top = self.level = self.highest = 0.0
         self.reacts, self.sign = int(turns), sign  # which speed reacts, and which way
         self.falls = self.done = False
@@ -70,7 +70,7 @@ class Pulse:
         # what was missed is not made up for: nobody saw what the torque did meanwhile
         step, self.last = min(time - self.last, self.longest_step), time
         shares = np.array([float(state.forward_speed), float(state.yaw_rate)]) / self.goals
-        if self.rested_at is not None:
+        if self.rests:
             level = self.rest(shares)
         elif self.falls:
             level = self.fall(shares, step)
@@ -103,14 +103,14 @@ class Pulse:
     def finish(self) -> None:
         """Do nothing more but damp what motion there is."""
         self.top = max(self.top, abs(self.level))
-        if self.rested_at is None:
-            self.rested_at = self.last
+        self.rests = True
 
     def rest(self, shares: Array) -> float:
         """Level that takes away what motion is left, little by little."""
         self.finish()
+        self.rested_at = self.rested_at or self.last
         at_rest = bool(np.abs(shares).max() < AT_REST)
-        self.done = at_rest or self.last - (self.rested_at or 0.0) > REST_TIME
+        self.done = at_rest or self.last - self.rested_at > REST_TIME
         level = -self.sign * float(shares[self.reacts]) * self.damping
         return 0.0 if self.done else clipped(level, -self.top, self.top)
 

@@ -17,6 +17,7 @@ REACTION, LATE_REACTION = 0.02, 0.1  # [s]: what the controller was tried with, 
 MOVED, TURNED = 0.005, 0.01  # [m], [rad] from which on a motion says something
 BLOCK = 0.05  # [s] over which speeds are compared with ways, as single steps are mostly noise
 RATIO_OFF, RATIO_WRONG = 0.1, 0.25  # of way and speed: rounding and noise; a wrong unit or radius
+GAP = 4.0  # periods from which on messages were lost, and with them what twist said
 TELLING = 0.2  # of the largest way of all blocks: the others are mostly noise
 NOTHING = 5e-4  # of the pose's way: less than a speed would be that is in km/s
 UNIT_OFF = 0.2  # by which a wrong unit may be missed, of 57.3

@@ -16,7 +16,7 @@ from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 
-RECENT = 20  # messages that tell whether it stands, and how old they usually are
+RECENT = 20  # messages that tell whether it stands
 ORDER = True, False, False, True  # whether each pulse turns
 LATE = (
     0.02  # [s] or periods of odometry, whichever is more, that odometry may come later than usual
@@ -62,7 +62,7 @@ class Trial:
         self.on_wall_clock = on_wall_clock
         self.limit = bounds.torque_share * climber.max_wheel_torque
         self.late = round(max(LATE, LATE_PERIODS * period) * SECOND)
-        ages = [a.wall - reading.nanoseconds(a.message.header.stamp) for a in heard[-RECENT:]]
+        ages = [a.wall - reading.nanoseconds(a.message.header.stamp) for a in heard]
         self.usual_age = float(np.median(ages))  # [ns]
         self.commands: list[Command] = []
         self.pulses: list[evidence.Pulse] = []
