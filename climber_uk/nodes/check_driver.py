@@ -107,10 +107,11 @@ def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None
         if node.simulated_for == 0:  # in lock-step, and nobody answers
             node.speak()
     duration = options.duration
-    spin.until(lambda: node.simulated_for > duration or node.disturbs, duration)
+    longest = max(duration, PATIENCE / 2) if node.has_clock() else duration
+    spin.until(lambda: node.simulated_for > duration or node.disturbs, longest)
     if node.disturbs:
         node.hush()
-        spin.until(lambda: node.simulated_for > duration, duration)
+        spin.until(lambda: node.simulated_for > duration, longest)
 
 
 def move(node: DriverNode, spin: Spinner) -> None:

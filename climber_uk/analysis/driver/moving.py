@@ -39,8 +39,8 @@ def ways(motion: Motion) -> Ways:
     block = max(1, round(thresholds.BLOCK / float(np.median(steps))))
     whole = len(gone) // block * block
     # what was not heard was not integrated
-    gaps = np.append(np.greater(steps, thresholds.GAP * float(np.median(steps))), False)
-    deaf = gaps[:whole].reshape(-1, block).any(axis=1)
+    gaps = np.append(steps > thresholds.GAP * np.median(steps), False)
+    deaf: Any = gaps[:whole].reshape(-1, block).any(axis=1)
     heard = ~(deaf[1:] | deaf[:-1])
     # means over blocks, of both alike: noise averages out
     places = motion.pose[:whole].reshape(-1, block, 3).mean(axis=1)
