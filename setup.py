@@ -41,6 +41,7 @@ setup(
                 "markers": "nodes.markers",
                 "record_bag": "nodes.record_bag",
                 "run_demo": "nodes.run_demo",
+                "check_driver": "nodes.check_driver",
                 "analyze_bag": "analysis.analyze_bag",
                 "reproduce_paper": "analysis.reproduce_paper",
             }.items()

@@ -9,6 +9,7 @@ from typing import Any
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from climber_uk.nodes.driver_node import DriverNode
 from climber_uk.nodes.markers import Markers
 from climber_uk.nodes.plant_simulator import PlantSimulator
 from climber_uk.nodes.running import ClimberNode
@@ -20,6 +21,7 @@ NODES: list[Callable[[], ClimberNode]] = [
     UkTorqueController,
     PlantSimulator,
     Markers,
+    DriverNode,
 ]
 EVERY_NODE = ("/rosout", "/parameter_events", "_type_description", "_parameters", "parameter_types")
 

@@ -58,9 +58,13 @@ class World:
 
     def start(self, name, *arguments):
         """Start an executable of the package; its output is `log(name)`."""
+        return self.run(name, *command(name), *arguments)
+
+    def run(self, name, *words):
+        """Start a command; its output is `log(name)`."""
         with (self.directory / f"{name}.log").open("wb") as log:
             self.processes[name] = subprocess.Popen(
-                [*command(name), *arguments],
+                words,
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 env=self.environment,

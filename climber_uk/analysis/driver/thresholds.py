@@ -1,0 +1,37 @@
+"""Where a driver passes, and where it fails; each with its reason.
+
+What the machine that listens can spoil is judged by medians, so that a busy one fails no driver.
+"""
+
+# Time
+SLOWEST, FASTEST = 20.0, 1000.0  # [Hz] of odometry: beyond, the controller was never tried
+RATE_OFF = 1.25  # times `control_period`, which the controller takes for the first few messages
+UNEVEN, VERY_UNEVEN = 0.1, 0.5  # typical error of a step of the stamps, in steps
+OLD = 0.5  # of `odometry_timeout`, at which the controller refuses an odometry
+AHEAD = 0.02  # [s] of the clock: two computers synchronised by NTP, or a tick of /clock
+NEAREST_CLOCK = 10.0  # [s] from a clock that may be meant by a stamp; clocks are further apart
+FEWEST = 5  # messages that tell anything
+REACTION, LATE_REACTION = 0.02, 0.1  # [s]: what the controller was tried with, and its timeout
+
+# Motion
+MOVED, TURNED = 0.005, 0.01  # [m], [rad] from which on a motion says something
+BLOCK = 0.05  # [s] over which speeds are compared with ways, as single steps are mostly noise
+RATIO_OFF, RATIO_WRONG = 0.1, 0.25  # of way and speed: rounding and noise; a wrong unit or radius
+GAP = 4.0  # periods from which on messages were lost, and with them what twist said
+TELLING = 0.2  # of the largest way of all blocks: the others are mostly noise
+NOTHING = 5e-4  # of the pose's way: less than a speed would be that is in km/s
+UNIT_OFF = 0.2  # by which a wrong unit may be missed, of 57.3
+SAME_FRAME = 0.05  # of the way: too small a difference to tell body from wall
+SLIP, MUCH_SLIP = 0.02, 0.1  # sideways, of the speed: noise; a wheel that slides or is misaligned
+
+# Reaction to torques
+STANDING_SPEED, STANDING_RATE = 0.02, 0.05  # [m/s], [rad/s] that still are rest
+NOISES = 5.0  # standard deviations at rest that are no motion
+MOVING = 0.2  # of the highest speed: where friction surely slides
+LIKENESS = 0.9  # cosine of a reaction and the one it is taken for
+GAIN_OFF, GAIN_WRONG = (
+    1.2,
+    1.5,
+)  # times the model's: the controller learns the first, docs/control.md
+STILL_PUSHED = 0.5  # of the acceleration that a torque gave while it was commanded
+LONGEST_DELAY = 0.2  # [s] that is looked for
