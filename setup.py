@@ -23,7 +23,7 @@ setup(
         # rclpy and the messages, where no ROS installation brings them
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
-        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib"],
+        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis"],
     },
     zip_safe=False,
@@ -42,6 +42,7 @@ setup(
                 "record_bag": "nodes.record_bag",
                 "run_demo": "nodes.run_demo",
                 "analyze_bag": "analysis.analyze_bag",
+                "compare_bags": "analysis.compare_bags",
                 "reproduce_paper": "analysis.reproduce_paper",
             }.items()
         ]
