@@ -11,5 +11,5 @@ def main() -> None:
     parser = reporting.parser("analyze_bag", __doc__)
     parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
     options = parser.parse_args()
-    title = f"Run of {options.bag.absolute().name}"
+    title = f"Run {'/'.join(options.bag.absolute().parts[-2:])}"
     sys.exit(reporting.report("analyze_bag", title, [options.bag], options))

@@ -15,7 +15,7 @@ class Event:
     """Something that a node told."""
 
     arrival: int  # log time [ns]
-    stamp: int  # [ns], 0 if there is none on the clock of the node
+    stamp: int | None  # [ns]
     node: str
     kind: str  # mode, state or log
     level: int
@@ -46,7 +46,7 @@ def warnings(batch: Batch) -> Iterator[Event]:
     node = "/" + batch.strings["name"].replace(".", "/")
     for arrival, level in zip(batch.log_times.tolist(), batch["level"], strict=True):
         if int(level) in LOG_LEVELS:
-            yield Event(arrival, 0, node, "log", LOG_LEVELS[int(level)], batch.strings["msg"])
+            yield Event(arrival, None, node, "log", LOG_LEVELS[int(level)], batch.strings["msg"])
 
 
 def changes(events: Iterable[Event]) -> list[Event]:

@@ -11,6 +11,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 
 from climber_uk.analysis import topics
 from climber_uk.analysis.events import ERROR, OK
@@ -85,6 +86,10 @@ def _curves(title: str, labels: Sequence[str], drawn: Sequence[tuple[str, Curves
         for name, (time, values) in drawn:
             axes.plot(*thinned(time, values[:, i]), label=name)
         axes.set_ylabel(labels[i])
+        if "margin" in labels[i] or "latency" in labels[i]:  # which are ratios, or have outliers
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(LogFormatter())
+            axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
     grid[0, 0].set_title(title)
     grid[-1, 0].set_xlabel("time [s]")
     if len(drawn) > 1:

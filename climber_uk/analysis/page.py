@@ -1,26 +1,23 @@
 """Runs as one page of HTML that needs nothing but itself: no network, no other file."""
 
 import math
+import re
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from html import escape
 from string import Template
 
 from climber_uk.analysis.events import ERROR, OK, WARNING
-from climber_uk.analysis.tables import UNKNOWN, Column, groups, unknown
+from climber_uk.analysis.tables import Column, groups, ratio_heads, unknown
 from climber_uk.mechanics.contact import Alarm
+from climber_uk.mechanics.preview import SECOND
 
 MOST_EVENTS = 200  # of a run
+STOPS = {0.0: "no stop", 1.0: "1 stop"}
+CODE = re.compile("`([^`]*)`")
 LEVELS = {OK: "ok", WARNING: "warning", ERROR: "error"}
-TITLES = {
-    "path": "Path",
-    "errors": "Errors",
-    "torques": "Torques",
-    "constraint_force": "Constraint force",
-    "margins": "Margins",
-    "latency": "Latency",
-    "modes": "Safety",
-}
+TIME_LINE = "modes"
 
 
 def page(title: str, columns: Sequence[Column], figures: Mapping[str, bytes]) -> str:
@@ -29,7 +26,8 @@ def page(title: str, columns: Sequence[Column], figures: Mapping[str, bytes]) ->
         title=escape(title),
         summaries="".join(map(_summary, columns)),
         losses="".join(map(_losses, columns)),
-        figures="".join(_figure(TITLES[name], image) for name, image in figures.items()),
+        modes="".join(_figure(name, figures[name]) for name in figures if name == TIME_LINE),
+        figures="".join(_figure(name, figures[name]) for name in figures if name != TIME_LINE),
         events="".join(map(_events, columns)),
         table=_table(columns),
         unknown=escape(", ".join(unknown(columns)) or "none"),
@@ -43,7 +41,11 @@ def _summary(column: Column) -> str:
         for name, main, note, level in _tiles(column)
     )
     run = column.case.run
-    about = f"{column.shown('duration')}, {len(run.time)} odometry messages, from {column.bag}"
+    recorded = datetime.fromtimestamp(run.odometry.arrivals[0] // SECOND, UTC)
+    about = (
+        f"{column.shown('duration')} with {len(run.time)} odometry messages, recorded on "
+        f"{recorded:%Y-%m-%d at %H:%M:%S} UTC: {column.bag}"
+    )
     return (
         f'<h2>{escape(column.label)}</h2><p class="about">{escape(about)}</p>'
         f'<div class="tiles">{tiles}</div>'
@@ -53,15 +55,14 @@ def _summary(column: Column) -> str:
 def _tiles(column: Column) -> Iterable[tuple[str, str, str, int]]:
     """Name, what matters most, what else does, and how bad it is."""
     values, shown = column.values, column.shown
-    tracks = math.isfinite(values["rms_distance"])
-    yield (
-        "Tracking",
-        f"{shown('rms_distance')} RMS" if tracks else "no reference",
-        f"at most {shown('max_distance')}; settled after {shown('settling_time')}"
-        if tracks
-        else "",
-        OK,
-    )
+    settled = f"settled after {shown('settling_time')}"
+    if math.isnan(values["settling_time"]):
+        settled = "not settled"
+    if math.isnan(values["rms_distance"]):
+        yield "Tracking", "no reference", "", OK
+    else:
+        most = shown("max_distance")
+        yield "Tracking", f"{shown('rms_distance')} RMS", f"at most {most}; {settled}", OK
     yield (
         "Motors",
         f"{shown('peak_torque')} peak",
@@ -78,7 +79,7 @@ def _tiles(column: Column) -> Iterable[tuple[str, str, str, int]]:
     stops = values["safety_stops"]
     yield (
         "Safety",
-        UNKNOWN if math.isnan(stops) else "no stop" if stops == 0 else f"{stops:.0f} stops",
+        STOPS.get(stops, f"{shown('safety_stops')} stops"),
         f"followed {shown('following')} of the time; {shown('errors')} errors of nodes",
         ERROR if stops > 0 or values["errors"] > 0 else OK,
     )
@@ -98,9 +99,9 @@ def _losses(column: Column) -> str:
     return f'<div class="losses"><h3>Not read of {escape(column.bag)}</h3><ul>{items}</ul></div>'
 
 
-def _figure(title: str, image: bytes) -> str:
+def _figure(name: str, image: bytes) -> str:
     data = b64encode(image).decode()
-    return f'<img alt="{title}" src="data:image/png;base64,{data}">'
+    return f'<img alt="{name}" src="data:image/png;base64,{data}">'
 
 
 def _events(column: Column) -> str:
@@ -121,18 +122,20 @@ def _events(column: Column) -> str:
 
 def _table(columns: Sequence[Column]) -> str:
     labels = [column.label for column in columns]
-    heads = [*labels, "", *(f"{label} / {labels[0]}" for label in labels[1:])]
-    parts = [f"<tr><th></th>{''.join(f'<th>{escape(head)}</th>' for head in heads)}</tr>"]
+    heads = [*labels, "", *ratio_heads(columns)]
+    cells = "".join(f'<th class="number">{escape(head)}</th>' for head in heads)
+    parts = [f"<tr><th></th>{cells}</tr>"] if len(columns) > 1 else []
     for title, rows in groups(columns):
-        parts += (
-            [f'<tr class="group"><td colspan="{len(heads) + 1}">{title}</td></tr>'] if rows else []
-        )
+        parts.append(f'<tr class="group"><td colspan="{len(heads) + 1}">{title}</td></tr>')
         for row in rows:
-            numbers = (*row.cells, row.unit, *row.ratios)
-            cells = "".join(f'<td class="number">{cell}</td>' for cell in numbers)
+            numbers, ratios = (
+                "".join(f'<td class="number">{cell}</td>' for cell in cells)
+                for cells in (row.cells, row.ratios)
+            )
+            meaning = CODE.sub(r"<code>\1</code>", escape(row.metric.definition))
             parts.append(
-                f"<tr><td><code>{row.metric.name}</code>"
-                f"<small>{escape(row.metric.definition)}</small></td>{cells}</tr>"
+                f"<tr><td><code>{row.metric.name}</code><small>{meaning}</small></td>"
+                f"{numbers}<td>{row.unit}</td>{ratios}</tr>"
             )
     return f"<table>{''.join(parts)}</table>"
 
@@ -162,8 +165,8 @@ h3 { font-size: 1em; margin: 0.8em 0 0.3em; }
 img { display: block; width: 100%; max-width: 990px; margin: 1em 0; }
 table { border-collapse: collapse; width: 100%; }
 td, th { padding: 3px 8px; border-bottom: 1px solid #eee; text-align: left; vertical-align: top; }
-th { overflow-wrap: anywhere; }
-.number { font-variant-numeric: tabular-nums; white-space: nowrap; text-align: right; }
+.number { font-variant-numeric: tabular-nums; text-align: right; }
+td.number { white-space: nowrap; }
 .group td { font-weight: bold; background: #f0f2f4; }
 small { display: block; }
 tr.warning td:first-child { border-left: 4px solid #e0a000; }
@@ -175,10 +178,11 @@ tr.ok td:first-child { border-left: 4px solid #2a9d4a; }
 <h1>$title</h1>
 $summaries
 $losses
+<h2>What happened when</h2>
+$modes
+$events
 <h2>Figures</h2>
 $figures
-<h2>What happened when</h2>
-$events
 <h2>Metrics</h2>
 $table
 <p class="about">Not known from what was recorded: $unknown.</p>

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -202,6 +203,7 @@ def _run(
     }
     commands = recorded[topics.TORQUES]
     own = [event for event in told if events.is_of(event, namespace)]
+    news = [(_seconds(e, whole, int(odometry.stamps[0])), e) for e in events.changes(own)]
     return RecordedRun(
         name=namespace,
         start=int(odometry.stamps[0]),
@@ -209,10 +211,7 @@ def _run(
         reference=reference,
         commands=commands.where(np.isin(commands.stamps, odometry.stamps)),
         recorded=recorded,
-        events=[
-            (_seconds(event, whole, int(odometry.stamps[0])), event)
-            for event in events.changes(own)
-        ],
+        events=sorted(news, key=itemgetter(0)),
         is_diagnosed=any(event.kind == "state" for event in own),
         climber=found.climber,
     )
@@ -222,8 +221,9 @@ def _seconds(event: Event, odometry: Recorded, start: int) -> float:
     """Time of an event [s]: its stamp, if it is of the odometry's clock, else by its arrival."""
     stamps, arrivals = odometry.stamps, odometry.arrivals
     tolerance = TOLERANCE * SECOND
-    if stamps[0] - tolerance <= event.stamp <= stamps[-1] + tolerance:
-        return (event.stamp - start) / SECOND
+    stamp = event.stamp
+    if stamp is not None and stamps[0] - tolerance <= stamp <= stamps[-1] + tolerance:
+        return (stamp - start) / SECOND
     i = int(np.clip(np.searchsorted(arrivals, event.arrival), 1, len(stamps)) - 1)
     return (int(stamps[i]) - start + event.arrival - int(arrivals[i])) / SECOND
 

@@ -91,14 +91,15 @@ def report(command: str, title: str, bags: Sequence[Path], options: Namespace) -
 
 
 def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
-    names, columns = Topics.parse(options.remap), []
+    names = Topics.parse(options.remap)
+    columns: list[Column] = []
     for bag, said in zip(bags, _short(bags), strict=True):
         runs, losses = read_runs(bag, names, options.namespace)
         for run in runs:
-            parts = [said] if len(bags) > 1 or not run.name else []
-            parts += [run.name] if run.name else []
+            parts = [part for part in (said, run.name) if part] or ["climber"]
             case = Case(run, _climber(options.params, run), options.settled)
-            columns.append(Column("/".join(parts), str(bag), case, losses))
+            base = columns[0] if columns and len(bags) > 1 else None
+            columns.append(Column("/".join(parts), str(bag), case, losses, base))
     return columns
 
 
@@ -110,7 +111,9 @@ def _climber(file: Path | None, run: RecordedRun) -> Climber | None:
 
 
 def _short(bags: Sequence[Path]) -> list[str]:
-    """The last parts of paths, as many as it takes to tell them from each other."""
+    """The last parts of paths, as many as it takes to tell them from each other; of one none."""
+    if len(bags) == 1:
+        return [""]
     paths = [bag.absolute().parts for bag in bags]
     for count in range(1, max(map(len, paths))):
         names = ["/".join(parts[-count:]) for parts in paths]

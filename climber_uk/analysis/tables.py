@@ -21,7 +21,8 @@ class Column:
     label: str
     bag: str
     case: Case
-    losses: Sequence[str]  # what of the bag could not be read
+    losses: Sequence[str] = ()  # what of the bag could not be read
+    base: "Column | None" = None  # to which ratios are told
 
     @cached_property
     def values(self) -> dict[str, float]:
@@ -41,7 +42,7 @@ class Row:
     metric: Metric
     unit: str
     cells: Sequence[str]
-    ratios: Sequence[str]  # of the second and later columns to the first
+    ratios: Sequence[str]  # of the columns that have a base
 
 
 def number(value: float, digits: int = 6) -> str:
@@ -49,54 +50,52 @@ def number(value: float, digits: int = 6) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else UNKNOWN
 
 
-def ratio(value: float, first: float) -> float:
-    """How many times `first` it is; nan if that cannot be said."""
-    return value / first if first else math.nan
-
-
 def groups(columns: Sequence[Column]) -> Iterator[tuple[str, list[Row]]]:
     """Titles and rows, without metrics that no run has."""
     for title, metrics in GROUPS.items():
-        rows = [
-            _row(metric, [column.values[metric.name] for column in columns]) for metric in metrics
-        ]
-        yield title, [row for row in rows if set(row.cells) != {UNKNOWN}]
+        rows = [_row(metric, columns) for metric in metrics]
+        if known := [row for row in rows if set(row.cells) != {UNKNOWN}]:
+            yield title, known
 
 
-def _row(metric: Metric, values: Sequence[float]) -> Row:
+def _row(metric: Metric, columns: Sequence[Column]) -> Row:
+    values = [column.values[metric.name] for column in columns]
     factor, unit = prefix(values, metric.unit)
-    first, *others = values
+    bases = [column.base.values[metric.name] if column.base else None for column in columns]
     return Row(
         metric,
         unit,
         [number(factor * value) for value in values],
-        [number(ratio(value, first), 4) for value in others],
+        [
+            number(value / base if base else math.nan, 4)
+            for value, base in zip(values, bases, strict=True)
+            if base is not None
+        ],
     )
 
 
+def ratio_heads(columns: Sequence[Column]) -> list[str]:
+    """What stands above the ratios."""
+    return [f"{column.label} / {column.base.label}" for column in columns if column.base]
+
+
 def text(columns: Sequence[Column]) -> str:
-    """The table as lines of text; with more than one column, ratios to the first."""
-    head = ["", *(column.label for column in columns), "", *_ratio_heads(columns)]
-    lines: list[list[str]] = [head] if len(columns) > 1 else []
+    """The table as lines of text."""
+    head = ["", *(column.label for column in columns), "", *ratio_heads(columns)]
+    lines: list[Sequence[str]] = [head] if len(columns) > 1 else []
     for title, rows in groups(columns):
-        lines += [[title]] if rows else []
+        lines.append([title])
         lines += [[f"  {row.metric.name}", *row.cells, row.unit, *row.ratios] for row in rows]
     widths = [max(len(line[i]) for line in lines if len(line) > i) for i in range(len(head))]
-    return "\n".join(_aligned(line, widths) for line in lines)
+    left = 0, len(columns) + 1  # name and unit
+    return "\n".join(_aligned(line, widths, left) for line in lines)
 
 
-def _aligned(line: Sequence[str], widths: Sequence[int]) -> str:
-    left = {0, len(widths) // 2 + 1}  # name and unit
-    cells = zip(line, widths, strict=False)
-    padded = [
-        cell.ljust(width) if i in left else cell.rjust(width)
-        for i, (cell, width) in enumerate(cells)
+def _aligned(line: Sequence[str], widths: Sequence[int], left: Sequence[int]) -> str:
+    cells = [
+        cell.ljust(widths[i]) if i in left else cell.rjust(widths[i]) for i, cell in enumerate(line)
     ]
-    return "  ".join(padded).rstrip()
-
-
-def _ratio_heads(columns: Sequence[Column]) -> list[str]:
-    return [f"{column.label} / {columns[0].label}" for column in columns[1:]]
+    return "  ".join(cells).rstrip()
 
 
 def unknown(columns: Sequence[Column]) -> list[str]:
