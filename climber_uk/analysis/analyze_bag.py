@@ -13,3 +13,7 @@ def main() -> None:
     options = parser.parse_args()
     title = f"Run {'/'.join(options.bag.absolute().parts[-2:])}"
     sys.exit(reporting.report("analyze_bag", title, [options.bag], options))
+
+
+if __name__ == "__main__":
+    main()

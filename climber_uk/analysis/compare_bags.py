@@ -14,3 +14,7 @@ def main() -> None:
     options = parser.parse_args()
     bags = [options.first, *options.others]
     sys.exit(reporting.report("compare_bags", "Comparison of runs", bags, options))
+
+
+if __name__ == "__main__":
+    main()

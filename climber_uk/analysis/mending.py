@@ -80,17 +80,23 @@ def _mend_sqlite3(torn: Path, mended: Path) -> None:
     for journal, copy in zip(_journals(torn), _journals(mended), strict=True):
         if journal.exists():
             shutil.copyfile(journal, copy)
-    with closing(sqlite3.connect(mended)) as database:
+    with closing(_connect(mended)) as database:
         database.execute("PRAGMA journal_mode = DELETE")  # rosbags reads nothing but the file
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if _is_short(mended):
         _copy_rows(mended)
 
 
+def _connect(database: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(database)
+    connection.execute("PRAGMA writable_schema = ON")  # else one with missing pages does not open
+    return connection
+
+
 def _copy_rows(short: Path) -> None:
     """Leave of a database the rows that come before its first missing page."""
     whole = short.with_name(f"{short.name}.whole")
-    with closing(sqlite3.connect(short)) as source, closing(sqlite3.connect(whole)) as target:
+    with closing(_connect(short)) as source, closing(_connect(whole)) as target:
         tables = source.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
         for name, definition in tables.fetchall():
             target.execute(definition)

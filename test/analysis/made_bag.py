@@ -181,16 +181,29 @@ class Made:
         made.level, made.name, made.msg = level, "uk_torque_controller", text
         self.add("/rosout", "rcl_interfaces/msg/Log", BEGAN + round(time * SECOND), made)
 
-    def write(self, path, storage="mcap"):
-        return write(path, self.messages, storage)
+    def write(self, path, storage="mcap", flush=False):
+        return write(path, self.messages, storage, flush)
 
 
-def write(path, messages, storage="mcap"):
-    """A bag of topics, types, log times and messages."""
+def write(path, messages, storage="mcap", flush=False, topics=()):
+    """A bag of topics, types, log times and messages, and of other topics without messages."""
     with BagWriter(path, storage) as writer:
+        for topic, type_name in dict(topics).items():
+            writer.add_topic(topic, type_name, [])
         for topic, type_name, log_time, made in sorted(messages, key=lambda message: message[2]):
             if topic not in writer:
                 writer.add_topic(topic, type_name, [])
             data = bytes(STORE.serialize_cdr(made, type_name))
             writer.write(topic, log_time, log_time, data)
+            if flush:
+                writer.flush()
     return path
+
+
+def a_run(n=60, **how):
+    """A run with odometry, reference and torques."""
+    made = Made(n, **how)
+    made.add_odometry()
+    made.add_reference()
+    made.add_torques()
+    return made

@@ -85,5 +85,7 @@ def prefix(values: Sequence[float], unit: str) -> tuple[float, str]:
     sizes = [abs(value) for value in values if np.isfinite(value)]
     if not sizes or unit not in PREFIXED:
         return 1.0, unit
-    size, sign = next(((size, sign) for size, sign in PREFIXES if max(sizes) >= size), (1.0, ""))
+    size, sign = next(
+        ((size, sign) for size, sign in PREFIXES if max(sizes) >= 0.999999 * size), (1.0, "")
+    )
     return 1 / size, sign + unit
