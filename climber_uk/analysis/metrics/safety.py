@@ -27,7 +27,12 @@ def errors(case: Case) -> float:
 
 
 METRICS = (
-    Metric("following", "%", "share of time in which the controller followed", following),
+    Metric(
+        "following",
+        "%",
+        "share of time in which the controller followed, by /diagnostics",
+        following,
+    ),
     Metric(
         "safety_stops",
         "",

@@ -44,11 +44,16 @@ METRICS = (
     Metric(
         "latency_p50",
         "s",
-        "half of the torques arrived at the recorder at most this long after their odometry",
+        "median time from an odometry's arrival at the recorder to that of its torques",
         lambda case: percentile(case.run.latency, 50),
     ),
-    Metric("latency_p99", "s", "99 % of them did", lambda case: percentile(case.run.latency, 99)),
-    Metric("latency_max", "s", "all of them did", lambda case: largest(case.run.latency)),
+    Metric(
+        "latency_p99",
+        "s",
+        "latency that 99 % of the torques do not exceed",
+        lambda case: percentile(case.run.latency, 99),
+    ),
+    Metric("latency_max", "s", "longest latency", lambda case: largest(case.run.latency)),
     Metric(
         "latency_jitter",
         "s",

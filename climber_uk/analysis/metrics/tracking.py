@@ -1,6 +1,7 @@
 """How well the climber followed its reference."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -23,34 +24,30 @@ QUANTITIES: dict[str, tuple[str, str, Callable[[Case], Array]]] = {
     "distance": ("m", "distance from the reference", lambda case: case.run.distance),
     "along_track": (
         "m",
-        "error along the reference's heading, positive ahead",
+        "error along the reference's heading",
         lambda case: case.run.error[:, 0],
     ),
     "cross_track": (
         "m",
-        "error across the reference's heading, positive to the left",
+        "error across the reference's heading",
         lambda case: case.run.error[:, 1],
     ),
-    "heading": ("rad", "heading less the reference's", lambda case: case.run.error[:, 2]),
+    "heading": ("rad", "heading error", lambda case: case.run.error[:, 2]),
 }
 STATISTICS: dict[str, tuple[str, Callable[[Array], float]]] = {
-    "rms": ("root mean square of the", rms),
-    "p50": (
-        "half of the odometry messages have at most this size of the",
-        lambda v: percentile(v, 50),
-    ),
-    "p95": ("95 % of them have at most this size of the", lambda v: percentile(v, 95)),
-    "p99": ("99 % of them have at most this size of the", lambda v: percentile(v, 99)),
-    "max": ("largest size of the", largest),
+    "rms": ("root mean square of the {}", rms),
+    "p50": ("median size of the {}", partial(percentile, percent=50)),
+    "p95": ("size of the {} that 95 % do not exceed", partial(percentile, percent=95)),
+    "p99": ("size of the {} that 99 % do not exceed", partial(percentile, percent=99)),
+    "max": ("largest size of the {}", largest),
 }
 
 
 def _statistic(statistic: str, quantity: str) -> Metric:
     said, evaluate = STATISTICS[statistic]
     unit, meaning, values = QUANTITIES[quantity]
-    return Metric(
-        f"{statistic}_{quantity}", unit, f"{said} {meaning}", lambda case: evaluate(values(case))
-    )
+    name = f"{statistic}_{quantity}"
+    return Metric(name, unit, said.format(meaning), lambda case: evaluate(values(case)))
 
 
 def settling_time(case: Case) -> float:
@@ -88,7 +85,7 @@ METRICS = (
     Metric(
         "settling_time",
         "s",
-        "from the start until the distance stays below 1 cm, or what `--settled` says",
+        "from the start until the distance stays below 1 cm (`--settled`); unknown if it does not",
         settling_time,
     ),
     Metric(
