@@ -163,7 +163,7 @@ def metrics() -> str:
     lines = [
         HEAD.format("Metrics"),
         "What `analyze_bag` and `compare_bags` tell of a run ([analysis.md](analysis.md)), in the "
-        "units of CSV, JSON and `--fail-if`; tables put m, µ or k before some of them, and leave "
+        "units of CSV, JSON and `--fail-if`; tables put m, µ or n before some of them, and leave "
         "out what is not known. `saturation`, `friction`, and power without `joint_states`, need "
         "the climber's parameters.",
     ]

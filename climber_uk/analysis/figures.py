@@ -22,6 +22,8 @@ from climber_uk.mechanics import Array
 Curves = tuple[Array, Array]  # times (n,) [s] and values (n, k)
 WIDTH = 9.0  # [in]
 STRETCHES = 2000  # of a curve, of each of which lowest and highest value are drawn
+MOST_POSES = 100_000  # of a path
+SHORTEST_LATENCY = 0.01  # [ms] that is drawn
 COLOURS = {OK: "tab:green", ERROR: "tab:red"}
 STYLE = {
     "axes.grid": True,
@@ -60,7 +62,7 @@ def _png(figure: Figure) -> bytes:
 def _path(runs: Runs) -> Figure:
     figure, axes = plt.subplots(figsize=(WIDTH, 5.5), layout="constrained")
     for label, run in runs:
-        step = max(1, len(run.time) // (2 * STRETCHES))
+        step = max(1, len(run.time) // MOST_POSES)
         (line,) = axes.plot(*run.pose[::step, :2].T, label=label, linewidth=1.5, zorder=3)
         axes.plot(*run.reference[::step, :2].T, color="0.75", linewidth=4, zorder=1)
         for pose, marker in ((run.pose[0], "o"), (run.pose[-1], "s")):
@@ -90,6 +92,8 @@ def _curves(title: str, labels: Sequence[str], drawn: Sequence[tuple[str, Curves
             axes.set_yscale("log")
             axes.yaxis.set_major_formatter(LogFormatter())
             axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
+        if "latency" in labels[i]:
+            axes.set_ylim(bottom=SHORTEST_LATENCY)
     grid[0, 0].set_title(title)
     grid[-1, 0].set_xlabel("time [s]")
     if len(drawn) > 1:

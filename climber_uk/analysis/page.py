@@ -28,7 +28,7 @@ def page(title: str, columns: Sequence[Column], figures: Mapping[str, bytes]) ->
         losses="".join(map(_losses, columns)),
         modes="".join(_figure(name, figures[name]) for name in figures if name == TIME_LINE),
         figures="".join(_figure(name, figures[name]) for name in figures if name != TIME_LINE),
-        events="".join(map(_events, columns)),
+        events="".join(map(_events, columns)) or "<p>Nothing was told.</p>",
         table=_table(columns),
         unknown=escape(", ".join(unknown(columns)) or "none"),
     )
@@ -38,7 +38,8 @@ def _summary(column: Column) -> str:
     tiles = "".join(
         f'<div class="tile {LEVELS[level]}"><h3>{name}</h3><b>{escape(main)}</b>'
         f"<p>{escape(note)}</p></div>"
-        for name, main, note, level in _tiles(column)
+        for name, metric, main, note, level in _tiles(column)
+        if math.isfinite(column.values[metric])
     )
     run = column.case.run
     recorded = datetime.fromtimestamp(run.odometry.arrivals[0] // SECOND, UTC)
@@ -52,33 +53,36 @@ def _summary(column: Column) -> str:
     )
 
 
-def _tiles(column: Column) -> Iterable[tuple[str, str, str, int]]:
-    """Name, what matters most, what else does, and how bad it is."""
+def _tiles(column: Column) -> Iterable[tuple[str, str, str, str, int]]:
+    """Name, metric that has to be known, what matters most, what else does, and how bad it is."""
     values, shown = column.values, column.shown
-    settled = f"settled after {shown('settling_time')}"
-    if math.isnan(values["settling_time"]):
-        settled = "not settled"
-    if math.isnan(values["rms_distance"]):
-        yield "Tracking", "no reference", "", OK
-    else:
-        most = shown("max_distance")
-        yield "Tracking", f"{shown('rms_distance')} RMS", f"at most {most}; {settled}", OK
+    is_settled = math.isfinite(values["settling_time"])
+    settled = f"settled after {shown('settling_time')}" if is_settled else "not settled"
+    yield (
+        "Tracking",
+        "rms_distance",
+        f"{shown('rms_distance')} RMS",
+        f"at most {shown('max_distance')}; {settled}",
+        OK if is_settled else WARNING,
+    )
     yield (
         "Motors",
+        "peak_torque",
         f"{shown('peak_torque')} peak",
         f"saturated {shown('saturation')} of the time; {shown('energy_per_metre')}",
         WARNING if values["saturation"] > 0 else OK,
     )
-    slip, tip = values["lowest_slip_margin"], values["lowest_tip_margin"]
     yield (
         "Hold on the wall",
+        "lowest_slip_margin",
         f"{shown('lowest_slip_margin')} slip margin",
         f"{shown('lowest_tip_margin')} tip margin; below 1 it slips, it tips",
-        Alarm().level(min(slip, tip)) if math.isfinite(slip) else OK,
+        Alarm().level(min(values["lowest_slip_margin"], values["lowest_tip_margin"])),
     )
     stops = values["safety_stops"]
     yield (
         "Safety",
+        "safety_stops",
         STOPS.get(stops, f"{shown('safety_stops')} stops"),
         f"followed {shown('following')} of the time; {shown('errors')} errors of nodes",
         ERROR if stops > 0 or values["errors"] > 0 else OK,
@@ -86,6 +90,7 @@ def _tiles(column: Column) -> Iterable[tuple[str, str, str, int]]:
     lost = values["odometry_lost"] + values["odometry_unfit"]
     yield (
         "Timing",
+        "latency_p50",
         f"{shown('latency_p50')} latency",
         f"99 %: {shown('latency_p99')}; {lost:.0f} odometry messages lost or unfit",
         WARNING if lost > 0 else OK,

@@ -32,7 +32,8 @@ class Column:
     def shown(self, name: str) -> str:
         """A metric as it reads well."""
         factor, unit = prefix([self.values[name]], METRICS[name].unit)
-        return f"{number(factor * self.values[name], 3)} {unit}".rstrip()
+        value = factor * self.values[name]
+        return f"{number(value, 3 if abs(value) < 1000 else 6)} {unit}".rstrip()
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
 NAN = float("nan")
-PREFIXED = {"m", "rad", "s", "m/s", "rad/s", "Pa"}  # units that are read with m, µ or k before them
-PREFIXES = ((1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+PREFIXED = {"m", "rad", "s", "m/s"}  # units that may have one of the prefixes
+PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
 @dataclass(frozen=True)
