@@ -1,30 +1,28 @@
 """Runs of climbers, as arrays, from the messages of a bag."""
 
-from collections import defaultdict
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from climber_uk.analysis import events, topics
-from climber_uk.analysis.bag import Bag, open_bag
-from climber_uk.analysis.batches import Batch, read_batches
+from climber_uk.analysis.bag import open_bag
+from climber_uk.analysis.collecting import Collected, collect
 from climber_uk.analysis.events import Event
-from climber_uk.analysis.reference import Points, poses_at
-from climber_uk.analysis.topics import Recorded, Topics
+from climber_uk.analysis.recorded import Recorded
+from climber_uk.analysis.reference import poses_at
+from climber_uk.analysis.taking import TAKEN
+from climber_uk.analysis.topics import Topics
 from climber_uk.control.constraints import tracking_error
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.trajectory import Reference
 
-PATIENCE = 2.0  # [s] after which progress is told
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
 
 
@@ -125,12 +123,11 @@ def read_runs(
     """
     with open_bag(path) as bag:
         chosen = [name.strip("/") for name in namespaces] or names.namespaces(bag.types)
-        collected = {namespace: _Collected() for namespace in chosen}
-        told = _collect(bag, names, collected)
+        collected, told = collect(bag, names, chosen)
         runs = []
         for namespace, found in collected.items():
-            if odometry := found.parts[topics.ODOMETRY]:
-                runs.append(_run(namespace, found, Recorded.of(odometry), told))
+            if len(odometry := Recorded.of(found.parts[topics.ODOMETRY])):
+                runs.append(_run(namespace, found, odometry, told))
             else:
                 bag.lose(f"no odometry on {names.full(topics.ODOMETRY, namespace)}")
         if not runs:
@@ -139,55 +136,8 @@ def read_runs(
         return runs, bag.losses
 
 
-class _Collected:
-    """What was read so far of one climber."""
-
-    def __init__(self) -> None:
-        self.parts: dict[str, list[tuple[Any, Any, Any]]] = defaultdict(list)
-        self.reference: list[Points] = []
-        self.climber: Climber | None = None
-
-    def take(self, name: str, batch: Batch) -> None:
-        """Take the numbers of a batch; `KeyError` or `ValueError` if it has not what it should."""
-        if name == topics.REFERENCE:
-            self.reference.append(Points.of(batch))
-        elif name == topics.PARAMETERS:
-            self.climber = climber_of(batch)
-        else:
-            self.parts[name].append((batch.stamps, batch.log_times, topics.TAKEN[name](batch)))
-
-
-def _collect(bag: Bag, names: Topics, collected: dict[str, _Collected]) -> list[Event]:
-    """Fill what is collected of each climber; return all events."""
-    takers = {
-        topic: (name, found)
-        for namespace, found in collected.items()
-        for topic, name in names.of(namespace)
-    }
-    texts = {
-        names.full(topics.DIAGNOSTICS, ""): events.statuses,
-        names.full(topics.LOG, ""): events.warnings,
-    }
-    wanted = [topic for topic in bag.types if topic in takers or topic in texts]
-    told: list[Event] = []
-    with tqdm(
-        total=bag.count(wanted), unit=" messages", delay=PATIENCE, leave=False, disable=None
-    ) as progress:
-        for topic, batch in read_batches(bag, wanted):
-            progress.update(len(batch))
-            try:
-                if topic in texts:
-                    told += texts[topic](batch)
-                else:
-                    name, found = takers[topic]
-                    found.take(name, batch)
-            except (KeyError, IndexError, ValueError) as error:
-                bag.lose(f"{topic}: messages are not what they should be ({error})")
-    return told
-
-
 def _run(
-    namespace: str, found: _Collected, odometry: Recorded, told: Collection[Event]
+    namespace: str, found: Collected, odometry: Recorded, told: Collection[Event]
 ) -> RecordedRun:
     """Run of a climber from what was collected."""
     reference = poses_at(found.reference, odometry.stamps)
@@ -199,7 +149,7 @@ def _run(
         reference = reference[first : last + 1]
     recorded = {
         name: Recorded.of(found.parts[name]).within(odometry.stamps[0], odometry.stamps[-1])
-        for name in topics.TAKEN
+        for name in TAKEN
     }
     commands = recorded[topics.TORQUES]
     own = [event for event in told if events.is_of(event, namespace)]
@@ -226,12 +176,3 @@ def _seconds(event: Event, odometry: Recorded, start: int) -> float:
         return (stamp - start) / SECOND
     i = int(np.clip(np.searchsorted(arrivals, event.arrival), 1, len(stamps)) - 1)
     return (int(stamps[i]) - start + event.arrival - int(arrivals[i])) / SECOND
-
-
-def climber_of(batch: Batch) -> Climber:
-    """Parameters of a climber, from the last of the messages with all of a node's parameters."""
-    told = {
-        batch.strings[f"new_parameters.{i}.name"]: batch[f"new_parameters.{i}.value.double_value"]
-        for i in range(batch.lengths["new_parameters"])
-    }
-    return Climber(**{field.name: float(told[field.name][-1]) for field in fields(Climber)})

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.analysis.batches import Batch
-from climber_uk.analysis.topics import heading
+from climber_uk.analysis.taking import heading
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import wrapped
 

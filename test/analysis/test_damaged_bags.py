@@ -141,6 +141,14 @@ def test_odometry_that_is_not_finite_is_left_out_and_counted(tmp_path):
     assert np.nanmax(run.distance) < 1e-9
 
 
+def test_odometry_without_a_finite_message_is_one_line(tmp_path):
+    made = Made(N)
+    made.pose[:] = math.nan
+    made.add_odometry()
+    with pytest.raises(ValueError, match=r"/bag: no odometry on /odom$"):
+        read(made.write(tmp_path / "bag"))
+
+
 def test_a_topic_of_another_type_than_it_should_have_is_said_and_left_out(tmp_path):
     made = a_run(N)
     made.messages = [m for m in made.messages if m[0] != "/wheel_torques"]

@@ -22,7 +22,7 @@ from made_bag import (
 )
 
 from climber_uk.analysis.bag_writer import BagWriter
-from climber_uk.analysis.batches import Layout
+from climber_uk.analysis.layout import Layout
 
 pytestmark = [pytest.mark.soak, pytest.mark.timeout(900)]
 
