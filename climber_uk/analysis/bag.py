@@ -125,7 +125,8 @@ def read_messages(
 ) -> Iterator[tuple[str, int, Any]]:
     """Yield topic, log time [ns] and deserialised message in the order of the log times.
 
-    `topics` selects by full names (default: all of known types). Raises as `open_bag` does.
+    `topics` selects by full names (default: all). Raises as `open_bag` does; what cannot be read,
+    or is of an unknown type, is left out.
     """
     with open_bag(path) as bag:
         for connection, log_time, message in bag.messages(bag.types if topics is None else topics):

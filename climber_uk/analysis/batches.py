@@ -17,6 +17,7 @@ from climber_uk.analysis.layout import Layout
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.preview import SECOND
 
+LATEST = 2**63 - 1  # [ns]
 CHUNK = 4096  # messages of a topic that are decoded at a time
 
 
@@ -92,7 +93,7 @@ def decode(
     if by_size.pop(0, None):
         spoilt = "it is empty"
     for size, alike in by_size.items():
-        times = np.array([log_time for log_time, _ in alike], np.int64)
+        times = np.array([min(log_time, LATEST) for log_time, _ in alike], np.int64)
         rows = np.frombuffer(b"".join(data for _, data in alike), np.uint8).reshape(-1, size)
         while len(rows):
             layout = Layout(rows[0].tobytes(), store)

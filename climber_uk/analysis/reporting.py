@@ -38,11 +38,10 @@ def parser(name: str, description: str | None) -> ArgumentParser:
     )
     made.add_argument(
         "--remap",
-        nargs="+",
-        action="extend",
+        action="append",
         default=[],
         metavar="FROM:=TO",
-        help="other names of topics, as in odom:=/robot/odom",
+        help="other name of a topic, as in odom:=/robot/odom; may be repeated",
     )
     made.add_argument(
         "--params", type=Path, help="parameter file of the nodes (default: as the bag tells them)"

@@ -17,6 +17,8 @@ from climber_uk.analysis.recorded_run import read_runs
 from climber_uk.analysis.tables import Column
 from climber_uk.analysis.topics import Topics
 
+pytestmark = pytest.mark.slow  # figures are
+
 ALONG = 0.004
 
 

@@ -114,6 +114,8 @@ def test_messages_that_are_cut_off_or_absurd_are_left_out_and_told():
     batches, spoilt = decode(recorded, "sensor_msgs/msg/JointState", STORE)
     assert spoilt
     assert [log_time for batch in batches for log_time in batch.log_times] == [0, 6]
+    (batch,), _ = decode([(2**64 - 1, whole)], "sensor_msgs/msg/JointState", STORE)
+    assert batch.log_times == [2**63 - 1]
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

@@ -56,6 +56,7 @@ def is_part_of(run, whole):
     np.testing.assert_array_equal(run.pose, whole.pose[found])
 
 
+@pytest.mark.slow
 @FUZZ
 @given(kept=st.floats(0, 1, exclude_max=True))
 def test_a_bag_cut_anywhere_gives_what_comes_before_the_cut_or_one_line(whole, kept):
@@ -75,6 +76,7 @@ def test_most_of_a_bag_is_read_up_to_the_cut(whole):
     assert len(run.time) > N / 3
 
 
+@pytest.mark.slow
 @FUZZ
 @given(
     places=st.lists(st.floats(0, 1, exclude_max=True), min_size=1, max_size=5),

@@ -4,12 +4,13 @@ import shutil
 
 import numpy as np
 import pytest
-from made_bag import ODOMETRY, SECOND, START, STORE, Made, a_run, on_circle, write
+from made_bag import ODOMETRY, SECOND, START, STORE, Made, a_run, blank, on_circle, write
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from climber_uk.analysis.recorded_run import read_run, read_runs
 from climber_uk.analysis.reference import Points, poses_at
 from climber_uk.analysis.topics import Topics
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview, joined
 
 N = 60
@@ -151,6 +152,19 @@ def test_wheels_are_told_apart_by_their_names(tmp_path):
             sent.name = ["r_right", "l_left", "arm"]
             sent.effort = np.array([1.0, 2.0, 7.0])
     assert read_run(made.write(tmp_path / "bag")).torques[0].tolist() == [1.0, 2.0]
+
+
+def test_parameters_are_those_that_the_controller_told(tmp_path):
+    made = a_run(N)
+    event = "rcl_interfaces/msg/ParameterEvent"
+    for mass in (4.0, 6.0):  # they were changed
+        told = blank(event)
+        for name, value in (vars(Climber()) | {"mass": mass, "other": 1.0}).items():
+            parameter = blank("rcl_interfaces/msg/Parameter")
+            parameter.name, parameter.value.type, parameter.value.double_value = name, 3, value
+            told.new_parameters.append(parameter)
+        made.add("uk_torque_controller/parameters", event, mass, told)
+    assert read_run(made.write(tmp_path / "bag")).climber == Climber(mass=6.0)
 
 
 def test_points_are_where_they_were_written(tmp_path):
