@@ -11,7 +11,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.analysis import topics
 from climber_uk.analysis.events import ERROR, OK
@@ -23,7 +23,8 @@ Curves = tuple[Array, Array]  # times (n,) [s] and values (n, k)
 WIDTH = 9.0  # [in]
 STRETCHES = 2000  # of a curve, of each of which lowest and highest value are drawn
 MOST_POSES = 100_000  # of a path
-SHORTEST_LATENCY = 0.01  # [ms] that is drawn
+RATIO = None, (1, 2, 5)
+LOGARITHMIC = {"slip margin": RATIO, "tip margin": RATIO, "latency [ms]": (0.01, (1,))}
 COLOURS = {OK: "tab:green", ERROR: "tab:red"}
 STYLE = {
     "axes.grid": True,
@@ -88,12 +89,13 @@ def _curves(title: str, labels: Sequence[str], drawn: Sequence[tuple[str, Curves
         for name, (time, values) in drawn:
             axes.plot(*thinned(time, values[:, i]), label=name)
         axes.set_ylabel(labels[i])
-        if "margin" in labels[i] or "latency" in labels[i]:  # which are ratios, or have outliers
+        if labels[i] in LOGARITHMIC and any((values[:, i] > 0).any() for _, (_, values) in drawn):
+            lowest, ticks = LOGARITHMIC[labels[i]]
             axes.set_yscale("log")
-            axes.yaxis.set_major_formatter(LogFormatter())
-            axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
-        if "latency" in labels[i]:
-            axes.set_ylim(bottom=SHORTEST_LATENCY)
+            axes.set_ylim(bottom=lowest)
+            axes.yaxis.set_major_locator(LogLocator(subs=ticks))
+            axes.yaxis.set_major_formatter("{x:g}")
+            axes.yaxis.set_minor_formatter(NullFormatter())
     grid[0, 0].set_title(title)
     grid[-1, 0].set_xlabel("time [s]")
     if len(drawn) > 1:
