@@ -32,7 +32,7 @@ def statuses(batch: Batch) -> Iterator[Event]:
             for k in range(batch.lengths[f"{place}.values"])
         }
         mode = values.get("mode")
-        levels = batch[f"{place}.level"].astype(int).tolist()
+        levels = batch[f"{place}.level"].clip(max=ERROR).astype(int).tolist()  # 3 is "stale"
         for arrival, stamp, level in zip(
             batch.log_times.tolist(), batch.stamps.tolist(), levels, strict=True
         ):

@@ -203,10 +203,11 @@ def test_modes_give_stops_and_the_share_that_was_followed(tmp_path):
     modes = (0.0, "following"), (0.5, "no odometry"), (0.6, "no odometry"), (1.0, "following")
     for time, mode in (*modes, (1.5, "the reference begins later")):
         made.add_mode(time, mode, level=2 if mode == "no odometry" else 0)
+    made.add_mode(1.9, "the reference begins later", level=3)  # stale
     made.add_log(0.5, 30, "safe output: no odometry")
     made.add_log(0.7, 20, "not worth a word")
     got = metrics_of(made, tmp_path)
-    same(got, following=50.0, safety_stops=1.0, errors=1.0)
+    same(got, following=50.0, safety_stops=1.0, errors=2.0)
     (run,), _ = read_runs(tmp_path / "bag", Topics())
     told = [(time, event.kind, event.text) for time, event in run.events]
     assert told == [
@@ -217,6 +218,7 @@ def test_modes_give_stops_and_the_share_that_was_followed(tmp_path):
         (1.0, "state", "ok"),
         (1.0, "mode", "following"),
         (1.5, "mode", "the reference begins later"),
+        (1.9, "state", "the reference begins later"),
     ]
 
 
