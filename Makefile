@@ -16,12 +16,12 @@ SET_UP := $(VENV)/set-up
 demo: $(SET_UP)
 	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
 		$(if $(CLIMBERS),--climbers $(CLIMBERS))
-	@$(BIN)/analyze_bag $(OUTPUT)/bag --figures $(OUTPUT)/figures
+	@$(BIN)/analyze_bag $(OUTPUT)/bag --params $(CONFIG) --output $(OUTPUT)
 
 paper: $(SET_UP)
 	@$(BIN)/reproduce_paper --output $(PAPER_OUTPUT)
 
-# The references of parameters, topics and services, from the nodes
+# The references of parameters, topics, services and metrics
 docs: $(SET_UP)
 	$(BIN)/python docs/generate.py
 

@@ -23,7 +23,7 @@ setup(
         # rclpy and the messages, where no ROS installation brings them
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
-        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib"],
+        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis"],
     },
     zip_safe=False,
@@ -43,6 +43,7 @@ setup(
                 "run_demo": "nodes.run_demo",
                 "check_driver": "nodes.check_driver",
                 "analyze_bag": "analysis.analyze_bag",
+                "compare_bags": "analysis.compare_bags",
                 "reproduce_paper": "analysis.reproduce_paper",
             }.items()
         ]

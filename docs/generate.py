@@ -1,4 +1,7 @@
-"""Write parameters.md and interfaces.md, from the nodes: `python docs/generate.py [DIRECTORY]`."""
+"""Write what is said in one place only: `python docs/generate.py [DIRECTORY]`.
+
+parameters.md and interfaces.md come from the nodes, metrics.md from the metrics of bags.
+"""
 
 import dataclasses
 import sys
@@ -9,6 +12,7 @@ from typing import Any
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from climber_uk.analysis.metrics import GROUPS
 from climber_uk.nodes.driver_node import DriverNode
 from climber_uk.nodes.markers import Markers
 from climber_uk.nodes.plant_simulator import PlantSimulator
@@ -156,12 +160,31 @@ def qos(profile: QoSProfile) -> str:
     return f"{'reliable' if reliable else 'best effort'}, {kept}{', latched' if latched else ''}"
 
 
+def metrics() -> str:
+    """Reference of what `analyze_bag` tells."""
+    lines = [
+        HEAD.format("Metrics"),
+        "What `analyze_bag` and `compare_bags` tell of a run ([analysis.md](analysis.md)), in the "
+        "units of CSV, JSON and `--fail-if`; tables put m, µ or n before some of them, and leave "
+        "out what is not known. `saturation`, `friction`, and power without `joint_states`, need "
+        "the climber's parameters.",
+    ]
+    for title, group in GROUPS.items():
+        lines.append(f"\n## {title}\n\n| metric | unit | definition |\n|---|---|---|")
+        lines += [f"| `{metric.name}` | {metric.unit} | {metric.definition} |" for metric in group]
+    return "\n".join(lines) + "\n"
+
+
 def documents() -> dict[str, str]:
     """Texts by file name, of nodes as they are."""
     rclpy.init()
     nodes = [make() for make in NODES]
     try:
-        return {"parameters.md": parameters(nodes), "interfaces.md": interfaces(nodes)}
+        return {
+            "parameters.md": parameters(nodes),
+            "interfaces.md": interfaces(nodes),
+            "metrics.md": metrics(),
+        }
     finally:
         for node in nodes:
             node.destroy_node()

@@ -1,25 +1,19 @@
-"""`analyze_bag BAG`: how well a recorded run tracked its reference, in numbers and pictures."""
+"""`analyze_bag BAG`: what a recorded run was like, in numbers and pictures."""
 
-import argparse
 import sys
 from pathlib import Path
 
-from climber_uk.analysis import figures, metrics
-from climber_uk.analysis.recorded_run import read_run
+from climber_uk.analysis import reporting
 
 
 def main() -> None:
-    """Print the table of a bag and write its figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("bag", type=Path, help="rosbag2 directory, MCAP or sqlite3")
-    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
-    parser.add_argument("--figures", type=Path, help="directory (default: figures in the bag)")
+    """Print the table of a bag, and write its page, CSV and JSON."""
+    parser = reporting.parser("analyze_bag", __doc__)
+    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
     options = parser.parse_args()
-    try:
-        run = read_run(options.bag, options.namespace)
-    except (ValueError, OSError) as error:
-        sys.exit(f"analyze_bag: {error}")
-    print(metrics.table(metrics.metrics(run)))
-    directory = options.figures or options.bag / "figures"
-    for path in figures.draw(run, directory):
-        print(path)
+    title = f"Run {'/'.join(options.bag.absolute().parts[-2:])}"
+    sys.exit(reporting.report("analyze_bag", title, [options.bag], options))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""Where a serialised message has its numbers.
+
+CDR puts a field where the strings and lengths before it leave it. So all messages of one type that
+have the same strings and the same lengths have their numbers in the same places.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+from rosbags.typesys.store import Typestore
+
+HEADER = 4  # bytes before the fields: how they are encoded
+FORMATS = {
+    **dict.fromkeys(("bool", "byte", "char", "uint8"), "u1"),
+    **{"int8": "i1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
+    **{"int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8"},
+}
+
+
+@dataclass
+class Layout:
+    """Where a message, and others with the same strings and lengths, has its numbers."""
+
+    data: bytes
+    store: Typestore
+    place: int = HEADER
+    fields: dict[str, tuple[Any, int]] = field(default_factory=dict)  # format and place by path
+    fixed: list[int] = field(default_factory=lambda: list(range(HEADER)))  # places of all else
+    strings: dict[str, str] = field(default_factory=dict)
+    lengths: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def order(self) -> str:
+        """Order of the bytes in a number; raises `ValueError` unless the encoding is CDR."""
+        if self.data[:2] not in (b"\0\0", b"\0\1"):
+            raise ValueError(f"encoding {self.data[:2].hex()} is not CDR")
+        return "<" if self.data[1] else ">"
+
+    @property
+    def numbers(self) -> "np.dtype[Any]":
+        """All numbers of a message as one type; raises `ValueError` if they go beyond its end."""
+        formats, places = zip(*self.fields.values(), strict=True) if self.fields else ((), ())
+        return np.dtype(
+            {
+                "names": list(self.fields),
+                "formats": list(formats),
+                "offsets": list(places),
+                "itemsize": len(self.data),
+            }
+        )
+
+    def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool]:
+        """Which of some messages (n, size) have the same strings and lengths."""
+        fits: NDArray[np.bool] = (rows[:, self.fixed] == rows[0, self.fixed]).all(axis=1)
+        return fits
+
+    def walk(self, type_name: str, path: str = "") -> None:
+        """Find the fields of a type from here on."""
+        for name, description in self.store.fielddefs[type_name][1]:
+            self._find(description, f"{path}.{name}" if path else name)
+
+    def _find(self, description: Any, path: str) -> None:
+        kind, what = description
+        if kind == Nodetype.NAME:
+            self.walk(what, path)
+        elif kind == Nodetype.BASE and what[0] == "string":
+            start, size = self._length()
+            self.strings[path] = self.data[start : start + size - 1].decode()
+            self._keep(start, size)
+        elif kind == Nodetype.BASE:
+            self._number(path, what[0])
+        else:
+            element, length = what
+            if kind == Nodetype.SEQUENCE:
+                _, length = self._length()
+                self.lengths[path] = length
+            if element[0] == Nodetype.BASE and element[1][0] != "string":
+                self._number(path, element[1][0], length)
+                return
+            for i in range(length):
+                self._find(element, f"{path}.{i}")
+
+    def _number(self, path: str, kind: str, length: int | None = None) -> None:
+        if length == 0:
+            return
+        if kind not in FORMATS:
+            raise ValueError(f"{path}: numbers of type {kind} are not read")
+        code = self.order + FORMATS[kind]
+        start = self._aligned(int(code[2:]))
+        self.fields[path] = code if length is None else (code, (length,)), start
+        self.place = start + int(code[2:]) * (1 if length is None else length)
+
+    def _length(self) -> tuple[int, int]:
+        """Place behind a length, and the length."""
+        start = self._aligned(4)
+        self._keep(start, 4)
+        length = int(np.frombuffer(self.data, f"{self.order}u4", 1, start)[0])
+        if length > len(self.data):
+            raise ValueError(f"length {length} at byte {start} goes beyond the end")
+        return self.place, length
+
+    def _keep(self, start: int, size: int) -> None:
+        self.fixed += range(start, start + size)
+        self.place = start + size
+
+    def _aligned(self, size: int) -> int:
+        return self.place + (HEADER - self.place) % size

@@ -1,0 +1,89 @@
+"""How well the climber held on to its wall, and how the wall held on to it.
+
+m Δv = ∫ (τR + τL)/r dt - m g_t ∫ sinθ dt - f ∫ σ dt        (11), integrated
+"""
+
+import numpy as np
+
+from climber_uk.analysis import topics
+from climber_uk.analysis.metrics.metric import NAN, Case, Metric, largest, lowest, share
+from climber_uk.mechanics import Array
+
+WINDOW = 0.5  # [s] over which momentum is balanced
+MOVING = 0.01  # [m/s] above which friction is that of sliding
+
+
+def friction(case: Case) -> float:
+    """Coulomb friction f [N]: least squares over windows in which it moves one way."""
+    run, climber = case.run, case.known_climber
+    if climber is None or len(run.commands) < 2:
+        return NAN
+    time, speed = run.seconds(run.commands), run.answered.values[:, 3]
+    drive, _ = climber.drive_and_turn(run.torques)
+    push = drive - climber.weight_along_wall * np.sin(run.answered.values[:, 2])
+    pushed = np.concatenate([[0.0], np.cumsum(push[:-1] * np.diff(time))])
+    ways = np.concatenate([[0], np.cumsum(np.sign(speed) * (np.abs(speed) > MOVING))])
+
+    ends = np.flatnonzero(np.diff(time // WINDOW, prepend=-1))
+    begin, end = ends[:-1], ends[1:]  # of windows, the last of which is not whole
+    lasted, way = time[end] - time[begin], (ways[end] - ways[begin]) / (end - begin)
+    chosen = (np.abs(way) == 1) & (lasted < 1.5 * WINDOW)
+    taken = pushed[end] - pushed[begin] - climber.mass * (speed[end] - speed[begin])
+    opposed = (way * lasted)[chosen]
+    return float(taken[chosen] @ opposed / (opposed @ opposed)) if chosen.any() else NAN
+
+
+def _margin(case: Case, column: int) -> Array:
+    return case.run.hold.values[:, column]
+
+
+def _pressure(case: Case) -> Array:
+    return case.run.recorded[topics.PRESSURE].values.ravel()
+
+
+METRICS = (
+    Metric(
+        "lowest_slip_margin",
+        "",
+        "grip of the wheels over what is asked of it, at worst; below 1 they slip. As the "
+        "simulator tells it, else as the controller estimates it",
+        lambda case: lowest(_margin(case, 0)),
+    ),
+    Metric(
+        "slip_share",
+        "%",
+        "share of time with a slip margin below 1",
+        lambda case: share(_margin(case, 0) < 1),
+    ),
+    Metric(
+        "lowest_tip_margin",
+        "",
+        "hold against tipping over what is asked of it, at worst; below 1 it tips",
+        lambda case: lowest(_margin(case, 1)),
+    ),
+    Metric(
+        "lowest_wheel_load",
+        "N",
+        "least load on the wheels",
+        lambda case: lowest(_margin(case, 2)),
+    ),
+    Metric(
+        "lowest_pressure",
+        "Pa",
+        "least pressure difference of the suction",
+        lambda case: lowest(_pressure(case)),
+    ),
+    Metric(
+        "max_side_slip",
+        "m/s",
+        "largest speed to a side, by the odometry",
+        lambda case: largest(case.run.side_slip),
+    ),
+    Metric(
+        "friction",
+        "N",
+        "Coulomb friction of the seal: least squares of the momentum's balance over windows of "
+        "0.5 s in which the climber moves one way; `identify` does it with care",
+        friction,
+    ),
+)

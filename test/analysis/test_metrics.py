@@ -1,0 +1,251 @@
+"""Metrics against values by hand, of bags whose errors are known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+from made_bag import RADIUS, RATE, START, Made
+
+from climber_uk.analysis.metrics import METRICS, Case, evaluate
+from climber_uk.analysis.recorded_run import read_runs
+from climber_uk.analysis.topics import Topics
+from climber_uk.mechanics.climber import GRAVITY, Climber
+
+EXACT = {"rel": 1e-9, "abs": 1e-12}
+UNITS = {"", "%", "m", "rad", "s", "m/s", "N", "N m", "W", "J", "J/m", "Pa"}
+
+
+def metrics_of(made, path, climber=None, settled=0.01):
+    (run,) = read_runs(made.write(path / "bag"), Topics())[0]
+    return evaluate(Case(run, climber, settled))
+
+
+def same(got, **expected):
+    assert {name: got[name] for name in expected} == pytest.approx(expected, **EXACT)
+
+
+def test_tracking_errors_are_those_by_hand(tmp_path):
+    """Along a ramp up to c, across b + B sin of 10 whole swings, heading h throughout."""
+    n, c, b, B, h = 400, 0.03, 0.002, 0.001, 0.004
+
+    def errors(time):
+        k = np.arange(n)
+        across = b + B * np.sin(2 * np.pi * 10 * k / n)
+        return np.stack([c * k / (n - 1), across, np.full(n, h)], axis=1)
+
+    made = Made(n, errors=errors)
+    made.add_odometry()
+    made.add_reference()
+    got = metrics_of(made, tmp_path)
+    ramp, swing = c**2 * (2 * n - 1) / (6 * (n - 1)), b**2 + B**2 / 2
+    same(
+        got,
+        rms_along_track=math.sqrt(ramp),
+        p50_along_track=c / 2,
+        p95_along_track=0.95 * c,
+        p99_along_track=0.99 * c,
+        max_along_track=c,
+        rms_cross_track=math.sqrt(swing),
+        max_cross_track=b + B,  # each swing has 40 samples, and one of them its top
+        p50_cross_track=b,
+        rms_distance=math.sqrt(ramp + swing),
+        ape_rmse=math.sqrt(ramp + swing),
+        end_distance=math.hypot(c, b + B * math.sin(-2 * np.pi * 10 / n)),
+        **{f"{statistic}_heading": h for statistic in ("rms", "p50", "p95", "p99", "max")},
+        duration=(n - 1) * 0.005,
+        travelled=RADIUS * RATE * (n - 1) * 0.005,
+    )
+    assert math.isnan(got["settling_time"])
+
+
+def test_errors_fixed_in_the_references_frame_drift_as_it_turns(tmp_path):
+    """d in a frame that turns by RATE in a second: |(R - 1) d| = 2 sin(RATE/2) |d|."""
+    a, b = 0.003, -0.004
+    made = Made(801, errors=lambda time: np.tile([a, b, 0.0], (len(time), 1)))
+    made.add_odometry()
+    made.add_reference()
+    got = metrics_of(made, tmp_path)
+    same(
+        got,
+        ape_rmse=0.005,
+        ape_mean=0.005,
+        rpe_rmse=2 * math.sin(RATE / 2) * 0.005,
+        settling_time=0.0,
+        p99_distance=0.005,
+    )
+    assert got["ape_std"] == pytest.approx(0, abs=1e-12)
+    assert got["rpe_rotation_rmse"] == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("settled", "expected"), [(0.01, 1.505), (0.002, 1.905), (0.5, 0.0)])
+def test_it_has_settled_when_the_distance_stays_small(tmp_path, settled, expected):
+    """Distance 1 cm per half a second left until 2 s."""
+    made = Made(401, errors=lambda time: np.outer(0.02 * (2 - time), [1.0, 0, 0]))
+    made.add_odometry()
+    made.add_reference()
+    got = metrics_of(made, tmp_path, settled=settled)
+    assert got["settling_time"] == pytest.approx(expected, abs=1e-9)
+
+
+def test_torques_power_and_energy_are_those_by_hand(tmp_path):
+    def torques(time, _):
+        return np.stack(
+            [1.0 + 0.5 * np.sin(2 * np.pi * 10 * np.arange(400) / 400), -2 + 0 * time], 1
+        )
+
+    made = Made(torques=torques)
+    made.add_odometry()
+    made.add_torques()
+    made.add_joints(rates=[3.0, -4.0], torques=[1.5, 2.0])
+    made.add_forces(np.tile([30.0, -40.0, 0.5], (400, 1)))
+    got = metrics_of(made, tmp_path, Climber(max_wheel_torque=1.5))
+    lasted = 399 * 0.005
+    same(
+        got,
+        rms_torque=math.sqrt((1 + 0.5**2 / 2 + 4) / 2),
+        peak_torque=2.0,
+        saturation=100.0,
+        peak_power_right=4.5,
+        mean_power_right=4.5,
+        energy_right=4.5 * lasted,
+        peak_power_left=8.0,
+        mean_power_left=-8.0,
+        energy_left=-8.0 * lasted,
+        energy_per_metre=-3.5 / (RADIUS * RATE),
+        peak_constraint_lateral=40.0,
+        rms_constraint_drive=30.0,
+        rms_constraint_moment=0.5,
+    )
+
+
+def test_without_joint_states_the_power_is_that_of_the_odometry(tmp_path):
+    made = Made(torques=lambda time, _: np.tile([1.0, 2.0], (len(time), 1)))
+    made.add_odometry()
+    made.add_torques()
+    climber = Climber()
+    got = metrics_of(made, tmp_path, climber)
+    v, turning, r = RADIUS * RATE, 0.3 * RATE, 0.027
+    same(got, peak_power_right=(v + turning) / r, mean_power_left=2 * (v - turning) / r)
+    (run,), _ = read_runs(tmp_path / "bag", Topics())
+    assert math.isnan(evaluate(Case(run))["peak_power_right"])  # the radius is not known
+
+
+def test_friction_is_what_torques_and_weight_leave_of_the_momentum(tmp_path):
+    """At a steady speed, torques that overcome weight and 12 N of friction."""
+    climber, f = Climber(), 12.0
+    weight = climber.mass * GRAVITY
+
+    def torques(_, pose):
+        return np.repeat(0.027 / 2 * (f + weight * np.sin(pose[:, 2:])), 2, axis=1)
+
+    made = Made(1000, torques=torques)
+    made.add_odometry()
+    made.add_torques()
+    same(metrics_of(made, tmp_path, climber), friction=f)
+
+
+def test_friction_of_a_climber_that_backs_is_positive_too(tmp_path):
+    climber, f = Climber(inclination=0.0), 12.0
+    made = Made(1000, torques=lambda time, _: np.full((len(time), 2), -0.027 / 2 * f), speed=-1.0)
+    made.add_odometry()
+    made.add_torques()
+    same(metrics_of(made, tmp_path, climber), friction=f)
+
+
+def test_margins_are_the_lowest_and_the_share_below_one(tmp_path):
+    made = Made()
+    made.add_odometry()
+    made.add_vectors("plant_simulator/margins", [[0.5, 7, 90], [2, 6, 80], [3, 8, 85], [4, 9, 99]])
+    made.add_vectors("uk_torque_controller/margins", [[0.1, 1, 10]])  # an estimate
+    got = metrics_of(made, tmp_path)
+    same(got, lowest_slip_margin=0.5, slip_share=25.0, lowest_tip_margin=6, lowest_wheel_load=80)
+
+
+def test_latency_and_its_jitter_are_those_by_hand(tmp_path):
+    """1.00, 1.01 … 1.99 ms, over and over."""
+    made = Made()
+    made.add_odometry()
+    made.add_torques(latency=lambda i: 1_000_000 + i % 100 * 10_000)
+    same(
+        metrics_of(made, tmp_path),
+        latency_p50=1.495e-3,
+        latency_max=1.99e-3,
+        latency_jitter=1e-5 * math.sqrt((100**2 - 1) / 12),
+        odometry_period=0.005,
+        odometry_jitter=0.0,
+    )
+
+
+def test_what_is_missing_repeated_late_or_unfit_is_counted(tmp_path):
+    made = Made(100)
+    made.pose[50, 0] = math.nan
+    made.pose[60, 1] = 1e9
+    made.add_odometry([*range(10), *range(13, 100), 20, 21])
+    made.add_torques([i for i in range(5, 95) if i not in (30, 31, 32)])
+    for i, (topic, kind, log_time, sent) in enumerate(made.messages):
+        if topic == "/odom" and sent.header.stamp.nanosec == made.stamps[80] % 10**9:
+            made.messages[i] = topic, kind, log_time + 12_000_000, sent  # after two others
+    got = metrics_of(made, tmp_path)
+    same(
+        got,
+        odometry_count=95.0,
+        odometry_lost=5.0,  # 10, 11, 12, and the two that are unfit
+        odometry_unfit=2.0,
+        odometry_repeated=2.0,
+        odometry_late=1.0,
+        odometry_unanswered=3.0,
+    )
+
+
+def test_modes_give_stops_and_the_share_that_was_followed(tmp_path):
+    made = Made(401)  # 2 s
+    made.add_odometry()
+    modes = (0.0, "following"), (0.5, "no odometry"), (0.6, "no odometry"), (1.0, "following")
+    for time, mode in (*modes, (1.5, "the reference begins later")):
+        made.add_mode(time, mode, level=2 if mode == "no odometry" else 0)
+    made.add_mode(1.9, "the reference begins later", level=3)  # stale
+    made.add_log(0.5, 30, "safe output: no odometry")
+    made.add_log(0.7, 20, "not worth a word")
+    got = metrics_of(made, tmp_path)
+    same(got, following=50.0, safety_stops=1.0, errors=2.0)
+    (run,), _ = read_runs(tmp_path / "bag", Topics())
+    told = [(time, event.kind, event.text) for time, event in run.events]
+    assert told == [
+        (0.0, "mode", "following"),
+        (0.5, "state", "no odometry"),
+        (0.5, "mode", "no odometry"),
+        (0.5, "log", "safe output: no odometry"),
+        (1.0, "state", "ok"),
+        (1.0, "mode", "following"),
+        (1.5, "mode", "the reference begins later"),
+        (1.9, "state", "the reference begins later"),
+    ]
+
+
+def test_without_a_reference_all_else_is_told(tmp_path):
+    made = Made()
+    made.add_odometry()
+    made.add_torques()
+    got = metrics_of(made, tmp_path)
+    same(got, peak_torque=1.0, duration=399 * 0.005, latency_p50=1e-3)
+    unknown = {name for name, value in got.items() if math.isnan(value)}
+    assert {"rms_distance", "rms_heading", "ape_rmse", "rpe_rmse", "settling_time"} <= unknown
+
+
+def test_where_no_preview_reaches_there_is_no_reference(tmp_path):
+    made = Made(1001)  # 5 s
+    made.add_odometry()
+    made.add_reference(0.0, 0.5)
+    made.add_reference(3.0, 4.0)
+    (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    known = np.isfinite(run.distance)
+    assert run.start == START
+    covered = (run.time <= 1.5 + 1e-9) | (run.time >= 3.0 - 1e-9)
+    assert (known == covered).all()
+    assert run.distance[known].max() < 1e-9
+
+
+def test_every_metric_has_a_unit_and_says_what_it_is():
+    for metric in METRICS.values():
+        assert metric.unit in UNITS
+        assert len(metric.definition) > 12
