@@ -42,6 +42,7 @@ setup(
                 "record_bag": "nodes.record_bag",
                 "run_demo": "nodes.run_demo",
                 "analyze_bag": "analysis.analyze_bag",
+                "identify": "analysis.identify",
                 "reproduce_paper": "analysis.reproduce_paper",
             }.items()
         ]
