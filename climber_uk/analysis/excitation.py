@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from climber_uk.analysis.identification import Identified, predicted
+from climber_uk.analysis.identification import OF_WHEELS, RESISTANCES, Identified, predicted
 from climber_uk.analysis.recorded_motion import RecordedMotion
 from climber_uk.mechanics import Array, unpack
 from climber_uk.mechanics.climber import Climber
@@ -24,7 +24,7 @@ from climber_uk.mechanics.trajectory import Trajectory
 
 PERIOD = 0.02  # [s]
 RAMPS = (0.5, 1.0, 2.0, 4.0)  # [s]
-SOUGHT = 3  # mass, inertia, friction
+SOUGHT = ~(RESISTANCES | OF_WHEELS)  # mass, inertia, friction
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def plan(climber: Climber, limits: Limits, origin: tuple[float, float] = (0.0, 0
     found = list(_plans(climber, limits, origin))
     if not found:
         raise ValueError(f"no trajectory keeps within {limits}")
-    return min(found, key=lambda one: one.tells.uncertainty[:SOUGHT].max())
+    return min(found, key=lambda one: one.tells.uncertainty[SOUGHT].max())
 
 
 def _plans(climber: Climber, limits: Limits, origin: tuple[float, float]) -> Iterator[Plan]:

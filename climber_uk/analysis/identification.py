@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from climber_uk.analysis.integral_equations import (
@@ -31,19 +30,19 @@ from climber_uk.mechanics.climber import Climber
 Choice = NDArray[np.bool_]
 UNITS = {
     "mass": "kg",
-    "yaw_inertia": "kg m²",
     "seal_friction_coefficient": "",
     "viscous_friction": "N s/m",
+    "yaw_inertia": "kg m²",
     "turning_resistance": "N m s",
     "wheel_radius": "m",
     "half_track": "m",
 }
 NAMES = tuple(UNITS)
-POSITIVE = np.array([True, True, False, False, False, True, True])
-RESISTANCES = np.array([False, False, False, True, True, False, False])  # which there need not be
+RESISTANCES = np.array([False, False, True, False, True, False, False])  # which there need not be
 OF_WHEELS = np.array([False] * 5 + [True] * 2)  # which wheel angles tell
-CUT, LEAST_WINDOWS, REFINEMENTS = Cut(), 5, 3
+CUT, LEAST_WINDOWS, REFINEMENTS, ITERATIONS = Cut(), 5, 3, 10
 CLEAR = 3.0  # standard deviations beyond which a residual counts less and less
+SPREAD = 0.05  # of the speed: least difference of speeds that shows viscous friction
 KNOWN = 0.1  # of a value, or of all that drives: the widest interval that is of use
 # [SI] of speed, way; yaw rate, heading; way; heading: noise to begin with, and a tenth of it is the
 # least that is believed of a sensor.
@@ -60,6 +59,7 @@ class Extent(NamedTuple):
     load: float  # [N] of the seal
     speed: float  # [m/s]
     yaw_rate: float  # [rad/s]
+    speed_spread: float  # [m/s] standard deviation of the windows' speeds
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ class Identified:
     @property
     def uncertainty(self) -> Array:
         """Half widths as shares of the value, or of all drive or turn if that is more (7,)."""
-        drive, turn, load, speed, yaw_rate = np.maximum(self.extent, ROUNDING)
-        whole = np.array([0, 0, drive / load, drive / speed, turn / yaw_rate, 0, 0])
+        drive, turn, load, speed, yaw_rate, _ = np.maximum(self.extent, ROUNDING)
+        whole = np.array([0, drive / load, drive / speed, 0, turn / yaw_rate, 0, 0])
         return self.half_widths / np.maximum(np.abs(self.values), whole)
 
     @property
@@ -118,42 +118,26 @@ class System:
         design, target, quantity = map(np.concatenate, zip(*rows, strict=True))
         return cls(design, target, quantity, ends)
 
-    def residuals(self, values: Array) -> Array:
-        """Of parameters (7,): (rows,)."""
-        width = self.design.shape[1]
-        return self.target - self.design @ _coefficients(values)[:width]
+    def solved(self, sought: Choice) -> tuple[Array, Array]:
+        """Coefficients (7,), 0 where not `sought`, and residuals (rows,) of their soft L1 fit."""
+        design = self.design[:, sought[: self.design.shape[1]]]
+        weights: Array = np.ones(len(self.target))
+        for _ in range(ITERATIONS):
+            weighted = weights[:, None] * design
+            fit = _inverse(weighted.T @ design) @ (weighted.T @ self.target)
+            residuals = self.target - design @ fit
+            weights = _weights(residuals)
+        coefficients = np.zeros(7)
+        coefficients[sought] = fit
+        return coefficients, residuals
 
-    def jacobian(self, values: Array) -> Array:
-        """Of the residuals by the parameters (rows, 7); exact, by a complex step."""
+    def half_widths(self, values: Array, sought: Choice, residuals: Array) -> Array:
+        """Of the 95 % intervals (7,): N is what a window tells, N⁻¹ g what it changes."""
         step, width = 1e-20, self.design.shape[1]
         slopes = [_coefficients(values + 1j * step * unit).imag / step for unit in np.eye(7)]
-        return -self.design @ np.stack(slopes, axis=1)[:width]
-
-    def solved(self, values: Array, sought: Choice) -> Array:
-        """Parameters (7,) with the least residuals; those not `sought` are kept."""
-
-        def all_of(part: Array) -> Array:
-            changed = values.copy()
-            changed[sought] = part
-            return changed
-
-        return all_of(
-            least_squares(
-                lambda part: self.residuals(all_of(part)),
-                values[sought],
-                lambda part: self.jacobian(all_of(part))[:, sought],
-                bounds=(np.where(POSITIVE, 1e-3 * values, -np.inf)[sought], np.inf),
-                loss="soft_l1",
-                f_scale=CLEAR,
-                x_scale="jac",
-            ).x
-        )
-
-    def half_widths(self, values: Array, sought: Choice) -> Array:
-        """Of the 95 % intervals (7,): N is what a window tells, N⁻¹ g what it changes."""
-        residuals, jacobian = self.residuals(values), self.jacobian(values)[:, sought]
-        weights = 1 / np.sqrt(1 + (residuals / CLEAR) ** 2)
-        parts = (np.split(rows, self.ends[:-1]) for rows in (jacobian, weights, residuals))
+        jacobian = self.design @ np.stack(slopes, axis=1)[:width, sought]
+        rows = jacobian, _weights(residuals), residuals
+        parts = (np.split(part, self.ends[:-1]) for part in rows)
         each = [(J.T @ (w[:, None] * J), J.T @ (w * r)) for J, w, r in zip(*parts, strict=True)]
         N, g = (np.stack(both) for both in zip(*each, strict=True))
         count, squares = len(N), (_inverse(N.sum(axis=0) - N) @ g[..., None])[..., 0] ** 2
@@ -182,6 +166,9 @@ def identify(motion: RecordedMotion, climber: Climber, cut: Cut = CUT) -> Identi
     each = [equations(motion, climber, window) for window in windows]
     extent = _extent(motion, climber, windows)
     sought = ~OF_WHEELS | (motion.wheel_angles is not None)
+    if extent.speed_spread < SPREAD * extent.speed:
+        # noise would look like a difference of speeds, and tell that it makes none in friction
+        sought[NAMES.index("viscous_friction")] = False
     found = Identified(*_fitted(each, climber, sought), extent, windows)
     needless = RESISTANCES & ~found.known
     if needless.any():
@@ -194,7 +181,8 @@ def predicted(motion: RecordedMotion, climber: Climber, cut: Cut = CUT) -> Ident
     windows = cut.windows(motion)
     each = [equations(motion, climber, window) for window in windows]
     noise, values, sought = _noise(each), _believed(climber), ~OF_WHEELS
-    half_widths = System.of(each, noise).half_widths(values, sought)
+    system = System.of(each, noise)
+    half_widths = system.half_widths(values, sought, 0 * system.target)
     extent = _extent(motion, climber, windows)
     return Identified(values, half_widths, sought, noise, [], extent, windows)
 
@@ -203,15 +191,15 @@ def _fitted(
     windows: list[list[Equations]], climber: Climber, sought: Choice
 ) -> tuple[Array, Array, Choice, Array, list[Array]]:
     """First fields of `Identified`, with the noise as it turns out to be."""
-    noise, values = _noise(windows), _believed(climber)
-    least, used = 0.1 * noise, noise
+    noise = _noise(windows)
+    least = 0.1 * noise
     for _ in range(REFINEMENTS):
         system, used = System.of(windows, noise), noise
-        values = system.solved(values, sought)
-        residuals = system.residuals(values)
+        coefficients, residuals = system.solved(sought)
         each = [residuals[system.quantity == number] for number in range(len(noise))]
         noise = np.maximum(noise * [1.4826 * np.median(np.abs(one)) for one in each], least)
-    return values, system.half_widths(values, sought), sought, used, each
+    values = _parameters(coefficients, climber)
+    return values, system.half_widths(values, sought, residuals), sought, used, each
 
 
 def _noise(windows: list[list[Equations]]) -> Array:
@@ -225,8 +213,22 @@ def _believed(climber: Climber) -> Array:
 
 def _coefficients(values: Array) -> Array:
     """Coefficients (7,) of parameters (7,)."""
-    m, J, mu, c, D, r, d = values
+    m, mu, c, J, D, r, d = values
     return np.array([1 / (m * r), mu / m, c / m, d / (J * r), D / J, r, r / d])
+
+
+def _parameters(coefficients: Array, climber: Climber) -> Array:
+    """Parameters (7,) of coefficients (7,); the climber's where these make no sense."""
+    a_1, a_2, a_3, b_1, b_2, radius, per_track = coefficients.tolist()
+    r = radius or climber.wheel_radius
+    d = _quotient(r, per_track, climber.half_track)
+    m, J = _quotient(1 / r, a_1, climber.mass), _quotient(d / r, b_1, climber.yaw_inertia)
+    return np.array([m, a_2 * m, a_3 * m, J, b_2 * J, r, d])
+
+
+def _quotient(dividend: float, divisor: float, believed: float) -> float:
+    """Quotient, or what is believed if it were beyond a thousand times that."""
+    return dividend / divisor if divisor > 1e-3 * dividend / believed else believed
 
 
 def _extent(motion: RecordedMotion, climber: Climber, windows: list[Indices]) -> Extent:
@@ -235,7 +237,14 @@ def _extent(motion: RecordedMotion, climber: Climber, windows: list[Indices]) ->
     time, right, left, way, turned = (quantities[ends[1]] - quantities[ends[0]]).T
     drive, turn = climber.drive_and_turn(np.column_stack([right, left]) / time[:, None])
     each = (drive, turn, seal_load(motion, climber), way / time, turned / time)
-    return Extent(*(float(np.sqrt(np.mean(values**2))) for values in each))
+    rms = [np.sqrt(np.mean(values**2)) for values in each]
+    return Extent(*map(float, (*rms, np.std(np.abs(way / time)))))
+
+
+def _weights(residuals: Array) -> Array:
+    """Of residuals (...) in the soft L1 fit."""
+    weights: Array = 1 / np.sqrt(1 + (residuals / CLEAR) ** 2)
+    return weights
 
 
 def _inverse(matrix: Array) -> Array:

@@ -55,7 +55,7 @@ def given_in(motion: RecordedMotion, found: Identified, window: Indices) -> Arra
 
 def asked_of(motion: RecordedMotion, climber: Climber, values: Array, window: Indices) -> Array:
     """Drive [N] and moment [N m] (2,) that parameters (7,) ask for in a window."""
-    mass, inertia, coefficient, viscous, turning, _, _ = values
+    mass, coefficient, viscous, inertia, turning, _, _ = values
     time, heading = motion.time[window], motion.pose[window, 2]
     gone = np.column_stack([motion.way[window], heading])
     gone = gone - gone.mean(axis=0)

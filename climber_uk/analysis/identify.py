@@ -78,7 +78,7 @@ def plan(options: argparse.Namespace, limits: excitation.Limits) -> None:
     print(
         f"{best.name}, {best.trajectory.duration:.1f} s, from ({x:.3f}, {y:.3f}) {heading:.3f} rad"
     )
-    for name, share in zip(NAMES[: excitation.SOUGHT], best.tells.uncertainty, strict=False):
+    for name, share in zip(NAMES, best.tells.uncertainty, strict=True):
         print(f"{name} ± {share:.2%}")
 
 

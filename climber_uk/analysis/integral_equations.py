@@ -69,14 +69,14 @@ def equations(motion: RecordedMotion, climber: Climber, window: Indices) -> list
     right, left = _since_start(motion.impulse[window]).T
     direction = np.sign(motion.speed[window[len(window) // 2]])
     load = seal_load(motion, climber)[window]
-    driven = np.column_stack([right + left, -direction * _integral(load, time), -way])
+    resisting = _integral(motion.smooth_rates[window], time).T
+    driven = np.column_stack([right + left, -direction * _integral(load, time), -resisting[0]])
+    turning = np.column_stack([right - left, -resisting[1]])
     weight = climber.weight_along_wall / climber.mass * _integral(np.sin(heading), time)
     speed, yaw_rate = (None, None) if motion.rates is None else motion.rates[window].T
     both = [
         _twice_integrated(time, speed, way, driven, weight),
-        _twice_integrated(
-            time, yaw_rate, turned, np.column_stack([right - left, -turned]), 0 * way
-        ),
+        _twice_integrated(time, yaw_rate, turned, turning, 0 * way),
     ]
     if angles is None:
         return both

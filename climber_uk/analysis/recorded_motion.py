@@ -17,7 +17,7 @@ from climber_uk.messages import reading
 
 Indices = NDArray[np.intp]
 PATIENCE = 5.0  # typical times from one torque to the next, after which some are missing
-SMOOTHING = 0.1  # [s] to either side, over which the speed is taken from the way
+SMOOTHING = 0.1  # [s] to either side, over which rates are taken
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,18 @@ class RecordedMotion:
         return np.concatenate([[0.0], np.cumsum(x * np.cos(middle) + y * np.sin(middle))])
 
     @cached_property
-    def speed(self) -> Array:
-        """Forward speed (n,) [m/s], smoothed."""
+    def smooth_rates(self) -> Array:
+        """Forward speed [m/s] and yaw rate [rad/s] (n, 2), from way and heading, smoothed."""
         first = np.maximum(self.time - SMOOTHING, self.time[0])
         last = np.minimum(self.time + SMOOTHING, self.time[-1])
-        ways = (np.interp(at, self.time, self.way) for at in (last, first))
-        return np.subtract(*ways) / (last - first)
+        both = self.way, self.pose[:, 2]
+        gone = [np.interp(last, self.time, one) - np.interp(first, self.time, one) for one in both]
+        return np.column_stack(gone) / (last - first)[:, None]
+
+    @property
+    def speed(self) -> Array:
+        """Forward speed (n,) [m/s], smoothed."""
+        return self.smooth_rates[:, 0]
 
 
 def impulse(time: Array, begins: Array, torques: Array) -> Array:
