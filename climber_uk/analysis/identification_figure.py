@@ -40,7 +40,7 @@ def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Pat
     for axis in axes.flat:
         axis.grid(alpha=0.3)
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120)
+    figure.savefig(path, dpi=120, format="png")
     plt.close(figure)
     return path
 

@@ -33,6 +33,7 @@ PUBLISHER = "trajectory_publisher"
 
 def tell(options: argparse.Namespace) -> None:
     """Print and write what a bag tells; raises `ValueError` of what it does not."""
+    cut = Values(vars(options)).read(Cut)
     parameters = parameters_of(CONTROLLER, options)
     believed = Values(parameters).read(Climber)
     right, left = (parameters.get(name, name) for name in ("right_wheel_joint", "left_wheel_joint"))
@@ -46,7 +47,7 @@ def tell(options: argparse.Namespace) -> None:
         options.namespace,
         options.odometry,
     )
-    found = identify(motion, believed, Cut(options.window, options.least_speed))
+    found = identify(motion, believed, cut)
     print(table(found, believed), end="")
     print(*remarks(found), sep="\n")
     if unfit:
@@ -62,11 +63,12 @@ def tell(options: argparse.Namespace) -> None:
         raise ValueError("\n".join(said))
 
 
-def plan(options: argparse.Namespace, limits: excitation.Limits) -> None:
+def plan(options: argparse.Namespace) -> None:
     """Write a trajectory, with all that is in the parameter file; raises `ValueError`."""
     parameters = parameters_of(PUBLISHER, options)
     origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
     believed = Values(parameters_of(CONTROLLER, options)).read(Climber)
+    limits = Values(vars(options)).read(excitation.Limits)
     best = excitation.plan(believed, limits, origin)
     x, y, heading = best.trajectory.at(0.0).pose.tolist()
     changed = {
@@ -101,27 +103,23 @@ def main() -> None:
     parser.add_argument(
         "--delay", type=float, help="[s] of torques, unless joint_states tells them"
     )
-    parser.add_argument("--window", type=float, default=2.0, help="[s] (default: 2)")
-    parser.add_argument("--least-speed", type=float, default=0.02, help="[m/s] (default: 0.02)")
     parser.add_argument("--output", type=Path, help="write a parameter file for the nodes")
     parser.add_argument("--json", type=Path, help="write the table as JSON")
     parser.add_argument("--figure", type=Path, help="write a picture of the fit, PNG")
     parser.add_argument(
         "--plan", type=Path, help="write a parameter file with a trajectory instead"
     )
-    for field in fields(excitation.Limits):
-        rule, name = field.metadata, field.name
-        said = f"of the plan: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
-        parser.add_argument(f"--{name}", type=float, default=field.default, help=said)
+    for kind, of in (Cut, "of a bag"), (excitation.Limits, "of a plan"):
+        for field in fields(kind):
+            rule, name = field.metadata, "--" + field.name.replace("_", "-")
+            said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
+            parser.add_argument(name, type=float, default=field.default, help=said)
     options = parser.parse_args()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
     try:
         if options.plan:
-            limits = {
-                field.name: getattr(options, field.name) for field in fields(excitation.Limits)
-            }
-            plan(options, excitation.Limits(**limits))
+            plan(options)
         else:
             tell(options)
     except (ValueError, OSError) as error:
