@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from climber_uk.analysis.identification import OF_WHEELS, RESISTANCES, Identified, predicted
+from climber_uk.analysis.identification import (
+    CUT,
+    LEAST_WINDOWS,
+    OF_WHEELS,
+    RESISTANCES,
+    Identified,
+    predicted,
+)
 from climber_uk.analysis.recorded_motion import RecordedMotion
 from climber_uk.mechanics import Array, unpack
 from climber_uk.mechanics.climber import Climber
@@ -72,7 +79,8 @@ def _plans(climber: Climber, limits: Limits, origin: tuple[float, float]) -> Ite
             if trajectory.duration > limits.duration:
                 continue
             motion, torques = driven(trajectory, climber)
-            if np.abs(torques).max() <= limits.torque:
+            is_long = len(CUT.windows(motion)) >= LEAST_WINDOWS
+            if is_long and np.abs(torques).max() <= limits.torque:
                 yield Plan(name, trajectory, predicted(motion, climber))
 
 

@@ -4,27 +4,21 @@ The coefficients of `integral_equations`,
 
     a = (1/(m r), μ/m, c/m)      b = (d/(J r), D/J)      and with wheel angles  r  and  r/d,
 
-are fitted to all windows at once by robust least squares. Intervals are those of a jackknife over
-the windows, so that they hold whatever noise and errors of the model do within a window, but not
-less than white noise leaves: what a motion does not excite shows there.
+are fitted to all windows at once (`window_fit`), and give the parameters. Those of a Coulomb and a
+viscous friction can be told apart where speeds differ, mass and friction where the weight along the
+way does, or the speed changes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
-from climber_uk.analysis.integral_equations import (
-    Cut,
-    Equations,
-    equations,
-    seal_load,
-    standardised,
-)
+from climber_uk.analysis.integral_equations import Cut, Equations, equations, seal_load
 from climber_uk.analysis.recorded_motion import Indices, RecordedMotion
-from climber_uk.mechanics import Array, transpose
+from climber_uk.analysis.window_fit import WindowFit
+from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
 Choice = NDArray[np.bool_]
@@ -40,15 +34,13 @@ UNITS = {
 NAMES = tuple(UNITS)
 RESISTANCES = np.array([False, False, True, False, True, False, False])  # which there need not be
 OF_WHEELS = np.array([False] * 5 + [True] * 2)  # which wheel angles tell
-CUT, LEAST_WINDOWS, REFINEMENTS, ITERATIONS = Cut(), 5, 3, 10
-CLEAR = 3.0  # standard deviations beyond which a residual counts less and less
+CUT, LEAST_WINDOWS, REFINEMENTS = Cut(), 5, 3
 SPREAD = 0.05  # of the speed: least difference of speeds that shows viscous friction
 KNOWN = 0.1  # of a value, or of all that drives: the widest interval that is of use
 # [SI] of speed, way; yaw rate, heading; way; heading: noise to begin with, and a tenth of it is the
 # least that is believed of a sensor.
 NOISE = ((1e-2, 1e-3), (1e-2, 1e-3), (1e-3,), (1e-3,))
-QUANTILE = 0.975
-ROUNDING = 1e-13
+NOTHING = 1e-100
 
 
 class Extent(NamedTuple):
@@ -90,7 +82,7 @@ class Identified:
     @property
     def uncertainty(self) -> Array:
         """Half widths as shares of the value, or of all drive or turn if that is more (7,)."""
-        drive, turn, load, speed, yaw_rate, _ = np.maximum(self.extent, ROUNDING)
+        drive, turn, load, speed, yaw_rate, _ = np.maximum(self.extent, NOTHING)
         whole = np.array([0, drive / load, drive / speed, 0, turn / yaw_rate, 0, 0])
         return self.half_widths / np.maximum(np.abs(self.values), whole)
 
@@ -99,58 +91,6 @@ class Identified:
         """Which intervals are narrow enough to be of use (7,)."""
         known: Choice = self.uncertainty <= KNOWN
         return known
-
-
-@dataclass(frozen=True)
-class System:
-    """Equations of all windows in standard deviations: target = design · coefficients + noise."""
-
-    design: Array  # (rows, 7, or 5 without wheel angles)
-    target: Array  # (rows,)
-    quantity: Indices  # (rows,) number of what is measured
-    ends: Indices  # (windows,) row after the last of each
-
-    @classmethod
-    def of(cls, windows: list[list[Equations]], noise: Array) -> "System":
-        """System of the kinds of equations in each window, of quantities with `noise` (q,)."""
-        rows = [standardised(kinds, noise) for kinds in windows]
-        ends = np.cumsum([len(target) for _, target, _ in rows])
-        design, target, quantity = map(np.concatenate, zip(*rows, strict=True))
-        return cls(design, target, quantity, ends)
-
-    def solved(self, sought: Choice) -> tuple[Array, Array]:
-        """Coefficients (7,), 0 where not `sought`, and residuals (rows,) of their soft L1 fit."""
-        design = self.design[:, sought[: self.design.shape[1]]]
-        weights: Array = np.ones(len(self.target))
-        for _ in range(ITERATIONS):
-            weighted = weights[:, None] * design
-            fit = _inverse(weighted.T @ design) @ (weighted.T @ self.target)
-            residuals = self.target - design @ fit
-            weights = _weights(residuals)
-        coefficients = np.zeros(7)
-        coefficients[sought] = fit
-        return coefficients, residuals
-
-    def half_widths(self, values: Array, sought: Choice, residuals: Array) -> Array:
-        """Of the 95 % intervals (7,): N is what a window tells, N⁻¹ g what it changes."""
-        step, width = 1e-20, self.design.shape[1]
-        slopes = [_coefficients(values + 1j * step * unit).imag / step for unit in np.eye(7)]
-        jacobian = self.design @ np.stack(slopes, axis=1)[:width, sought]
-        rows = jacobian, _weights(residuals), residuals
-        parts = (np.split(part, self.ends[:-1]) for part in rows)
-        each = [(J.T @ (w[:, None] * J), J.T @ (w * r)) for J, w, r in zip(*parts, strict=True)]
-        N, g = (np.stack(both) for both in zip(*each, strict=True))
-        count, squares = len(N), (_inverse(N.sum(axis=0) - N) @ g[..., None])[..., 0] ** 2
-        jackknife = np.sqrt((count - 1) / count * squares.sum(axis=0))
-        # as many degrees of freedom as if the windows' changes were normal, each with its variance
-        ratio = squares.sum(axis=0) ** 2 / np.maximum((squares**2).sum(axis=0), ROUNDING**9)
-        freedom = np.clip(3 * ratio - 2, 1, count - 1)
-        white = np.sqrt(np.diagonal(_inverse(N.sum(axis=0))))
-        half_widths = np.zeros(7)
-        half_widths[sought] = np.maximum(
-            student.ppf(QUANTILE, freedom) * jackknife, student.ppf(QUANTILE, count - 1) * white
-        )
-        return half_widths
 
 
 def identify(motion: RecordedMotion, climber: Climber, cut: Cut = CUT) -> Identified:
@@ -181,8 +121,8 @@ def predicted(motion: RecordedMotion, climber: Climber, cut: Cut = CUT) -> Ident
     windows = cut.windows(motion)
     each = [equations(motion, climber, window) for window in windows]
     noise, values, sought = _noise(each), _believed(climber), ~OF_WHEELS
-    system = System.of(each, noise)
-    half_widths = system.half_widths(values, sought, 0 * system.target)
+    fit, half_widths = WindowFit.of(each, noise), np.zeros(len(NAMES))
+    half_widths[sought] = fit.half_widths(_slopes(values, sought), 0 * fit.target)
     extent = _extent(motion, climber, windows)
     return Identified(values, half_widths, sought, noise, [], extent, windows)
 
@@ -192,14 +132,23 @@ def _fitted(
 ) -> tuple[Array, Array, Choice, Array, list[Array]]:
     """First fields of `Identified`, with the noise as it turns out to be."""
     noise = _noise(windows)
-    least = 0.1 * noise
+    least, coefficients, half_widths = 0.1 * noise, np.zeros(len(NAMES)), np.zeros(len(NAMES))
     for _ in range(REFINEMENTS):
-        system, used = System.of(windows, noise), noise
-        coefficients, residuals = system.solved(sought)
-        each = [residuals[system.quantity == number] for number in range(len(noise))]
+        whole, used = WindowFit.of(windows, noise), noise
+        fit = replace(whole, design=whole.design[:, sought[: whole.design.shape[1]]])
+        coefficients[sought], residuals = fit.solved()
+        each = [residuals[fit.quantity == number] for number in range(len(noise))]
         noise = np.maximum(noise * [1.4826 * np.median(np.abs(one)) for one in each], least)
     values = _parameters(coefficients, climber)
-    return values, system.half_widths(values, sought, residuals), sought, used, each
+    half_widths[sought] = fit.half_widths(_slopes(values, sought), residuals)
+    return values, half_widths, sought, used, each
+
+
+def _slopes(values: Array, sought: Choice) -> Array:
+    """Of the coefficients sought by the parameters sought; exact, by a complex step."""
+    step = 1e-20
+    slopes = [_coefficients(values + 1j * step * unit).imag / step for unit in np.eye(len(NAMES))]
+    return np.stack(slopes, axis=1)[np.ix_(sought, sought)]
 
 
 def _noise(windows: list[list[Equations]]) -> Array:
@@ -239,18 +188,3 @@ def _extent(motion: RecordedMotion, climber: Climber, windows: list[Indices]) ->
     each = (drive, turn, seal_load(motion, climber), way / time, turned / time)
     rms = [np.sqrt(np.mean(values**2)) for values in each]
     return Extent(*map(float, (*rms, np.std(np.abs(way / time)))))
-
-
-def _weights(residuals: Array) -> Array:
-    """Of residuals (...) in the soft L1 fit."""
-    weights: Array = 1 / np.sqrt(1 + (residuals / CLEAR) ** 2)
-    return weights
-
-
-def _inverse(matrix: Array) -> Array:
-    """Inverse (..., p, p) of positive semidefinite matrices; enormous where there is none."""
-    scale = np.sqrt(np.maximum(np.diagonal(matrix, axis1=-2, axis2=-1), ROUNDING**2))
-    both = scale[..., :, None] * scale[..., None, :]
-    values, vectors = np.linalg.eigh(matrix / both)
-    inverse: Array = (vectors / np.maximum(values, ROUNDING)[..., None, :]) @ transpose(vectors)
-    return inverse / both

@@ -20,7 +20,10 @@ def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Pat
     figure, axes = plt.subplots(2, 2, figsize=(10, 6), sharex=True, layout="constrained")
     windows, time = found.windows, motion.time - motion.time[0]
     now = np.array([getattr(believed, name, 0.0) for name in NAMES])
-    for values, style, label in ((now, "0.6", "model of now"), (found.values, "tab:blue", "model")):
+    for values, style, label in (
+        (now, "0.6", "nodes now"),
+        (found.values, "tab:blue", "identified"),
+    ):
         asked = np.array([asked_of(motion, believed, values, window) for window in windows])
         for axis, column in zip(axes[0], asked.T, strict=True):
             axis.plot([time[window].mean() for window in windows], column, color=style, label=label)
@@ -28,7 +31,8 @@ def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Pat
     for axis, column, label in zip(axes[0], gave.T, ("drive [N]", "moment [N m]"), strict=True):
         axis.plot([time[window].mean() for window in windows], column, "k.", label="motors")
         axis.set(ylabel=label)
-    axes[0, 1].legend()
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
     every = np.concatenate(windows)
     of_way = 0 if motion.rates is None else 1  # speed and yaw rate are before way and heading
     for axis, quantity, label in zip(

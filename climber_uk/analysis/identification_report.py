@@ -82,7 +82,7 @@ def changes(found: Identified, believed: Climber) -> dict[str, dict[str, Any]]:
     controller, plant = dict(climber), dict(climber)
     seal, viscous = climber.get("seal_friction_coefficient", 0.0), found["viscous_friction"]
     if seal > 0:
-        controller["seal_friction_coefficient"] = found.friction / found.extent.load
+        controller["seal_friction_coefficient"] = max(0.0, found.friction / found.extent.load)
         if viscous > 0 and found.is_clear("viscous_friction"):
             law = {"ratio": 1.0, "viscous": viscous / (seal * found.extent.load)}
             plant |= {"friction": "stribeck", **{f"stribeck.{k}": v for k, v in law.items()}}

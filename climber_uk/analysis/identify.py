@@ -29,6 +29,7 @@ from climber_uk.analysis.recorded_motion import read_motion
 from climber_uk.mechanics.climber import Climber
 
 PUBLISHER = "trajectory_publisher"
+AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
 def tell(options: argparse.Namespace) -> None:
@@ -37,8 +38,8 @@ def tell(options: argparse.Namespace) -> None:
     parameters = parameters_of(CONTROLLER, options)
     believed = Values(parameters).read(Climber)
     right, left = (parameters.get(name, name) for name in ("right_wheel_joint", "left_wheel_joint"))
-    told = parameters.get("transport_delay", 0.0)
-    delay = told if options.delay is None else options.delay
+    believed_delay = parameters.get("transport_delay", 0.0)
+    delay = believed_delay if options.delay is None else options.delay
     motion, unfit = read_motion(
         options.bag,
         (right, left),
@@ -53,8 +54,8 @@ def tell(options: argparse.Namespace) -> None:
     if unfit:
         print(f"{unfit} unfit messages were left out")
     if options.json:
-        told = json.dumps(list(rows(found, believed)), indent=2)
-        options.json.write_text(told + "\n", encoding="utf-8")
+        text = json.dumps(list(rows(found, believed)), indent=2)
+        options.json.write_text(text + "\n", encoding="utf-8")
     if options.figure:
         identification_figure.draw(motion, believed, found, options.figure)
     if options.output:
@@ -80,11 +81,9 @@ def plan(options: argparse.Namespace) -> None:
     print(
         f"{best.name}, {best.trajectory.duration:.1f} s, from ({x:.3f}, {y:.3f}) {heading:.3f} rad"
     )
-    for name, share in zip(NAMES, best.tells.uncertainty, strict=True):
-        print(f"{name} ± {share:.2%}")
-
-
-AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
+    for name, share, sought in zip(NAMES, best.tells.uncertainty, excitation.SOUGHT, strict=True):
+        if sought:
+            print(f"{name} ± {share:.2%}")
 
 
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
