@@ -36,11 +36,11 @@ def table(found: Identified, believed: Climber) -> str:
     """The same, as text."""
     cells = []
     for row in rows(found, believed):
-        numbers = [row[key] for key in ("estimate", "half_width", "nodes_now")]
-        estimate, half_width, now = ("" if n is None else f"{n:.5g}" for n in numbers)
+        digits = {"estimate": 5, "half_width": 2, "nodes_now": 5}
+        numbers = [("" if row[key] is None else f"{row[key]:.{n}g}") for key, n in digits.items()]
         unknown = "cannot be told" if row["estimate"] is not None else "not in this bag"
         remark = "" if row["known"] else unknown
-        cells.append((row["parameter"], estimate, half_width, row["unit"], now, remark))
+        cells.append((row["parameter"], *numbers[:2], row["unit"], numbers[2], remark))
     return markdown(COLUMNS, cells)
 
 

@@ -25,10 +25,11 @@ from climber_uk.analysis.identification_report import (
 )
 from climber_uk.analysis.integral_equations import Cut
 from climber_uk.analysis.parameter_file import Values, read_file
-from climber_uk.analysis.recorded_motion import read_motion
+from climber_uk.analysis.recorded_motion import Source, read_motion
 from climber_uk.mechanics.climber import Climber
 
 PUBLISHER = "trajectory_publisher"
+SIDES = "right", "left"
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
@@ -37,17 +38,7 @@ def tell(options: argparse.Namespace) -> None:
     cut = Values(vars(options)).read(Cut)
     parameters = parameters_of(CONTROLLER, options)
     believed = Values(parameters).read(Climber)
-    right, left = (parameters.get(name, name) for name in ("right_wheel_joint", "left_wheel_joint"))
-    believed_delay = parameters.get("transport_delay", 0.0)
-    delay = believed_delay if options.delay is None else options.delay
-    motion, unfit = read_motion(
-        options.bag,
-        (right, left),
-        believed.suction_pressure,
-        delay,
-        options.namespace,
-        options.odometry,
-    )
+    motion, unfit = read_motion(options.bag, source(options, parameters))
     found = identify(motion, believed, cut)
     print(table(found, believed), end="")
     print(*remarks(found), sep="\n")
@@ -62,6 +53,20 @@ def tell(options: argparse.Namespace) -> None:
         write_changed(options.params, changes(found, believed), options.output)
     if said := list(missing(found)):
         raise ValueError("\n".join(said))
+
+
+def source(options: argparse.Namespace, parameters: dict[str, Any]) -> Source:
+    """Where the bag tells of the climber whose controller has `parameters`."""
+    believed = Values(parameters).read(Climber)
+    joints = [parameters.get(f"{side}_wheel_joint", f"{side}_wheel_joint") for side in SIDES]
+    delay = parameters.get("transport_delay", 0.0) if options.delay is None else options.delay
+    return Source(
+        namespace=options.namespace,
+        odometry=options.odometry,
+        joints=(joints[0], joints[1]),
+        pressure=believed.suction_pressure,
+        delay=delay,
+    )
 
 
 def plan(options: argparse.Namespace) -> None:
@@ -88,8 +93,8 @@ def plan(options: argparse.Namespace) -> None:
 
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
     """Those of a node in the parameter file; none without one."""
-    namespace = f"/{options.namespace.strip('/')}/".replace("//", "/")
-    return read_file(options.params, namespace + node) if options.params else {}
+    name = Source(namespace=options.namespace).topic(node)
+    return read_file(options.params, name) if options.params else {}
 
 
 def main() -> None:

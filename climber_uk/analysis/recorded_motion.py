@@ -1,6 +1,6 @@
 """How a climber moved and what drove it, as arrays, from the messages of a bag."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 
@@ -67,63 +66,70 @@ def stretches(time: Array, begins: Array) -> Indices:
     return np.searchsorted(begins[np.stack([gaps, gaps + 1], axis=1).ravel()], time)
 
 
-def read_motion(
-    bag: str | Path,
-    joints: tuple[str, str],
-    pressure: float,
-    delay: float = 0.0,
-    namespace: str = "",
-    odometry: str = "odom",
-) -> tuple[RecordedMotion, int]:
-    """Motion of the climber in `namespace`, and how many messages are unfit and left out.
+@dataclass(frozen=True)
+class Source:
+    """Where a bag tells of a climber, and what holds where it does not."""
 
-    `joints` are those of the right and left wheel; `pressure` [Pa] is that of a bag which tells
-    none, `delay` [s] that of torques which only `wheel_torques` tells, after their odometry.
+    namespace: str = ""
+    odometry: str = "odom"  # topic
+    joints: tuple[str, str] = ("right_wheel_joint", "left_wheel_joint")
+    pressure: float = 0.0  # [Pa] without suction_pressure
+    delay: float = 0.0  # [s] of a command after its odometry, without torques in joint_states
+
+    def topic(self, name: str) -> str:
+        """Full name of a topic."""
+        return f"/{self.namespace.strip('/')}/{name.lstrip('/')}".replace("//", "/")
+
+
+def read_motion(bag: str | Path, source: Source) -> tuple[RecordedMotion, int]:
+    """Motion of a climber, and how many messages are unfit and left out.
+
     Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
     """
-    prefix = f"/{namespace}/".replace("//", "/")
-    readers = {
-        odometry: _state,
-        "wheel_torques": lambda message: reading.wheel_torques(message, joints[1], joints[0]),
-        "joint_states": lambda message: _wheels(message, joints),
+    found, unfit = _collected(bag, source)
+    states, commands, wheels, pressures = found
+    begins, torques = _torques(commands, wheels, source.delay)
+    time = np.array([t for t in states if len(begins) > 1 and begins[0] <= t <= begins[-1]])
+    if len(time) < 2:
+        topic = source.topic(source.odometry)
+        raise ValueError(f"{bag} has no odometry on {topic} at times that torques are known")
+    kept = [states[t] for t in time.tolist()]
+    pose = np.array([state.pose for state in kept])
+    rates = np.array([[state.forward_speed, state.yaw_rate] for state in kept])
+    told = pressures or {0.0: source.pressure}
+    motion = RecordedMotion(
+        time=time,
+        pose=np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]),
+        rates=rates if rates.any() else None,
+        impulse=impulse(time, begins, torques),
+        pressure=np.interp(time, list(told), list(told.values())),
+        stretch=stretches(time, begins),
+        wheel_angles=_angles(time, wheels),
+    )
+    return motion, unfit
+
+
+def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]], int]:
+    """Contents by stamp [s] of odometry, commands, wheels and pressure; how many were unfit."""
+    right, left = source.joints
+    readers: dict[str, Callable[[Any], Any]] = {
+        source.odometry: lambda m: reading.state(m, m.header.frame_id, m.child_frame_id),
+        "wheel_torques": lambda m: reading.wheel_torques(m, left, right),
+        "joint_states": lambda m: _wheels(m, source.joints),
         "suction_pressure": reading.pressure,
     }
-    topics = {prefix + name.lstrip("/"): name for name in readers}
+    topics = {source.topic(name): name for name in readers}
     found: dict[str, dict[float, Any]] = {name: {} for name in readers}
     unfit = 0
     for topic, _, message in read_messages(bag, topics):
         name = topics[topic]
         try:
-            stamp = reading.nanoseconds(message.header.stamp) / SECOND
-            found[name][stamp] = readers[name](message)
+            content = readers[name](message)
         except ValueError:
             unfit += 1
-    states, wheels = (dict(sorted(found[name].items())) for name in (odometry, "joint_states"))
-    begins, torques = _torques(found["wheel_torques"], wheels, delay)
-    time = np.array([t for t in states if len(begins) > 1 and begins[0] <= t <= begins[-1]])
-    if len(time) < 2:
-        raise ValueError(
-            f"{bag} has no odometry on {prefix}{odometry} at times that torques are known"
-        )
-    kept = [states[t] for t in time.tolist()]
-    rates = np.array([[state.forward_speed, state.yaw_rate] for state in kept])
-    told = dict(sorted(found["suction_pressure"].items())) or {0.0: pressure}
-    return (
-        RecordedMotion(
-            time=time,
-            pose=_continuous(np.array([state.pose for state in kept])),
-            rates=rates if rates.any() else None,
-            impulse=impulse(time, begins, torques),
-            pressure=np.interp(time, list(told), list(told.values())),
-            stretch=stretches(time, begins),
-            wheel_angles=_angles(time, wheels),
-        ),
-        unfit,
-    )
-
-
-def _state(message: Any) -> State:
-    return reading.state(message, message.header.frame_id, message.child_frame_id)
+        else:
+            found[name][reading.nanoseconds(message.header.stamp) / SECOND] = content
+    return [dict(sorted(contents.items())) for contents in found.values()], unfit
 
 
 def _wheels(message: Any, joints: Sequence[str]) -> tuple[Array, Array]:
@@ -143,8 +149,7 @@ def _torques(
     if len(efforts) > 1 and np.isfinite(efforts).all() and efforts.any():
         ends = np.array(list(wheels))
         return ends, np.concatenate([efforts[1:], efforts[-1:]])  # each tells of the time before it
-    sent = dict(sorted(commanded.items()))
-    return np.array(list(sent)) + delay, np.array(list(sent.values())).reshape(-1, 2)
+    return np.array(list(commanded)) + delay, np.array(list(commanded.values())).reshape(-1, 2)
 
 
 def _angles(time: Array, wheels: dict[float, tuple[Array, Array]]) -> Array | None:
@@ -153,7 +158,3 @@ def _angles(time: Array, wheels: dict[float, tuple[Array, Array]]) -> Array | No
         return None
     stamps = list(wheels)
     return np.stack([np.interp(time, stamps, wheel) for wheel in angles.T], axis=1)
-
-
-def _continuous(pose: Array) -> Array:
-    return np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
