@@ -44,6 +44,7 @@ setup(
                 "check_driver": "nodes.check_driver",
                 "analyze_bag": "analysis.analyze_bag",
                 "compare_bags": "analysis.compare_bags",
+                "identify": "analysis.identify",
                 "reproduce_paper": "analysis.reproduce_paper",
             }.items()
         ]

@@ -1,0 +1,138 @@
+"""Runs of which the truth is known, to try the identification on: lock-step, without messages."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from climber_uk.analysis.closed_loop import Controlling, Link, Run, simulate
+from climber_uk.analysis.identification import CUT, NAMES, Identified, identify
+from climber_uk.analysis.integral_equations import Cut
+from climber_uk.analysis.recorded_motion import RecordedMotion, impulse
+from climber_uk.control.constraints import Guidance
+from climber_uk.control.controller import Controller, Law
+from climber_uk.control.follower import Answer, Follower
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.safety import Safety
+from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.preview import SECOND, Preview
+from climber_uk.mechanics.shapes import Ellipse, Lemniscate
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+
+NOISE = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
+EXACT = Link()
+OFF = ("mass", "yaw_inertia", "seal_friction_coefficient")
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What a parameter file says."""
+
+    believed: Climber  # by the controller
+    guidance: Guidance
+    trajectory: Trajectory
+    start: State
+    duration: float  # [s]
+
+    def run(self, believed: Climber, true: Climber, link: Link, seed: int = 0) -> tuple[Run, "Ear"]:
+        """Run of a controller that believes in a climber, and what it was told."""
+        controller = Controller(believed, self.guidance, Law())
+        ear = Ear(Follower(Tracker(controller, Observer(), Timing(), Pacing()), Safety()))
+        run = simulate(self.trajectory, self.start, self.duration, ear, true, link, seed=seed)
+        return run, ear
+
+    def tracks(self, believed: Climber, true: Climber) -> float:
+        """RMS distance from the reference, with exact odometry [m]."""
+        run, _ = self.run(believed, true, EXACT)
+        return run.rms()
+
+
+SCENARIOS = {
+    "climber.yaml": Scenario(
+        Climber(
+            seal_friction_coefficient=0.6,
+            wheel_load_share=0.8,
+            suction_pressure=8000.0,
+            max_wheel_torque=4.0,
+        ),
+        Guidance(cross_track_gain=3.0, fade_speed=0.1),
+        Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0)),
+        State(np.array([0.0, 3.0, np.pi / 4]), np.zeros(3)),
+        57.0,
+    ),
+    "paper.yaml": Scenario(
+        Climber(),
+        Guidance(),
+        Trajectory(Ellipse(), ConstantRate()),
+        State(np.array([0.0, 6.0, 0.0]), np.array([10.0, 0.0, -0.6])),
+        20.0,
+    ),
+}
+
+
+@dataclass
+class Ear:
+    """A controller, and all that it is told and answers."""
+
+    controlling: Controlling
+    stamps: list[int] = field(default_factory=list)  # [ns]
+    states: list[State] = field(default_factory=list)
+    torques: list[Array] = field(default_factory=list)
+
+    def on_reference(self, now: int, preview: Preview) -> Answer | None:
+        """See `Controlling`."""
+        return self.controlling.on_reference(now, preview)
+
+    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+        """See `Controlling`."""
+        answer = self.controlling.on_odometry(now, stamp, state)
+        self.stamps.append(stamp)
+        self.states.append(state)
+        self.torques.append(np.zeros(2) if answer is None else answer.torques)
+        return answer
+
+    def motion(self, pressure: float) -> RecordedMotion:
+        """What a bag would tell of it; `pressure` [Pa]."""
+        time = np.array(self.stamps) / SECOND
+        poses = np.array([state.pose for state in self.states])
+        rates = [[state.forward_speed, state.yaw_rate] for state in self.states]
+        return RecordedMotion(
+            time=time,
+            pose=np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]),
+            rates=np.array(rates),
+            impulse=impulse(time, time, np.array(self.torques)),
+            pressure=np.full(len(time), pressure),
+            stretch=np.zeros(len(time), np.intp),
+        )
+
+
+def truth(believed: Climber, seed: int) -> Climber:
+    """Climber of which mass, inertia and friction are each 30 % more or less than believed."""
+    shares = 1 + 0.3 * np.random.default_rng(1000 + seed).choice([-1, 1], len(OFF))
+    values = {
+        name: share * getattr(believed, name) for name, share in zip(OFF, shares, strict=True)
+    }
+    return replace(believed, **values)
+
+
+def identified(scenario: Scenario, seed: int, cut: Cut = CUT) -> tuple[Climber, Identified]:
+    """The true climber of a seed, and what noisy odometry of its run tells."""
+    true = truth(scenario.believed, seed)
+    _, ear = scenario.run(scenario.believed, true, NOISE, seed)
+    return true, identify(ear.motion(true.suction_pressure), scenario.believed, cut)
+
+
+def as_identified(believed: Climber, found: Identified) -> Climber:
+    """Climber with what was found."""
+    return replace(believed, **{name: found[name] for name in OFF})
+
+
+def errors(true: Climber, found: Identified) -> tuple[Array, Array]:
+    """Relative errors (3,) of `OFF`, and whether the truth is in the interval (3,)."""
+    indices = [NAMES.index(name) for name in OFF]
+    right = np.array([getattr(true, name) for name in OFF])
+    off = found.values[indices] - right
+    return off / right, np.abs(off) <= found.half_widths[indices]

@@ -1,0 +1,130 @@
+"""`identify BAG`: mass, inertia, friction and geometry of the climber that a bag was recorded of.
+
+`identify --plan FILE` writes a parameter file with a trajectory that shows them well. The status is
+1 if something cannot be told, or went wrong.
+"""
+
+import argparse
+import json
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from climber_uk.analysis import excitation, identification_figure
+from climber_uk.analysis.changed_parameters import write_changed
+from climber_uk.analysis.identification import NAMES, identify
+from climber_uk.analysis.identification_report import (
+    CONTROLLER,
+    PLANT,
+    changes,
+    missing,
+    remarks,
+    rows,
+    table,
+)
+from climber_uk.analysis.integral_equations import Cut
+from climber_uk.analysis.parameter_file import Values, read_file
+from climber_uk.analysis.recorded_motion import Source, read_motion
+from climber_uk.mechanics.climber import Climber
+
+PUBLISHER = "trajectory_publisher"
+SIDES = "right", "left"
+AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
+
+
+def tell(options: argparse.Namespace) -> None:
+    """Print and write what a bag tells; raises `ValueError` of what it does not."""
+    cut = Values(vars(options)).read(Cut)
+    parameters = parameters_of(CONTROLLER, options)
+    believed = Values(parameters).read(Climber)
+    motion, unfit = read_motion(options.bag, source(options, parameters))
+    found = identify(motion, believed, cut)
+    print(table(found, believed), end="")
+    print(*remarks(found), sep="\n")
+    if unfit:
+        print(f"{unfit} unfit messages were left out")
+    if options.json:
+        text = json.dumps(list(rows(found, believed)), indent=2)
+        options.json.write_text(text + "\n", encoding="utf-8")
+    if options.figure:
+        identification_figure.draw(motion, believed, found, options.figure)
+    if options.output:
+        write_changed(options.params, changes(found, believed), options.output)
+    if said := list(missing(found)):
+        raise ValueError("\n".join(said))
+
+
+def source(options: argparse.Namespace, parameters: dict[str, Any]) -> Source:
+    """Where the bag tells of the climber whose controller has `parameters`."""
+    believed = Values(parameters).read(Climber)
+    joints = [parameters.get(f"{side}_wheel_joint", f"{side}_wheel_joint") for side in SIDES]
+    delay = parameters.get("transport_delay", 0.0) if options.delay is None else options.delay
+    return Source(
+        namespace=options.namespace,
+        odometry=options.odometry,
+        joints=(joints[0], joints[1]),
+        pressure=believed.suction_pressure,
+        delay=delay,
+    )
+
+
+def plan(options: argparse.Namespace) -> None:
+    """Write a trajectory, with all that is in the parameter file; raises `ValueError`."""
+    parameters = parameters_of(PUBLISHER, options)
+    origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
+    believed = Values(parameters_of(CONTROLLER, options)).read(Climber)
+    limits = Values(vars(options)).read(excitation.Limits)
+    best = excitation.plan(believed, limits, origin)
+    x, y, heading = best.trajectory.at(0.0).pose.tolist()
+    changed = {
+        PUBLISHER: best.parameters,
+        PLANT: {"initial_x": x, "initial_y": y, "initial_heading": heading, **AT_REST},
+        "run_demo": {"duration": best.trajectory.duration},
+    }
+    write_changed(options.params, changed, options.plan)
+    print(
+        f"{best.name}, {best.trajectory.duration:.1f} s, from ({x:.3f}, {y:.3f}) {heading:.3f} rad"
+    )
+    for name, share, sought in zip(NAMES, best.tells.uncertainty, excitation.SOUGHT, strict=True):
+        if sought:
+            print(f"{name} ± {share:.2%}")
+
+
+def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
+    """Those of a node in the parameter file; none without one."""
+    name = Source(namespace=options.namespace).topic(node)
+    return read_file(options.params, name) if options.params else {}
+
+
+def main() -> None:
+    """Tell, or plan."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
+    parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
+    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
+    parser.add_argument("--odometry", default="odom", help="topic (default: odom)")
+    parser.add_argument(
+        "--delay", type=float, help="[s] of torques, unless joint_states tells them"
+    )
+    parser.add_argument("--output", type=Path, help="write a parameter file for the nodes")
+    parser.add_argument("--json", type=Path, help="write the table as JSON")
+    parser.add_argument("--figure", type=Path, help="write a picture of the fit, PNG")
+    parser.add_argument(
+        "--plan", type=Path, help="write a parameter file with a trajectory instead"
+    )
+    for kind, of in (Cut, "of a bag"), (excitation.Limits, "of a plan"):
+        for field in fields(kind):
+            rule, name = field.metadata, "--" + field.name.replace("_", "-")
+            said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
+            parser.add_argument(name, type=float, default=field.default, help=said)
+    options = parser.parse_args()
+    if (options.bag is None) == (options.plan is None):
+        parser.error("want a bag, or --plan")
+    try:
+        if options.plan:
+            plan(options)
+        else:
+            tell(options)
+    except (ValueError, OSError) as error:
+        sys.exit(f"identify: {error}")
