@@ -1,0 +1,61 @@
+"""Errors of a planar trajectory as the field defines them (Sturm et al. 2012).
+
+    absolute: Qᵢ⁻¹ Pᵢ        relative: (Qᵢ⁻¹ Qⱼ)⁻¹ (Pᵢ⁻¹ Pⱼ)
+
+P is the pose x [m], y [m], θ [rad], and Q the reference at the same time; doi
+10.1109/IROS.2012.6385773. Of each error, its length and its angle, as evo has them.
+"""
+
+import numpy as np
+
+from climber_uk.mechanics import Array, pack, unpack
+from climber_uk.mechanics.climber import across, along
+from climber_uk.mechanics.elementary import wrapped
+
+ROUNDING = 1e-9  # [s, m] by which a pair may fall short: stamps are nanoseconds
+
+
+def absolute_errors(reference: Array, pose: Array) -> Array:
+    """Distances [m] and angles [rad] (n, 2) between poses (n, 3) and their references (n, 3)."""
+    return _sizes(pose - reference)
+
+
+def relative_errors(reference: Array, pose: Array, progress: Array, delta: float) -> Array:
+    """Drifts [m] and [rad] (k, 2) over k stretches of `delta`, each from where the last one ended.
+
+    `progress` (n,) is the time [s] or the `way` [m], and `delta` in its unit.
+    """
+    ends = [0]
+    while (end := np.searchsorted(progress, progress[ends[-1]] + delta - ROUNDING)) < len(pose):
+        ends.append(int(end))
+    return _sizes(_moves(pose[ends]) - _moves(reference[ends]))
+
+
+def way(pose: Array) -> Array:
+    """Length (n,) of the way to each of the poses (n, 3) [m]."""
+    steps = np.hypot(*np.diff(pose[:, :2], axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def aligned(reference: Array, pose: Array) -> Array:
+    """Poses (n, 3), moved as one so that their distances from the reference are least squares.
+
+    Umeyama (1991, doi 10.1109/34.88573), in the plane and without a scale.
+    """
+    middle, wanted = pose.mean(axis=0), reference.mean(axis=0)
+    (x, y, _), (x_d, y_d, _) = (pose - middle).T, (reference - wanted).T
+    turn = np.arctan2(np.sum(x * y_d - y * x_d), np.sum(x * x_d + y * y_d))
+    offset = pose - middle
+    ahead, beside = along(-turn, offset), across(-turn, offset)
+    return pack(wanted[0] + ahead, wanted[1] + beside, pose[:, 2] + turn)
+
+
+def _moves(pose: Array) -> Array:
+    """From each pose to the next, (n - 1, 3), in the frame of the first."""
+    heading, move = pose[:-1, 2], np.diff(pose, axis=0)
+    return pack(along(heading, move), across(heading, move), move[:, 2])
+
+
+def _sizes(error: Array) -> Array:
+    x, y, turn = unpack(error)
+    return pack(np.hypot(x, y), np.abs(wrapped(turn)))
