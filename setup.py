@@ -24,7 +24,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
         "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib"],
-        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis"],
+        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo"],
     },
     zip_safe=False,
     maintainer="The climber_uk maintainers",
@@ -42,6 +42,8 @@ setup(
                 "record_bag": "nodes.record_bag",
                 "run_demo": "nodes.run_demo",
                 "analyze_bag": "analysis.analyze_bag",
+                "replay_controller": "analysis.replay_controller",
+                "export_tum": "analysis.export_tum",
                 "reproduce_paper": "analysis.reproduce_paper",
             }.items()
         ]
