@@ -62,8 +62,8 @@ def by_stamp(bag, topic, content):
 def runs(tmp_path_factory):
     """Directory and ROS domain of the runs that several tests look at."""
     world = World(tmp_path_factory.mktemp("runs"))
-    yield world
-    world.close()
+    world.close()  # its node: the tests have their own
+    return world
 
 
 @pytest.fixture(scope="module")
