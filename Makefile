@@ -56,7 +56,8 @@ colcon: $(SET_UP)
 $(SET_UP): requirements.txt setup.py
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --requirement requirements.txt
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+		evo==1.38.1 --editable . # evo without pandas and seaborn, 90 MB that the tests do not need
 	touch $(SET_UP)
 
 clean:

@@ -24,7 +24,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
         "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard"],
-        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis"],
+        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo"],
     },
     zip_safe=False,
     maintainer="The climber_uk maintainers",
@@ -45,6 +45,8 @@ setup(
                 "analyze_bag": "analysis.analyze_bag",
                 "compare_bags": "analysis.compare_bags",
                 "identify": "analysis.identify",
+                "replay_controller": "analysis.replay_controller",
+                "export_tum": "analysis.export_tum",
                 "reproduce_paper": "analysis.reproduce_paper",
             }.items()
         ]

@@ -50,6 +50,7 @@ CONTENTS = {
     "~/constraint_force": "Udwadia-Kalaba: drive [N], lateral [N], about z [N m], in `base_link`",
     "~/disturbance": "force [N], moment [N m] that the model did not expect, in `base_link`; 20 Hz",
     "~/margins": "lowest slip, tip margin (below 1 it slips, tips), load on the wheels [N]; 20 Hz",
+    "~/parameters": "all parameters as they are, at the start and whenever one changes",
     "~/transition_event": "changes of the managed node's state",
     "~/start": "start, or start again, at the next odometry",
     "~/stop": "come to rest on the path",

@@ -28,6 +28,11 @@ class Acting:
         """Torques that act from `begins` [ns] on."""
         self._begun.append((begins, torques))
 
+    def correct(self, torques: Array) -> None:
+        """Have other torques acting in the place of the last ones."""
+        begins, _ = self._begun.pop()
+        self.add(begins, torques)
+
     def forget_before(self, time: int) -> None:
         """Keep only what matters from `time` [ns] on."""
         while len(self._begun) > 1 and self._begun[1][0] <= time:

@@ -155,6 +155,10 @@ class Tracker:
         self._send(self._begin(age), np.zeros(2))
         return np.zeros(2)
 
+    def correct(self, torques: Array) -> None:
+        """Believe that other torques (2,) were sent than it answered last."""
+        self._acting.correct(torques)
+
     def expected_at(self, stamp: int) -> State:
         """State at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.state is not None

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any
 
 
@@ -54,7 +55,7 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
         if type(value) is not type(field.default):
             raise ValueError(f"{said} a {type(field.default).__name__}")
         return
-    if isinstance(value, bool | str) or not math.isfinite(value):
+    if isinstance(value, bool) or not (isinstance(value, Real) and math.isfinite(value)):
         raise ValueError(f"{said} a finite number{unit}")
     if rule["above"] is not None and not value > rule["above"]:
         raise ValueError(f"{said} > {rule['above']}{unit}")

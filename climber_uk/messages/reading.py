@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
     from geometry_msgs.msg import Quaternion, Twist, WrenchStamped
     from nav_msgs.msg import Odometry
+    from rcl_interfaces.msg import ParameterEvent
     from sensor_msgs.msg import FluidPressure, JointState
     from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -101,6 +102,13 @@ def wrench(message: "WrenchStamped", odom_frame: str, base_frame: str) -> tuple[
     planar = np.array([force.x, force.y, torque.z])
     _check_size(wrench=planar)
     return planar, frame == base_frame
+
+
+def parameters(message: "ParameterEvent") -> dict[str, bool | int | float | str]:
+    """Values by name of all that are one truth, number or text."""
+    kinds = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value"}
+    told = [(told.name, told.value) for told in message.new_parameters]
+    return {name: getattr(value, kinds[value.type]) for name, value in told if value.type in kinds}
 
 
 def _check_size(**vectors: "Array | list[list[float]]") -> None:

@@ -17,6 +17,8 @@ from geometry_msgs.msg import (
     WrenchStamped,
 )
 from nav_msgs.msg import Odometry, Path
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
@@ -133,6 +135,14 @@ def diagnostics(
     )
     message = DiagnosticArray(status=[status])
     message.header.stamp = time(stamp)
+    return message
+
+
+def parameters(values: Mapping[str, object], node: str, stamp: int) -> ParameterEvent:
+    """All parameters of a node, as they are."""
+    named = [Parameter(name, value=value) for name, value in values.items()]
+    message = ParameterEvent(stamp=time(stamp), node=node)
+    message.new_parameters = [parameter.to_parameter_msg() for parameter in named]
     return message
 
 

@@ -26,8 +26,8 @@ from climber_uk.analysis.driver import checks, report
 from climber_uk.analysis.driver.evidence import Expected
 from climber_uk.analysis.driver.trial import Bounds
 from climber_uk.mechanics.climber import Climber
+from climber_uk.messages.names import Names
 from climber_uk.nodes.driver_node import DriverNode
-from climber_uk.nodes.running import Names
 
 PATIENCE = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques

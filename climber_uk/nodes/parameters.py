@@ -40,6 +40,14 @@ class Parameters:
         """Prefix, class and field of every parameter, in the order in which they were declared."""
         return list(self._fields.values())
 
+    @property
+    def values(self) -> dict[str, Any]:
+        """Every parameter as it is now, by its name."""
+        return {
+            name: getattr(self.read(kind, prefix), field.name)
+            for name, (prefix, kind, field) in self._fields.items()
+        }
+
     def declare(self, kind: type[T], prefix: str = "") -> None:
         """Declare the fields of `kind` as `prefix` + name.
 

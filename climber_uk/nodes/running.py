@@ -3,7 +3,6 @@
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,9 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
-from climber_uk.mechanics.parameter import parameter
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import writing
+from climber_uk.messages.names import Names
 from climber_uk.nodes.parameters import Parameters
 
 RELIABLE = QoSProfile(depth=10)
@@ -33,25 +32,6 @@ SIGNAL_PERIOD = 0.1  # [s]
 SLOW = SECOND // 20  # [ns] from one message to the next of what need not be told each time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-@dataclass(frozen=True)
-class Names:
-    """Frames and joints as the robot's description calls them."""
-
-    odom_frame: str = parameter("odom", "", "frame fixed to the wall")
-    base_frame: str = parameter("base_link", "", "frame fixed to the climber")
-    left_wheel_joint: str = parameter("left_wheel_joint", "", "joint of the left wheel")
-    right_wheel_joint: str = parameter("right_wheel_joint", "", "joint of the right wheel")
-    prefix_frames: bool = parameter(True, "", "put the node's namespace before both frames")
-
-    def within(self, namespace: str) -> "Names":
-        """Names as a node in `namespace` uses them."""
-        prefix = namespace.strip("/") + "/"
-        if not self.prefix_frames or prefix == "/":
-            return self
-        odom_frame, base_frame = prefix + self.odom_frame, prefix + self.base_frame
-        return replace(self, odom_frame=odom_frame, base_frame=base_frame)
 
 
 class Rhythm:

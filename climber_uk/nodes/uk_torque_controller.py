@@ -4,37 +4,35 @@ Inactive, it answers with its safe output: a climber that hangs on a wall must b
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from climber_uk.control.constraints import CONSTRAINTS, tracking_error
-from climber_uk.control.controller import Command, Controller, Law
-from climber_uk.control.follower import Answer, Follower
-from climber_uk.control.model import Observer
-from climber_uk.control.pacing import Pacing
-from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.tracker import Timing, Tracker
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.control.constraints import tracking_error
+from climber_uk.control.controller import Command
+from climber_uk.control.follower import Answer
+from climber_uk.control.safety import Mode
+from climber_uk.control.settings import KINDS, Choice, new_follower, settings
+from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.contact import ADHESION, Alarm, Contact, Grip
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.wall import Plane
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.managed import ManagedNode
 from climber_uk.nodes.margins import Margins
-from climber_uk.nodes.running import BEST_EFFORT, SLOW, WALL_CLOCK, Rhythm, run
+from climber_uk.nodes.running import BEST_EFFORT, LATCHED, SLOW, WALL_CLOCK, Rhythm, run
 
 
 @dataclass(frozen=True)
 class Options:
-    """Which constraints, and what is published."""
+    """What holds the climber, and what is published."""
 
-    constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
     adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
     effort_commands: bool = parameter(False, "", "publish effort_controller/commands as well")
     effort_order: str = parameter(
@@ -50,17 +48,15 @@ class UkTorqueController(ManagedNode):
 
     def __init__(self) -> None:
         super().__init__("uk_torque_controller")
-        for kind in (Options, Climber, Law, Timing, Safety, Grip, Alarm):
-            self.parameters.declare(kind)
-        parts = {**CONSTRAINTS, **ADHESION, "observer": Observer, "pacing": Pacing}
-        for name, part in parts.items():
-            self.parameters.declare(part, f"{name}.")
+        parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
+        for kind, prefix in [*KINDS, (Options, ""), (Grip, ""), (Alarm, ""), *parts]:
+            self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
         self.contact = self.contact_now()
         self.pressure: float | None = None  # [Pa] as last measured
-        self.follower = self.new_follower()
+        self.follower = new_follower(self.parameters, self.pressure)
         self.answers = self.saturations = 0
         self.is_due = Rhythm(SLOW)  # to tell the disturbance
 
@@ -69,6 +65,8 @@ class UkTorqueController(ManagedNode):
         self.error = self.publisher(Vector3Stamped, "~/tracking_error")
         self.force = self.publisher(WrenchStamped, "~/constraint_force")
         self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
+        self.told = self.publisher(ParameterEvent, "~/parameters", LATCHED)
+        self.tell_parameters()
         safety = self.follower.safety
         shortest = min(safety.odometry_timeout, safety.reference_timeout)
         # on the wall clock: one in simulated time would not notice that there is no clock
@@ -78,7 +76,7 @@ class UkTorqueController(ManagedNode):
 
     def listen(self) -> list[Subscription]:
         """Start from nothing with the safe output, and listen to all inputs."""
-        self.follower = self.new_follower()
+        self.follower = new_follower(self.parameters, self.pressure)
         self.follower.enable(False)
         return [
             self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT),
@@ -92,19 +90,6 @@ class UkTorqueController(ManagedNode):
 
     # Parameters
 
-    def new_follower(self) -> Follower:
-        """Follower as the parameters say, that has seen nothing yet."""
-        return Follower(Tracker(*self.settings()), self.parameters.read(Safety))
-
-    def settings(self) -> tuple[Controller, Observer, Timing, Pacing]:
-        """What the parameters, and the measured pressure, say now."""
-        read, name = self.parameters.read, self.options.constraints
-        climber = read(Climber)
-        if self.pressure is not None:
-            climber = replace(climber, suction_pressure=self.pressure)
-        controller = Controller(climber, read(CONSTRAINTS[name], f"{name}."), read(Law))
-        return controller, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
-
     def contact_now(self) -> Contact:
         """What the parameters say that holds the climber on its wall."""
         read, name = self.parameters.read, self.options.adhesion
@@ -114,7 +99,17 @@ class UkTorqueController(ManagedNode):
         """Take up changed parameters."""
         self.margins.alarm = self.parameters.read(Alarm)
         self.contact = self.contact_now()
-        self.follower.tracker.retune(*self.settings())
+        self.retune()
+        self.tell_parameters()
+
+    def retune(self) -> None:
+        """Follow as the parameters, and the measured pressure, say now."""
+        self.follower.tracker.retune(*settings(self.parameters, self.pressure))
+
+    def tell_parameters(self) -> None:
+        """Publish all parameters: with them, a bag has all that an answer came from."""
+        name, now = self.get_fully_qualified_name(), self.now()
+        self.told.publish(writing.parameters(self.parameters.values, name, now))
 
     # Messages
 
@@ -148,7 +143,7 @@ class UkTorqueController(ManagedNode):
         self.say("suction_pressure", "")
         if pressure != self.pressure:
             self.pressure = pressure
-            self.on_parameters()
+            self.retune()
 
     def look(self) -> None:
         """Give the safe output if odometry or reference have stopped."""
@@ -226,7 +221,7 @@ class UkTorqueController(ManagedNode):
         return {
             "state": self.life,
             "mode": self.follower.mode.value,
-            "constraints": self.options.constraints,
+            "constraints": self.parameters.read(Choice).constraints,
             "answers": self.answers,
             "saturated answers": self.saturations,
             "odometry period [s]": tracker.period,

@@ -7,10 +7,14 @@ import time
 
 import numpy as np
 import pytest
-from world import CONFIG, executable
+from evo.core import metrics
+from evo.tools import file_interface
+from world import CONFIG, World, executable
 
+from climber_uk.analysis import export_tum
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.recorded_run import read_run
+from climber_uk.analysis.trajectory_errors import absolute_errors, relative_errors, way
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 
@@ -54,12 +58,32 @@ def by_stamp(bag, topic, content):
     }
 
 
-def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(world, tmp_path):
-    bags = [tmp_path / "first" / "bag", tmp_path / "second" / "bag"]
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Directory and ROS domain of the runs that several tests look at."""
+    world = World(tmp_path_factory.mktemp("runs"))
+    world.close()  # its node: the tests have their own
+    return world
+
+
+@pytest.fixture(scope="module")
+def paper_bags(runs):
+    bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
     for bag in bags:
-        process = demo(world, bag.parent, "paper.yaml")
+        process = demo(runs, bag.parent, "paper.yaml")
         hold_up_the_recorder(process)
         finished(process)
+    return bags
+
+
+@pytest.fixture(scope="module")
+def climber_bag(runs):
+    finished(demo(runs, runs.directory / "climber", "climber.yaml"))
+    return runs.directory / "climber" / "bag"
+
+
+def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(paper_bags):
+    bags = paper_bags
     run = read_run(bags[0])
     assert run.time[-1] >= 20.0
     assert len(run.time) == round(run.time[-1] * 200) + 1  # not one is missing
@@ -81,14 +105,70 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(w
         assert all(first[stamp] == second[stamp] for stamp in common)
 
 
-def test_a_realistic_climber_goes_from_rest_to_rest(world, tmp_path):
-    finished(demo(world, tmp_path / "run", "climber.yaml"))
-    run = read_run(tmp_path / "run" / "bag")
+def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
+    run = read_run(climber_bag)
     assert run.margins.min() > 2.8  # as its parameter file says of its wheels, at worst
     assert np.abs(run.error[:, 1]).max() < 2e-3
     assert run.time[-1] > 56
     assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
+
+
+def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):
+    for bag, answers in ((paper_bags[0], 3990), (climber_bag, 11390)):
+        numbers = replay(bag, "--fail-above", "1e-9")
+        recorded = numbers["answers"]["recorded"] - 1  # one may be from before there was a clock
+        assert numbers["answers"]["in both"] >= recorded >= answers
+        assert not numbers["changed"]
+        for modes in numbers["modes"].values():
+            assert modes[-1][1] == "following"
+    file = CONFIG / "paper.yaml"
+    assert not replay(paper_bags[0], "--params", file, "--fail-above", "1e-9")["changed"]
+
+
+def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_learnt(
+    paper_bags, replay
+):
+    """By hand: r Δf / 2 a wheel, Δf = (1 - k) Δμ P S; the observer finds it with 100/s."""
+    more, observer = "seal_friction_coefficient:=0.9", "observer.bandwidth:=0.0"
+    by_hand = 0.027 / 2 * 0.47 * 0.1 * 2500 * 0.06
+    numbers = replay(paper_bags[0], "-p", more, "-p", observer)
+    assert numbers["changed"]["seal_friction_coefficient"] == [0.8, 0.9]
+    wheels = numbers["wheels"]
+    assert wheels["difference, RMS [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
+    wheels = replay(paper_bags[0], "-p", more)["wheels"]
+    assert wheels["difference, largest [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
+    assert wheels["largest at [s]"] == [0.0, 0.0]
+    assert max(wheels["difference, RMS [N m]"]) < by_hand / 20
+
+
+def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
+    paper_bags, tmp_path, monkeypatch
+):
+    words = "export_tum", paper_bags[0], "--output", tmp_path
+    monkeypatch.setattr("sys.argv", [str(word) for word in words])
+    export_tum.main()
+    read = file_interface.read_tum_trajectory_file
+    reference, odometry, truth = (
+        read(tmp_path / f"{name}.tum") for name in ("reference", "odom", "ground_truth")
+    )
+    assert odometry == truth  # these sensors have no errors
+    run = read_run(paper_bags[0])
+    assert odometry.num_poses == len(run.time)
+    both = run.reference, run.pose
+    for column, relation in enumerate(
+        (metrics.PoseRelation.translation_part, metrics.PoseRelation.rotation_angle_rad)
+    ):
+        for measure, errors in (
+            (metrics.APE(relation), absolute_errors(*both)),
+            (metrics.RPE(relation, 200), relative_errors(*both, run.time, 1.0)),
+            (
+                metrics.RPE(relation, 1.0, metrics.Unit.meters),
+                relative_errors(*both, way(run.pose), 1.0),
+            ),
+        ):
+            measure.process_data((reference, odometry))
+            np.testing.assert_allclose(errors[:, column], measure.error, atol=1e-6)
 
 
 def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_end(world, tmp_path):

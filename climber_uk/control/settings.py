@@ -1,0 +1,59 @@
+"""The controller as its parameters say, whoever reads them: a node, or a replay of its bag."""
+
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
+
+from climber_uk.control.constraints import CONSTRAINTS
+from climber_uk.control.controller import Controller, Law
+from climber_uk.control.follower import Follower
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.safety import Safety
+from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.parameter import check, parameter
+
+T = TypeVar("T")
+
+
+class Parameters(Protocol):
+    """Where parameters come from."""
+
+    def read(self, kind: type[T], prefix: str = "") -> T:
+        """Instance of `kind`; raises `ValueError` naming parameter, value and bound."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which constraints are followed."""
+
+    constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+KINDS: list[tuple[type, str]] = [
+    *((kind, "") for kind in (Choice, Climber, Law, Timing, Safety)),
+    *((kind, f"{name}.") for name, kind in CONSTRAINTS.items()),
+    (Observer, "observer."),
+    (Pacing, "pacing."),
+]
+"""All that is read, with the prefix of its parameters."""
+
+
+def settings(
+    parameters: Parameters, pressure: float | None
+) -> tuple[Controller, Observer, Timing, Pacing]:
+    """What the parameters, and the measured pressure [Pa], say now."""
+    read = parameters.read
+    climber, name = read(Climber), read(Choice).constraints
+    if pressure is not None:
+        climber = replace(climber, suction_pressure=pressure)
+    controller = Controller(climber, read(CONSTRAINTS[name], f"{name}."), read(Law))
+    return controller, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
+
+
+def new_follower(parameters: Parameters, pressure: float | None) -> Follower:
+    """Follower as the parameters say, that has seen nothing yet."""
+    return Follower(Tracker(*settings(parameters, pressure)), parameters.read(Safety))
