@@ -34,7 +34,8 @@ def wrapped(angle: Any) -> Any:
 def clipped(value: Any, lowest: Any, highest: Any) -> Any:
     """`value` within its bounds; `highest` if they contradict each other."""
     if isinstance(value, float):
-        return min(max(value, lowest), highest)
+        raised = lowest if value < lowest else value
+        return highest if raised > highest else raised
     return np.clip(value, lowest, highest)
 
 
@@ -43,3 +44,36 @@ def select(condition: Any, this: Any, that: Any) -> Any:
     if isinstance(condition, bool | np.bool):
         return this if condition else that
     return np.where(condition, this, that)
+
+
+def everywhere(condition: Any) -> bool:
+    """Whether `condition` holds for the one, or for all of many."""
+    return condition if isinstance(condition, bool) else bool(np.all(condition))
+
+
+SMALL = 0.1  # [rad] of an angle whose sine and cosine are a few terms of their series
+
+
+def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
+    """Heading, cosine and sine after a turn by `angle` [rad].
+
+    Of many small angles the series takes half as long as numpy's cosine and sine; what it leaves
+    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
+    """
+    end = heading + angle
+    if isinstance(end, float):
+        return end, math.cos(end), math.sin(end)
+    if not np.abs(angle).max(initial=0.0) < SMALL:
+        return end, np.cos(end), np.sin(end)
+    c, s = _of_small(angle)
+    return end, c * cosine - s * sine, s * cosine + c * sine
+
+
+def _of_small(angle: Any) -> tuple[Any, Any]:
+    """Cosine and sine, by their first five terms."""
+    square = angle * angle
+    cosine = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720 - square / 40320)))
+    sine = angle * (
+        1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040 - square / 362880)))
+    )
+    return cosine, sine
