@@ -128,16 +128,26 @@ def _track(gains: Guidance, target: Target) -> Track:
     k_y, v_c = gains.cross_track_gain, gains.catch_up_speed
     waiting = sqrt(square + v_s * v_s / 4)
     return Track(
-        *(x, y, heading, cosine, sine, v, v_1, omega, omega_1),
-        waiting=(waiting, v * v_1 / waiting),
-        hurrying=(v_s / 2 + v_c * abs(v) / root, v_c * sign(v) * slope * v_1),
-        gain=(k_y * v / root, k_y * slope * v_1, k_y * (curvature * v_1 * v_1 + slope * v_2)),
+        x,
+        y,
+        heading,
+        cosine,
+        sine,
+        v,
+        v_1,
+        omega,
+        omega_1,
+        (waiting, v * v_1 / waiting),
+        (v_s / 2 + v_c * abs(v) / root, v_c * sign(v) * slope * v_1),
+        (k_y * v / root, k_y * slope * v_1, k_y * (curvature * v_1 * v_1 + slope * v_2)),
     )
 
 
 def _guided(gains: Guidance, track: Track, motion: Motion) -> Demand:
     x, y, heading, cosine, sine, v, omega = motion
-    x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, *_ = track
+    x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, waiting, hurrying, gain = (
+        track
+    )
     offset_x, offset_y, turned = x - x_d, y - y_d, wrapped(heading - heading_d)
     e_x, e_y = offset_x * cosine_d + offset_y * sine_d, offset_y * cosine_d - offset_x * sine_d
     v_x = v * (cosine * cosine_d + sine * sine_d)
@@ -147,7 +157,7 @@ def _guided(gains: Guidance, track: Track, motion: Motion) -> Demand:
     e_x1, e_y1 = v_x - v_d + omega_d * e_y, v_y - omega_d * e_x
 
     is_ahead = e_x * v_d > 0
-    (wait, wait_1), (hurry, hurry_1) = track.waiting, track.hurrying
+    (wait, wait_1), (hurry, hurry_1) = waiting, hurrying
     most, most_1 = select(is_ahead, wait, hurry), select(is_ahead, wait_1, hurry_1)
     u = gains.along_track_gain * e_x / most
     part = tanh(u)
@@ -157,7 +167,7 @@ def _guided(gains: Guidance, track: Track, motion: Motion) -> Demand:
     v_1 = v_d1 - back_1 - gains.speed_rate * (v - wanted)
 
     e_y2 = v_1 * sine_e + v_x * turning - omega_d1 * e_x - omega_d * e_x1
-    g, g_1, g_2 = track.gain
+    g, g_1, g_2 = gain
     w, w_1 = g * e_y, g_1 * e_y + g * e_y1
     w_2 = g_2 * e_y + 2 * g_1 * e_y1 + g * e_y2
     slope = 1 / (1 + w * w)

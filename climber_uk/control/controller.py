@@ -96,17 +96,26 @@ class Controller:
         The answer itself acts on the state it is for: it is computed twice, the second time
         knowing what it will be.
         """
-        climber, (motion, wheels, disturbance, period) = self.climber, situation
+        climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.law.lookahead(period)
         track, bounds = self.constraints.track(target), self._bounds(situation)
+        drive, turn = forces(climber, *held)
         for _ in range(2 if ahead else 1):
-            aim = rolled(climber, motion, wheels, disturbance, ahead)
-            demand = self.constraints.demand(track, aim)
-            wrench, lateral = _needed(climber, self.law, demand, aim, disturbance)
-            wheels = limited(torques(climber, *wrench), *bounds)
-        got = forces(climber, *wheels)
-        lost = Wrench(wrench.drive - got.drive, wrench.turn - got.turn)
-        return Command(wheels, wrench, lateral, lost)
+            aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)
+            drive, turn, lateral = self.force(self.constraints.demand(track, aim), aim)
+            wrench = Wrench(drive - r_drive, turn - r_turn)
+            drive, turn = limited(climber, wrench, *bounds)
+        lost = Wrench(wrench.drive - drive, wrench.turn - turn)
+        return Command(torques(climber, drive, turn), wrench, lateral, lost)
+
+    def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
+        """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
+        climber, (v_1, turning, speed) = self.climber, demand
+        weight = climber.weight_along_wall
+        rubbing = climber.seal_friction * tanh(speed / self.law.friction_speed)
+        drive = climber.mass * v_1 + rubbing + weight * motion.sine
+        lateral = climber.mass * motion.speed * motion.yaw_rate + weight * motion.cosine
+        return drive, climber.yaw_inertia * turning, lateral
 
     def holding(self, situation: Situation, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
@@ -114,7 +123,7 @@ class Controller:
         weight = climber.weight_along_wall * motion.sine
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
-        return limited(torques(climber, drive, turn), *self._bounds(situation))
+        return torques(climber, *limited(climber, Wrench(drive, turn), *self._bounds(situation)))
 
     def _bounds(self, situation: Situation) -> tuple[Bounds, Bounds]:
         right, left = torque_bounds(self.climber, situation.motion)
@@ -127,15 +136,3 @@ class Controller:
 
 def _near(bounds: Bounds, torque: Any, change: Any) -> Bounds:
     return clipped(torque - change, *bounds), clipped(torque + change, *bounds)
-
-
-def _needed(
-    climber: Climber, law: Law, demand: Demand, motion: Motion, disturbance: Wrench
-) -> tuple[Wrench, Any]:
-    """M Aᵀ b - Q in the climber's frame: forward and about z, and to the left."""
-    v_1, turning, speed = demand
-    weight, (r_drive, r_turn) = climber.weight_along_wall, disturbance
-    rubbing = climber.seal_friction * tanh(speed / law.friction_speed)
-    drive = climber.mass * v_1 + rubbing + weight * motion.sine - r_drive
-    lateral = climber.mass * motion.speed * motion.yaw_rate + weight * motion.cosine
-    return Wrench(drive, climber.yaw_inertia * turning - r_turn), lateral

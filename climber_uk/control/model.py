@@ -10,33 +10,38 @@ from dataclasses import dataclass
 from typing import Any
 
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import clipped, everywhere, exp, rotated, select, sign, wrapped
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces
+from climber_uk.mechanics.elementary import (
+    clipped,
+    everywhere,
+    exp,
+    rotated,
+    select,
+    with_sign_of,
+    wrapped,
+)
+from climber_uk.mechanics.motion import Motion, Wrench
 from climber_uk.mechanics.parameter import check, parameter
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 
 
-def rolled(
-    climber: Climber, motion: Motion, torques: Torques, disturbance: Wrench, time: float
-) -> Motion:
-    """Motion `time` [s] later under constant torques, by the midpoint rule.
+def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float) -> Motion:
+    """Motion `time` [s] later under a constant drive [N] and turn [N m], by the midpoint rule.
 
-    At rest friction takes whatever value holds the climber, up to f.
+    Both include the disturbance. At rest friction takes whatever value holds the climber, up to f.
     """
     x, y, heading, cosine, sine, v, omega = motion
-    drive, turn = forces(climber, *torques)
-    r_drive, r_turn = disturbance
     half, friction = time / 2, climber.seal_friction
-    omega_1 = (turn + r_turn) / climber.yaw_inertia
+    omega_1 = turn / climber.yaw_inertia
     _, c, s = rotated(heading, cosine, sine, half * (omega + half / 2 * omega_1))
-    push = drive + r_drive - climber.weight_along_wall * s
+    push = drive - climber.weight_along_wall * s
     held = clipped(push, -friction, friction)
-    v_1 = (push - select(abs(v) > SLOW, friction * sign(v), held)) / climber.mass
+    v_1 = (push - select(abs(v) > SLOW, with_sign_of(friction, v), held)) / climber.mass
     way = time * (v + half * v_1)
-    end = rotated(heading, cosine, sine, time * (omega + half * omega_1))
-    return Motion(x + way * c, y + way * s, *end, v + time * v_1, omega + time * omega_1)
+    heading, cosine, sine = rotated(heading, cosine, sine, time * (omega + half * omega_1))
+    v, omega = v + time * v_1, omega + time * omega_1
+    return Motion(x + way * c, y + way * s, heading, cosine, sine, v, omega)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ doi 10.1109/70.63270). So the climber stays on the path and lags along it.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from climber_uk.mechanics.motion import Target
 from climber_uk.mechanics.parameter import check, parameter
@@ -39,8 +40,7 @@ class Pacing:
         check(self)
 
 
-@dataclass(frozen=True)
-class Pace:
+class Pace(NamedTuple):
     """How far a reference is behind its time, and how fast it goes on."""
 
     lag: float = 0.0  # [s] t - s
@@ -49,6 +49,8 @@ class Pace:
 
     def after(self, time: float, pacing: Pacing) -> "Pace":
         """Pace `time` [s] later, on its way back to no lag."""
+        if self == IN_TIME:
+            return self
         rate = max(self.rate + time * self.change, 0.0)
         lag = max(self.lag + time * (1 - (self.rate + rate) / 2), 0.0)
         wanted = 1 + min(lag / pacing.recovery_time, pacing.catch_up)
@@ -63,7 +65,7 @@ class Pace:
         speed = found.v_x * cosine + found.v_y * sine
         if missing * speed <= 0 or abs(speed) < SLOW:
             return self
-        return replace(self, change=max(self.change - missing / speed, -self.rate / step))
+        return self._replace(change=max(self.change - missing / speed, -self.rate / step))
 
     def target(self, preview: Preview, time: int) -> Target | None:
         """Target for `time` [ns] at this pace; None outside of the preview."""
@@ -77,3 +79,6 @@ class Pace:
         # the jerk of the heading is not known, nor needed
         _, omega, omega_1, _ = compose((heading, omega, omega_1, 0.0), rates)
         return Target(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
+
+
+IN_TIME = Pace()

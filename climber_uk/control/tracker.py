@@ -14,7 +14,7 @@ from climber_uk.control.controller import Command, Controller, Situation
 from climber_uk.control.model import Observer, rolled
 from climber_uk.control.pacing import Pace, Pacing
 from climber_uk.mechanics.elementary import select
-from climber_uk.mechanics.motion import Motion, Torques, Wrench
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND, Preview
 
@@ -103,8 +103,11 @@ class Tracker:
                 self.controller.climber, self.disturbance, expected, motion, time
             )
             if self._acting.are_known_since(self.stamp):
-                pairs = zip(learnt, self.disturbance, strict=True)
-                self.disturbance = Wrench(*(select(self._learning, *pair) for pair in pairs))
+                drive, turn = self.disturbance
+                self.disturbance = Wrench(
+                    select(self._learning, learnt.drive, drive),
+                    select(self._learning, learnt.turn, turn),
+                )
         elif self.observer.velocity_source == "pose":
             motion = motion._replace(speed=0.0, yaw_rate=0.0)
         self.stamp, self.motion = stamp, motion
@@ -159,9 +162,11 @@ class Tracker:
     def expected_at(self, stamp: int) -> Motion:
         """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.motion is not None
-        motion = self.motion
+        motion, climber, disturbance = self.motion, self.controller.climber, self.disturbance
         for torques, time in self._acting.between(self.stamp, stamp):
-            motion = rolled(self.controller.climber, motion, torques, self.disturbance, time)
+            drive, turn = forces(climber, *torques)
+            drive, turn = drive + disturbance.drive, turn + disturbance.turn
+            motion = rolled(climber, motion, drive, turn, time)
         return motion
 
     def _constraints(self) -> ConstraintSet:

@@ -26,6 +26,11 @@ exp = _either(math.exp, np.exp)
 sign = _either(lambda x: float((x > 0) - (x < 0)), np.sign)
 
 
+def with_sign_of(size: Any, of: Any) -> Any:
+    """`size` (>= 0) with the sign of `of`."""
+    return math.copysign(size, of) if isinstance(of, float) else np.copysign(size, of)
+
+
 def wrapped(angle: Any) -> Any:
     """The same angle in [-π, π)."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
@@ -41,14 +46,14 @@ def clipped(value: Any, lowest: Any, highest: Any) -> Any:
 
 def select(condition: Any, this: Any, that: Any) -> Any:
     """`this` where `condition` holds, else `that`."""
-    if isinstance(condition, bool | np.bool):
-        return this if condition else that
-    return np.where(condition, this, that)
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, this, that)
+    return this if condition else that
 
 
-def everywhere(condition: Any) -> bool:
+def everywhere(condition: Any) -> Any:
     """Whether `condition` holds for the one, or for all of many."""
-    return condition if isinstance(condition, bool) else bool(np.all(condition))
+    return bool(condition.all()) if isinstance(condition, np.ndarray) else condition
 
 
 SMALL = 0.1  # [rad] of an angle whose sine and cosine are a few terms of their series

@@ -94,17 +94,19 @@ def _bounds(limit: Any, part: Any) -> Bounds:
     return -limit * clipped(1 + part, 0.0, 1.0), limit * clipped(1 - part, 0.0, 1.0)
 
 
-def limited(torques: Torques, right_bounds: Bounds, left_bounds: Bounds) -> Torques:
-    """Torques within each wheel's bounds, the turn served before the drive."""
-    right, left = torques
-    (right_low, right_high), (left_low, left_high) = right_bounds, left_bounds
+def limited(climber: "Climber", wrench: Wrench, right: Bounds, left: Bounds) -> Wrench:
+    """What wheels within their bounds can do of a wrench, the turn served before the drive."""
+    (right_low, right_high), (left_low, left_high) = right, left
+    to_mean = climber.wheel_radius / 2
+    to_twist = to_mean / climber.half_track
+    mean, twist = to_mean * wrench.drive, to_twist * wrench.turn  # τR,L = mean ± twist
+    one, other = mean + twist, mean - twist
     if everywhere(
-        (right_low <= right) & (right <= right_high) & (left_low <= left) & (left <= left_high)
+        (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
     ):
-        return torques
-    turn = clipped((right - left) / 2, (right_low - left_high) / 2, (right_high - left_low) / 2)
-    lowest, highest = right_low - turn, right_high - turn
-    lowest = lowest + clipped(left_low + turn - lowest, 0.0, float("inf"))
-    highest = highest - clipped(highest - (left_high + turn), 0.0, float("inf"))
-    drive = clipped((right + left) / 2, lowest, highest)
-    return Torques(drive + turn, drive - turn)
+        return wrench
+    twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
+    lowest, highest = right_low - twist, right_high - twist
+    lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
+    highest = highest - clipped(highest - (left_high + twist), 0.0, float("inf"))
+    return Wrench(clipped(mean, lowest, highest) / to_mean, twist / to_twist)

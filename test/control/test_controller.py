@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from climber_uk.control.constraints import Exact, Guidance, demanded, rows
 from climber_uk.control.controller import Controller, Law, Situation
 from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Torques, Wrench, limited
+from climber_uk.mechanics.motion import Torques, Wrench, forces, limited, torques
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -58,7 +58,9 @@ bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[
 
 @given(st.floats(-50, 50), st.floats(-50, 50), bounds, bounds)
 def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
-    got = limited(Torques(right, left), right_bounds, left_bounds)
+    climber = Climber()
+    wrench = limited(climber, forces(climber, right, left), right_bounds, left_bounds)
+    got = torques(climber, *wrench)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
         assert low - 1e-9 <= torque <= high + 1e-9
     turn, drive = (right - left) / 2, (right + left) / 2

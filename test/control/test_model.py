@@ -5,11 +5,16 @@ from hypothesis import strategies as st
 
 from climber_uk.control.model import Observer, rolled
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.motion import Torques, Wrench, torques
+from climber_uk.mechanics.motion import Torques, Wrench, forces, torques
 from climber_uk.simulation.plant import Plant
 
 CLIMBER = Climber()
 STILL, NONE = Torques(0.0, 0.0), Wrench(0.0, 0.0)
+
+
+def after(climber, motion, wheels, disturbance, time):
+    drive, turn = forces(climber, *wheels)
+    return rolled(climber, motion, drive + disturbance.drive, turn + disturbance.turn, time)
 
 
 @given(
@@ -22,7 +27,7 @@ def test_the_model_rolls_as_the_plant_does(heading, v, omega, torques):
     state = State.rolling(np.array([1.0, 2.0, heading]), v, omega)
     h = 0.005
     expected = Plant(CLIMBER, h / 10).advance(state, np.array(torques), steps=10)
-    got = State.moving(rolled(CLIMBER, state.motion, torques, NONE, h))
+    got = State.moving(after(CLIMBER, state.motion, torques, NONE, h))
     # third order in h: a rate of change of acceleration below 4000 m/s³
     np.testing.assert_allclose(got.pose, expected.pose, atol=4e3 * h**3 / 6)
     np.testing.assert_allclose(got.velocity, expected.velocity, atol=4e3 * h**3)
@@ -30,9 +35,9 @@ def test_the_model_rolls_as_the_plant_does(heading, v, omega, torques):
 
 def test_at_rest_friction_holds_what_it_can_and_no_more():
     rest = State(np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)).motion
-    assert rolled(CLIMBER, rest, STILL, NONE, 0.1).speed == 0
+    assert after(CLIMBER, rest, STILL, NONE, 0.1).speed == 0
     more = torques(CLIMBER, CLIMBER.weight_along_wall + CLIMBER.seal_friction + 1.0, 0.0)
-    assert rolled(CLIMBER, rest, more, NONE, 0.1).speed == pytest.approx(0.02)
+    assert after(CLIMBER, rest, more, NONE, 0.1).speed == pytest.approx(0.02)
 
 
 def learn(observer, true, believed, state, wheels, disturbance=NONE, steps=200, h=0.005):
@@ -40,7 +45,7 @@ def learn(observer, true, believed, state, wheels, disturbance=NONE, steps=200, 
     plant = Plant(true, h / 2)
     seen = state.motion
     for _ in range(steps):
-        expected = rolled(believed, seen, wheels, disturbance, h)
+        expected = after(believed, seen, wheels, disturbance, h)
         state = plant.advance(state, np.array(wheels), steps=2)
         seen, disturbance = observer.corrected(believed, disturbance, expected, state.motion, h)
     return state, seen, disturbance
