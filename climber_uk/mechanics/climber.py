@@ -16,6 +16,7 @@ from climber_uk.mechanics.motion import Bounds, Motion
 from climber_uk.mechanics.parameter import check, parameter
 
 GRAVITY = 9.81  # [m/s²]
+DEGREE = math.pi / 180  # [rad]
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ class Climber:
     @cached_property
     def weight_along_wall(self) -> float:
         """m g_t, the part of the weight that pulls along -y [N]."""
-        weight: float = self.mass * GRAVITY * sin(self.inclination * (math.pi / 180))
+        weight: float = self.mass * GRAVITY * sin(self.inclination * DEGREE)
         return weight
 
     def applied_force(self, heading: Array, direction: Array | float) -> Array:

@@ -56,7 +56,7 @@ def everywhere(condition: Any) -> Any:
     return bool(condition.all()) if isinstance(condition, np.ndarray) else condition
 
 
-SMALL = 0.1  # [rad] of an angle whose sine and cosine are a few terms of their series
+SMALL = 0.03  # [rad] of an angle whose sine and cosine are a few terms of their series
 
 
 def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
@@ -68,17 +68,9 @@ def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any,
     end = heading + angle
     if isinstance(end, float):
         return end, math.cos(end), math.sin(end)
-    if not np.abs(angle).max(initial=0.0) < SMALL:
-        return end, np.cos(end), np.sin(end)
-    c, s = _of_small(angle)
-    return end, c * cosine - s * sine, s * cosine + c * sine
-
-
-def _of_small(angle: Any) -> tuple[Any, Any]:
-    """Cosine and sine, by their first five terms."""
     square = angle * angle
-    cosine = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720 - square / 40320)))
-    sine = angle * (
-        1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040 - square / 362880)))
-    )
-    return cosine, sine
+    if not np.max(square, initial=0.0) < SMALL * SMALL:
+        return end, np.cos(end), np.sin(end)
+    c = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720)))
+    s = angle * (1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040))))
+    return end, c * cosine - s * sine, s * cosine + c * sine
