@@ -8,7 +8,7 @@ odometry, pumps, and every contact but that of a `Plain` climber.
 """
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -25,10 +25,10 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.many import chosen, part
-from climber_uk.mechanics.motion import Motion, Target, Torques, forces, torque_bounds
+from climber_uk.mechanics.motion import Motion, Target, Torques, Wrench, forces, torque_bounds
 from climber_uk.mechanics.preview import SECOND, Preview
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.simulation.plain import Plain, advanced
+from climber_uk.simulation.plain import Plain, advanced_often
 from climber_uk.simulation.sensors import Sensors
 
 BLOCK = 8192  # loops that are gone through together; by measurement
@@ -51,6 +51,7 @@ class Course:
     period: float = 0.005  # [s] of the controller
     steps: int = 2  # of the plant in a period
     delay: int = 0  # periods of a torque on its way to the wheels
+    compiled: bool = False  # whether the plant is, by numba: the extra `fast`
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class Loops:
     def run(self, course: Course, block: int = BLOCK) -> Outcome:
         """What became of each loop, arrays (N,)."""
         number = len(self.start.x)
+        keep_what_is_freed()
         preview = sampled(course.trajectory, course.duration)
         outcomes = [
             part(self, slice(first, first + block)).run_block(course, preview)
@@ -77,11 +79,14 @@ class Loops:
         ]
         return Outcome(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
 
-    def run_block(self, course: Course, preview: Preview) -> Outcome:
-        """The same, of few enough for the cache."""
+    def run_block(
+        self, course: Course, preview: Preview, on_period: Callable[[], object] = lambda: None
+    ) -> Outcome:
+        """The same, of few enough for the cache; `on_period` is called in every period."""
         tracker = Tracker(self.controller, self.observer, self.timing, Pacing(catch_up=0.0))
         tally = Tally(len(self.start.x), self.contact)
         motion, step = self.start, course.period / course.steps
+        advance = _advancing(course.compiled)
         on_their_way: deque[Torques] = deque()
         ticks = round(course.duration / course.period)
         given = self._noise(ticks), self._climbers(course, ticks), _targets(course, ticks)
@@ -97,9 +102,8 @@ class Loops:
             wheels = _within(on_their_way.popleft(), climber, motion)
             tally.add(tick * course.period, motion, target, command, wheels, climber)
             wrench = forces(climber, *wheels)
-            body = Plain.of(climber)
-            for _ in range(course.steps):
-                motion = advanced(body, motion, wrench, step)
+            on_period()
+            motion = advance(Plain.of(climber), motion, wrench, step, course.steps)
         return tally.outcome()
 
     @property
@@ -130,12 +134,29 @@ class Loops:
             yield climber
 
 
+def keep_what_is_freed() -> None:
+    """Let glibc keep memory that a step frees for the next one, which halves its time.
+
+    It gives back to the system whatever is freed at the end of its heap, but for twice as much as
+    the largest block that was freed so far: one of 16 MB will do.
+    """
+    np.empty(2 << 20)
+
+
 def _targets(course: Course, ticks: int) -> Iterator[Target]:
     for first in range(0, ticks + 1, CHUNK):
         times = np.arange(first, min(first + CHUNK, ticks + 1)) * course.period
         target = course.trajectory.at(times).target
         rows = zip(*(each.tolist() for each in target), strict=True)
         yield from (Target(*numbers) for numbers in rows)
+
+
+def _advancing(compiled: bool) -> Callable[[Plain, Motion, Wrench, float, int], Motion]:
+    if not compiled:
+        return advanced_often
+    from climber_uk.simulation.compiled import advanced  # numba takes long to import
+
+    return advanced
 
 
 def _within(torques: Torques, climber: Climber, motion: Motion) -> Torques:

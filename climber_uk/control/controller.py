@@ -98,13 +98,13 @@ class Controller:
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.law.lookahead(period)
-        track, bounds = self.constraints.track(target), self._bounds(situation)
-        drive, turn = forces(climber, *held)
+        track, (right, left) = self.constraints.track(target), self._bounds(situation)
+        drive, turn = forces(climber, held.right, held.left)
         for _ in range(2 if ahead else 1):
             aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)
             drive, turn, lateral = self.force(self.constraints.demand(track, aim), aim)
             wrench = Wrench(drive - r_drive, turn - r_turn)
-            drive, turn = limited(climber, wrench, *bounds)
+            drive, turn = limited(climber, wrench, right, left)
         lost = Wrench(wrench.drive - drive, wrench.turn - turn)
         return Command(torques(climber, drive, turn), wrench, lateral, lost)
 
@@ -135,4 +135,5 @@ class Controller:
 
 
 def _near(bounds: Bounds, torque: Any, change: Any) -> Bounds:
-    return clipped(torque - change, *bounds), clipped(torque + change, *bounds)
+    lowest, highest = bounds
+    return clipped(torque - change, lowest, highest), clipped(torque + change, lowest, highest)

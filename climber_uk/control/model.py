@@ -96,13 +96,9 @@ class Observer:
         else:
             g, h, k = 1 - memory**2, new**2, 0.0
             disturbance = _faded(disturbance, time)
-        motion = Motion(
-            x + g * (ahead * cosine - beside * sine),
-            y + g * (ahead * sine + beside * cosine),
-            *rotated(heading, cosine, sine, g * turned),
-            v + h / time * ahead,
-            omega + h / time * turned,
-        )
+        x, y = x + g * (ahead * cosine - beside * sine), y + g * (ahead * sine + beside * cosine)
+        v, omega = v + h / time * ahead, omega + h / time * turned
+        motion = Motion(x, y, *rotated(heading, cosine, sine, g * turned), v, omega)
         return motion, _more(climber, disturbance, k / time**2 * ahead, k / time**2 * turned)
 
 

@@ -12,6 +12,8 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 
+TURN = 2 * math.pi  # [rad]
+
 
 def _either(of_float: Callable[[float], float], of_array: Callable[[Array], Array]) -> Any:
     return lambda x: of_float(x) if isinstance(x, float) else of_array(x)
@@ -23,6 +25,7 @@ arctan = _either(math.atan, np.arctan)
 tanh = _either(math.tanh, np.tanh)
 sqrt = _either(math.sqrt, np.sqrt)
 exp = _either(math.exp, np.exp)
+floor = _either(math.floor, np.floor)
 sign = _either(lambda x: float((x > 0) - (x < 0)), np.sign)
 
 
@@ -33,7 +36,7 @@ def with_sign_of(size: Any, of: Any) -> Any:
 
 def wrapped(angle: Any) -> Any:
     """The same angle in [-π, π)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
+    return angle - TURN * floor(angle / TURN + 0.5)
 
 
 def clipped(value: Any, lowest: Any, highest: Any) -> Any:

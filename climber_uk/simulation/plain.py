@@ -40,6 +40,13 @@ def advanced(body: Plain, motion: Motion, wrench: Wrench, time: float) -> Motion
     return amended(rests, end, _from_rest, body, motion, wrench, time)
 
 
+def advanced_often(body: Plain, motion: Motion, wrench: Wrench, time: float, steps: int) -> Motion:
+    """Motion after `steps` such steps."""
+    for _ in range(steps):
+        motion = advanced(body, motion, wrench, time)
+    return motion
+
+
 def slid(body: Plain, motion: Motion, wrench: Wrench, direction: Any, time: Any) -> Motion:
     """Motion `time` [s] later of a climber whose seal slides in `direction`, 1 or -1."""
     x, y, heading, c_0, s_0, v_0, omega = motion
@@ -67,8 +74,9 @@ def _held(body: Plain, motion: Motion, wrench: Wrench, time: Any) -> Motion:
     """Motion `time` [s] later of a climber that friction holds: it may turn on the spot."""
     x, y, heading, cosine, sine, v, omega = motion
     turning = wrench.turn / body.yaw_inertia
-    turned = rotated(heading, cosine, sine, time * (omega + time / 2 * turning))
-    return Motion(x, y, *turned, 0.0 * v, omega + time * turning)
+    angle = time * (omega + time / 2 * turning)
+    heading, cosine, sine = rotated(heading, cosine, sine, angle)
+    return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * turning)
 
 
 def _push(body: Plain, motion: Motion, wrench: Wrench) -> Any:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from climber_uk.control.constraints import Exact, Guidance, demanded, rows
 from climber_uk.control.controller import Controller, Law, Situation
 from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Torques, Wrench, forces, limited, torques
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, limited, torques
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -115,3 +115,29 @@ def test_holding_torques_keep_the_climber_where_it_is():
         torques = controller.holding(situation(state), 5.0)
         state = plant.advance(state, np.array(torques), steps=2)
     np.testing.assert_allclose(state.velocity, 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("constraints", [Guidance(), Exact()], ids=["guidance", "exact"])
+@pytest.mark.parametrize("limit", [1.2, 20.0])
+def test_one_call_serves_many_climbers(constraints, limit):
+    random, n = np.random.default_rng(9), 40
+    climber = Climber(max_wheel_torque=limit)
+    controller = Controller(climber, constraints, Law(max_torque_rate=1000.0))
+    reference = PAPER.at(1.0)
+    pose = reference.pose + random.normal(size=(n, 3)) * 0.1
+    motion = State.rolling(pose, 8 + random.normal(size=n), random.normal(size=n)).motion
+    held, disturbance = random.normal(size=(2, n)), 10 * random.normal(size=(2, n))
+    many = Situation(motion, Torques(*held), Wrench(*disturbance), PERIOD)
+    together = controller.command(many, reference.target)
+    for i in range(n):
+        one = Situation(
+            Motion(*(float(number[i]) for number in motion)),
+            Torques(*held[:, i].tolist()),
+            Wrench(*disturbance[:, i].tolist()),
+            PERIOD,
+        )
+        alone = controller.command(one, reference.target)
+        for name in ("torques", "constraint_force", "missing"):
+            expected = getattr(alone, name)
+            got = getattr(together, name)[i]
+            np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * 100)
