@@ -101,7 +101,7 @@ class Loops:
             on_their_way.append(command.wheels)
             wheels = _within(on_their_way.popleft(), climber, motion)
             tally.add(tick * course.period, motion, target, command, wheels, climber)
-            wrench = forces(climber, *wheels)
+            wrench = Wrench(*forces(climber, *wheels))
             on_period()
             motion = advance(Plain.of(climber), motion, wrench, step, course.steps)
         return tally.outcome()

@@ -67,9 +67,7 @@ class Tally:
             np.maximum(self.peak, np.abs(torque) * self._on_wall, out=self.peak)
         lateral = climber.mass * motion.speed * motion.yaw_rate
         lateral = lateral + climber.weight_along_wall * motion.cosine
-        margin = self.contact.slip_margin(
-            climber, self._into, forces(climber, *wheels).drive, lateral
-        )
+        margin = self.contact.slip_margin(climber, self._into, forces(climber, *wheels)[0], lateral)
         self.slip = np.where(self._on_wall, np.minimum(self.slip, margin), self.slip)
 
     def _hold(self, time: float, climber: Climber) -> None:

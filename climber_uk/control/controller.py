@@ -102,11 +102,11 @@ class Controller:
         drive, turn = forces(climber, held.right, held.left)
         for _ in range(2 if ahead else 1):
             aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)
-            drive, turn, lateral = self.force(self.constraints.demand(track, aim), aim)
-            wrench = Wrench(drive - r_drive, turn - r_turn)
-            drive, turn = limited(climber, wrench, right, left)
-        lost = Wrench(wrench.drive - drive, wrench.turn - turn)
-        return Command(torques(climber, drive, turn), wrench, lateral, lost)
+            wanted, turned, lateral = self.force(self.constraints.demand(track, aim), aim)
+            wanted, turned = wanted - r_drive, turned - r_turn
+            drive, turn = limited(climber, wanted, turned, right, left)
+        lost = Wrench(wanted - drive, turned - turn)
+        return Command(torques(climber, drive, turn), Wrench(wanted, turned), lateral, lost)
 
     def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
         """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
@@ -123,7 +123,7 @@ class Controller:
         weight = climber.weight_along_wall * motion.sine
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
-        return torques(climber, *limited(climber, Wrench(drive, turn), *self._bounds(situation)))
+        return torques(climber, *limited(climber, drive, turn, *self._bounds(situation)))
 
     def _bounds(self, situation: Situation) -> tuple[Bounds, Bounds]:
         right, left = torque_bounds(self.climber, situation.motion)

@@ -57,10 +57,10 @@ class Torques(NamedTuple):
     left: Any
 
 
-def forces(climber: "Climber", right: Any, left: Any) -> Wrench:
-    """Force along the climber (τR + τL)/r and moment about it d (τR - τL)/r."""
+def forces(climber: "Climber", right: Any, left: Any) -> tuple[Any, Any]:
+    """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
     radius = climber.wheel_radius
-    return Wrench((right + left) / radius, climber.half_track * (right - left) / radius)
+    return (right + left) / radius, climber.half_track * (right - left) / radius
 
 
 def torques(climber: "Climber", drive: Any, turn: Any) -> Torques:
@@ -94,19 +94,21 @@ def _bounds(limit: Any, part: Any) -> Bounds:
     return -limit * clipped(1 + part, 0.0, 1.0), limit * clipped(1 - part, 0.0, 1.0)
 
 
-def limited(climber: "Climber", wrench: Wrench, right: Bounds, left: Bounds) -> Wrench:
-    """What wheels within their bounds can do of a wrench, the turn served before the drive."""
+def limited(
+    climber: "Climber", drive: Any, turn: Any, right: Bounds, left: Bounds
+) -> tuple[Any, Any]:
+    """What wheels within their bounds can do of both, the turn served before the drive."""
     (right_low, right_high), (left_low, left_high) = right, left
     to_mean = climber.wheel_radius / 2
     to_twist = to_mean / climber.half_track
-    mean, twist = to_mean * wrench.drive, to_twist * wrench.turn  # τR,L = mean ± twist
+    mean, twist = to_mean * drive, to_twist * turn  # τR,L = mean ± twist
     one, other = mean + twist, mean - twist
     if everywhere(
         (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
     ):
-        return wrench
+        return drive, turn
     twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
     lowest, highest = right_low - twist, right_high - twist
     lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
     highest = highest - clipped(highest - (left_high + twist), 0.0, float("inf"))
-    return Wrench(clipped(mean, lowest, highest) / to_mean, twist / to_twist)
+    return clipped(mean, lowest, highest) / to_mean, twist / to_twist

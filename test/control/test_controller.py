@@ -59,7 +59,7 @@ bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[
 @given(st.floats(-50, 50), st.floats(-50, 50), bounds, bounds)
 def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
     climber = Climber()
-    wrench = limited(climber, forces(climber, right, left), right_bounds, left_bounds)
+    wrench = limited(climber, *forces(climber, right, left), right_bounds, left_bounds)
     got = torques(climber, *wrench)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
         assert low - 1e-9 <= torque <= high + 1e-9

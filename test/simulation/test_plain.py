@@ -43,13 +43,13 @@ def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest):
         torques = wheels(random, motion)
         was = np.sign(motion.speed)
         for _ in range(2):
-            motion = advanced(body, motion, forces(PAPER, *torques), step)
+            motion = advanced(body, motion, Wrench(*forces(PAPER, *torques)), step)
         changes += np.count_nonzero(np.sign(motion.speed) != was)
         for i in range(12):
             pair = torques[:, i]
             states[i] = plant.advance(states[i], pair, steps=2)
             for _ in range(2):
-                alone[i] = advanced(body, alone[i], forces(PAPER, *pair.tolist()), step)
+                alone[i] = advanced(body, alone[i], Wrench(*forces(PAPER, *pair.tolist())), step)
             expected = states[i].motion
             np.testing.assert_allclose(floats(part(motion, i)), expected, atol=1e-9)
             np.testing.assert_allclose(alone[i], expected, atol=1e-9)
