@@ -2,9 +2,9 @@
 
 Whatever is a number in a `Climber`, in gains, in sensors or in a start may be an array (N,) of one
 for each loop. Loops go through time in blocks that fit the cache, and what is told of them is
-gathered on the way: memory does not grow with the duration. Not in here, but in `simulate`: a
-reference that waits, jumps and safe outputs, lost and late messages, motors with a lag, wheel
-odometry, pumps, and every contact but that of a `Plain` climber.
+gathered on the way: memory grows with the block, not with N or the duration. Not in here, but in
+`simulate`: a reference that waits, jumps and safe outputs, lost and late messages, motors with a
+lag, wheel odometry, pumps, and every contact but that of a `Plain` climber.
 """
 
 from collections import deque
@@ -22,8 +22,9 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.contact import Contact, Wheeled
 from climber_uk.mechanics.elementary import clipped
+from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, part
 from climber_uk.mechanics.motion import Motion, Target, Torques, Wrench, forces, torque_bounds
 from climber_uk.mechanics.preview import SECOND, Preview
@@ -66,7 +67,21 @@ class Loops:
     seeds: Array | None = None  # (N,) integers: noise as the plant's sensors make it of a seed
     changes: tuple[Change, ...] = ()
     timing: Timing = field(default_factory=Timing)
-    contact: Contact = field(default_factory=Contact)
+    contact: Contact = field(default_factory=Contact)  # for the margins
+
+    def __post_init__(self) -> None:
+        if self.seeds is None and not self.sensors.are_exact:
+            raise ValueError("seeds=None must be one for each loop, for sensors that err")
+        sensors, contact = self.sensors, self.contact
+        for name, value, wanted in (
+            ("odometry_source", sensors.odometry_source, "truth"),
+            ("odometry_delay", sensors.odometry_delay, 0.0),
+            ("friction", type(contact.friction), Coulomb),
+            ("locomotion", type(contact.locomotion), Wheeled),
+            ("seal_radius", contact.grip.seal_radius, 0.0),
+        ):
+            if value != wanted:
+                raise ValueError(f"{name}={value!r} must be {wanted!r} in many loops at once")
 
     def run(self, course: Course, block: int = BLOCK) -> Outcome:
         """What became of each loop, arrays (N,)."""
@@ -94,7 +109,7 @@ class Loops:
             told = motion if noise is None else self.sensors.told(motion, noise)
             tracker.see(SECOND + round(tick * course.period * SECOND), told)
             command = tracker.answer(preview, 0.0)
-            assert command is not None
+            assert command is not None  # the preview goes beyond the duration
             if not on_their_way:
                 before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
                 on_their_way.extend([before] * course.delay)
@@ -115,8 +130,8 @@ class Loops:
         if self.sensors.are_exact:
             yield from [None] * (ticks + 1)
             return
-        assert self.seeds is not None
-        randoms = [np.random.default_rng(seed) for seed in self.seeds.tolist()]
+        seeds = np.asarray(self.seeds).tolist()
+        randoms = [np.random.default_rng(seed) for seed in seeds]
         for first in range(0, ticks + 1, CHUNK):
             many = min(CHUNK, ticks + 1 - first)
             drawn = np.array([random.normal(size=(many, 5)) for random in randoms])

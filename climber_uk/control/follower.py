@@ -124,7 +124,7 @@ class Follower:
                 self._start_anew()
                 self._unsettled = self.safety.settling_messages
             self._unsettled -= self._unsettled > 0
-            tracker.see(stamp, motion)
+            tracker.see(stamp, motion, expected)
         if self._unsettled:
             return Mode.JUMPED, ""
         if self._moved_without_twist > MOVED:

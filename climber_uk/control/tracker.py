@@ -91,14 +91,14 @@ class Tracker:
         self.controller, self.observer = controller, observer
         self.timing, self.pacing = timing, pacing
 
-    def see(self, stamp: int, motion: Motion) -> None:
-        """Take in a newer odometry."""
+    def see(self, stamp: int, motion: Motion, expected: Motion | None = None) -> None:
+        """Take in a newer odometry; who has asked for what is expected by then may hand it back."""
         if self.motion is not None:
             time = (stamp - self.stamp) / SECOND
             share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
             self.period += share * (time - self.period)
             self._period_is_measured = True
-            expected = self.expected_at(stamp)
+            expected = expected or self.expected_at(stamp)
             motion, learnt = self.observer.corrected(
                 self.controller.climber, self.disturbance, expected, motion, time
             )

@@ -13,6 +13,7 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.contact import Contact, Grip
 from climber_uk.mechanics.many import part
 from climber_uk.mechanics.motion import Motion
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
@@ -156,3 +157,19 @@ def test_friction_that_jumps_is_learnt():
     outcome = loops.run(Course(EIGHT, 1.0))
     assert (outcome.peak_torque[:2] > outcome.peak_torque[2:].max() + 0.1).all()
     assert (outcome.worst < 0.05).all()
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"sensors": Sensors(speed_noise=0.1)}, "seeds=None must be one for each loop"),
+        (
+            {"sensors": Sensors(odometry_source="wheels")},
+            "odometry_source='wheels' must be 'truth'",
+        ),
+        ({"contact": Contact(grip=Grip(seal_radius=0.1))}, "seal_radius=0.1 must be 0.0"),
+    ],
+)
+def test_what_only_one_climber_can_do_is_refused(changed, said):
+    with pytest.raises(ValueError, match=said):
+        Loops(ON_EIGHT, BUILT, Controller(BUILT, SLOW, Law()), **changed)
