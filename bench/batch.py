@@ -19,8 +19,10 @@ from climber_uk.analysis.closed_loop import sampled
 from climber_uk.analysis.closed_loops import Course, Loops
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
+from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.motion import Motion, Wrench
+from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -28,7 +30,7 @@ from climber_uk.simulation.plain import Plain, advanced_often
 
 PAPER = Climber()
 ELLIPSE = Trajectory(Ellipse(), ConstantRate())
-OPEN, CLOSED = 10_000, 8192  # climbers
+OPEN, CLOSED, IN_C = 10_000, 8192, 512  # climbers; C needs no large blocks
 STEP, STEPS, TICKS = 0.0025, 20, 40  # [s]; steps, and ticks, in a measurement
 RATES = {"2.5 ms": 2, "1 ms": 5}  # steps of the plant in a tick of 5 ms
 
@@ -86,10 +88,13 @@ def open_loop(limit: Limit | None, with_numba: bool) -> dict[str, Way]:
         numbers, wrenches, motions = climber_numbers(PAPER, 1), np.array(wrench), np.array(motion)
         given = limit.pointer("Climber", numbers), limit.pointer("double", wrenches)
 
-        def in_c() -> None:
+        def in_c() -> Array:
             rows = motions.copy()
             limit.library.open_loops(OPEN, STEPS, STEP, *given, limit.pointer("double", rows))
+            return rows
 
+        if np.abs(in_c() - advanced_often(body, motion, wrench, STEP, STEPS)).max() > 1e-9:
+            raise RuntimeError("the C does something else")
         run["C"] = timed(in_c)
     return {name: Way(function, steps) for name, function in run.items()}
 
@@ -124,16 +129,21 @@ def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, 
     if with_numba:
         run["numpy, numba's plant"] = ours(True)
     if limit is not None:
-        run["C"] = closed_in_c(limit, loops, steps)
-    return {name: Way(function, CLOSED * TICKS * steps) for name, function in run.items()}
+        run["C"] = closed_in_c(limit, many_loops(IN_C), steps)
+    return {
+        name: Way(function, (IN_C if name == "C" else CLOSED) * TICKS * steps)
+        for name, function in run.items()
+    }
 
 
 def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
     """The same in C."""
-    controllers = controller_numbers(loops.controller, loops.observer, CLOSED)
-    climbers, start = climber_numbers(loops.climber, CLOSED), np.array(loops.start).T.copy()
-    aims = np.array([ELLIPSE.at(0.005 * (tick + 0.5)).target for tick in range(TICKS)])
-    memories = np.zeros((CLOSED, 12))
+    controllers = controller_numbers(loops.controller, loops.observer, IN_C)
+    climbers, start = climber_numbers(loops.climber, IN_C), np.array(loops.start).T.copy()
+    preview = sampled(ELLIPSE, 1.0)
+    times = (SECOND + round((tick + 0.5) * 0.005 * SECOND) for tick in range(TICKS))
+    aims = np.array([preview.target(time) for time in times])
+    memories = np.zeros((IN_C, 12))
     memories[:, :7] = start
     given = (
         limit.pointer("Controller", controllers),
@@ -141,14 +151,18 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
         limit.pointer("Target", aims),
     )
 
-    def run() -> float:
+    def in_c() -> Array:
         motions, memory = start.copy(), memories.copy()
         mutable = limit.pointer("Motion", motions), limit.pointer("Memory", memory)
-        return timed(
-            lambda: limit.library.closed_loops(CLOSED, TICKS, steps, 0.005, *given, *mutable)
-        )()
+        limit.library.closed_loops(IN_C, TICKS, steps, 0.005, *given, *mutable)
+        return motions
 
-    return run
+    end = ELLIPSE.at(TICKS * 0.005).target
+    far = np.hypot(*(in_c()[:, :2] - (end.x, end.y)).T)
+    ours = loops.run(Course(ELLIPSE, TICKS * 0.005, steps=steps)).last
+    if np.abs(far - ours).max() > 1e-9:
+        raise RuntimeError(f"the C is {np.abs(far - ours).max()} m elsewhere")
+    return timed(in_c)
 
 
 def half(number: int) -> float:

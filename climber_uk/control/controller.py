@@ -8,13 +8,14 @@ torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from climber_uk.control.constraints import ConstraintSet, Demand
+from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.model import rolled
 from climber_uk.mechanics import Array, pack
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
 from climber_uk.mechanics.motion import (
     Bounds,
+    Demand,
     Motion,
     Target,
     Torques,

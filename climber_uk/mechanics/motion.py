@@ -43,6 +43,14 @@ class Target(NamedTuple):
     j_y: Any  # [m/s³]
 
 
+class Demand(NamedTuple):
+    """What a constraint set asks of a climber."""
+
+    acceleration: Any  # v̇ [m/s²]
+    turning: Any  # θ̈ [rad/s²]
+    speed: Any  # forward [m/s]; its sign is the way friction will be met
+
+
 class Wrench(NamedTuple):
     """What pushes a climber forward, and what turns it."""
 
