@@ -125,5 +125,5 @@ def constraint_errors(gains: Guidance, state: State, reference: Reference) -> tu
     w_1 = g * (state.forward_speed * sin(turned) - reference.yaw_rate * e_x)
     led_1 = state.yaw_rate - reference.yaw_rate + w_1 / (1 + w**2)
     heading = led_1 + gains.heading_frequency * (turned + arctan(w))
-    wanted = demanded(gains, state, reference).speed
+    _, _, wanted = demanded(gains, state, reference)
     return float(state.forward_speed - wanted), float(heading)

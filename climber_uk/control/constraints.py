@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from climber_uk.control.guidance import Track, guided, on_track
+from climber_uk.control.guidance import guided, on_track
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import State, across, along, no_slip
 from climber_uk.mechanics.elementary import cos, select, sin, wrapped
@@ -41,7 +41,7 @@ def rows(state: State, demand: Demand) -> tuple[Array, Array]:
     slip_row, slip_b = no_slip(state)
     sine, minus_cosine, zero = unpack(slip_row)
     A = np.stack([pack(-minus_cosine, sine, zero), pack(zero, zero, zero + 1), slip_row], axis=-2)
-    return A, pack(demand.acceleration, demand.turning, slip_b)
+    return A, pack(*demand[:2], slip_b)
 
 
 def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Array]:
@@ -82,13 +82,8 @@ class Guidance:
     def __post_init__(self) -> None:
         check(self)
 
-    def track(self, target: Target) -> Track:
-        """See `ConstraintSet`."""
-        return on_track(self, target)
-
-    def demand(self, track: Track, motion: Motion) -> Demand:
-        """See `ConstraintSet`."""
-        return guided(self, track, motion)
+    track = on_track  # see `ConstraintSet`
+    demand = guided
 
 
 @dataclass(frozen=True)
@@ -112,29 +107,25 @@ class Exact:
         """See `ConstraintSet`."""
         return target
 
-    def demand(self, track: Target, motion: Motion) -> Demand:
+    def demand(self, target: Target, motion: Motion) -> Demand:
         """See `ConstraintSet`."""
-        return _exact(self, track, motion)
+        x, y, _, cosine, sine, v, omega = motion
+        x_d, y_d, heading_d, v_x, v_y, _, a_x, a_y, _, j_x, j_y = target
+        K_d, K_p = 2 * self.natural_frequency, self.natural_frequency * self.natural_frequency
+        e_x1, e_y1 = v_x - v * cosine, v_y - v * sine
+        u_x = a_x + K_d * e_x1 + K_p * (x_d - x)
+        u_y = a_y + K_d * e_y1 + K_p * (y_d - y)
 
+        # what p̈ will be: u along the heading, and the centripetal v ω across it
+        v_1, centripetal = u_x * cosine + u_y * sine, v * omega
+        u_x1 = j_x + K_d * (a_x - v_1 * cosine + centripetal * sine) + K_p * e_x1
+        u_y1 = j_y + K_d * (a_y - v_1 * sine - centripetal * cosine) + K_p * e_y1
 
-def _exact(gains: Exact, target: Target, motion: Motion) -> Demand:
-    x, y, _, cosine, sine, v, omega = motion
-    x_d, y_d, heading_d, v_x, v_y, _, a_x, a_y, _, j_x, j_y = target
-    K_d, K_p = 2 * gains.natural_frequency, gains.natural_frequency * gains.natural_frequency
-    e_x1, e_y1 = v_x - v * cosine, v_y - v * sine
-    u_x = a_x + K_d * e_x1 + K_p * (x_d - x)
-    u_y = a_y + K_d * e_y1 + K_p * (y_d - y)
-
-    # what p̈ will be: u along the heading, and the centripetal v ω across it
-    v_1, centripetal = u_x * cosine + u_y * sine, v * omega
-    u_x1 = j_x + K_d * (a_x - v_1 * cosine + centripetal * sine) + K_p * e_x1
-    u_y1 = j_y + K_d * (a_y - v_1 * sine - centripetal * cosine) + K_p * e_y1
-
-    phi = centripetal - (u_y * cosine - u_x * sine)
-    turning = u_y1 * cosine - u_x1 * sine - 2 * v_1 * omega - gains.hidden_rate * phi
-    at_rest = abs(v) < REST_SPEED
-    theta_2 = select(at_rest, 0.0, turning / select(at_rest, 1.0, v))
-    return Demand(v_1, theta_2, v_x * cos(heading_d) + v_y * sin(heading_d))
+        phi = centripetal - (u_y * cosine - u_x * sine)
+        turning = u_y1 * cosine - u_x1 * sine - 2 * v_1 * omega - self.hidden_rate * phi
+        at_rest = abs(v) < REST_SPEED
+        theta_2 = select(at_rest, 0.0, turning / select(at_rest, 1.0, v))
+        return v_1, theta_2, v_x * cos(heading_d) + v_y * sin(heading_d)
 
 
 CONSTRAINTS: dict[str, type[Guidance] | type[Exact]] = {"guidance": Guidance, "exact": Exact}

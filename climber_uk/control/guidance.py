@@ -96,4 +96,4 @@ def guided(gains: "Guidance", track: Track, motion: Motion) -> Demand:
     part = tanh(omega_n * led / fastest)
     turning_back = led_1 + fastest * part  # 0 when it turns back as fast as it should
     theta_2 = omega_d1 - led_2 - omega_n * ((1 - part * part) * led_1 + turning_back)
-    return Demand(v_1, theta_2, wanted)
+    return v_1, theta_2, wanted

@@ -16,13 +16,13 @@ from climber_uk.mechanics.elementary import (
     exp,
     rotated,
     select,
-    with_sign_of,
     wrapped,
 )
 from climber_uk.mechanics.motion import Motion, Wrench
 from climber_uk.mechanics.parameter import check, parameter
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
+AMPLE = 1e9  # [N s/m] by a speed of that: more than any friction
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 
 
@@ -36,8 +36,9 @@ def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float)
     omega_1 = turn / climber.yaw_inertia
     _, c, s = rotated(heading, cosine, sine, half * (omega + half / 2 * omega_1))
     push = drive - climber.weight_along_wall * s
-    held = clipped(push, -friction, friction)
-    v_1 = (push - select(abs(v) > SLOW, with_sign_of(friction, v), held)) / climber.mass
+    # sliding, friction is all of f, against the motion; at rest, as much as is pushed against it
+    rubbing = clipped(select(abs(v) > SLOW, v * AMPLE, push), -friction, friction)
+    v_1 = (push - rubbing) / climber.mass
     way = time * (v + half * v_1)
     heading, cosine, sine = rotated(heading, cosine, sine, time * (omega + half * omega_1))
     v, omega = v + time * v_1, omega + time * omega_1

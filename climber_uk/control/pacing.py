@@ -50,7 +50,7 @@ class Pace(NamedTuple):
     def after(self, time: float, pacing: Pacing) -> "Pace":
         """Pace `time` [s] later, on its way back to no lag."""
         if self == IN_TIME:
-            return self
+            return IN_TIME
         rate = max(self.rate + time * self.change, 0.0)
         lag = max(self.lag + time * (1 - (self.rate + rate) / 2), 0.0)
         wanted = 1 + min(lag / pacing.recovery_time, pacing.catch_up)

@@ -12,8 +12,8 @@ from climber_uk.control.acting import NONE, Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
 from climber_uk.control.model import Observer, rolled
-from climber_uk.control.pacing import Pace, Pacing
-from climber_uk.mechanics.elementary import select
+from climber_uk.control.pacing import IN_TIME, Pacing
+from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND, Preview
@@ -79,7 +79,7 @@ class Tracker:
 
     def start_pace(self) -> None:
         """Follow the reference in its own time."""
-        self.pace = Pace()
+        self.pace = IN_TIME
         self._paced_at: int | None = None
 
     def retune(
@@ -103,11 +103,7 @@ class Tracker:
                 self.controller.climber, self.disturbance, expected, motion, time
             )
             if self._acting.are_known_since(self.stamp):
-                drive, turn = self.disturbance
-                self.disturbance = Wrench(
-                    select(self._learning, learnt.drive, drive),
-                    select(self._learning, learnt.turn, turn),
-                )
+                self.disturbance = chosen(self._learning, learnt, self.disturbance)
         elif self.observer.velocity_source == "pose":
             motion = motion._replace(speed=0.0, yaw_rate=0.0)
         self.stamp, self.motion = stamp, motion
@@ -125,7 +121,7 @@ class Tracker:
         if self.pacing.catch_up > 0:
             since = begins if self._paced_at is None else self._paced_at
             pace = pace.after((begins - since) / SECOND, self.pacing)
-        target = pace.target(preview, aim)
+        target = preview.target(aim) if pace is IN_TIME else pace.target(preview, aim)
         if target is None:
             return None
         command = controller.command(situation, target)
@@ -163,6 +159,8 @@ class Tracker:
         """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.motion is not None
         motion, climber, disturbance = self.motion, self.controller.climber, self.disturbance
+        if stamp == self.stamp:
+            return motion
         for torques, time in self._acting.between(self.stamp, stamp):
             drive, turn = forces(climber, *torques)
             drive, turn = drive + disturbance.drive, turn + disturbance.turn

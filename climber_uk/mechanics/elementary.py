@@ -50,6 +50,8 @@ def clipped(value: Any, lowest: Any, highest: Any) -> Any:
 
 def select(condition: Any, this: Any, that: Any) -> Any:
     """`this` where `condition` holds, else `that`."""
+    if condition is True:
+        return this
     if isinstance(condition, np.ndarray):
         return np.where(condition, this, that)
     return this if condition else that
@@ -57,7 +59,7 @@ def select(condition: Any, this: Any, that: Any) -> Any:
 
 def everywhere(condition: Any) -> Any:
     """Whether `condition` holds for the one, or for all of many."""
-    return bool(condition.all()) if isinstance(condition, np.ndarray) else condition
+    return condition if condition is True or condition is False else bool(np.all(condition))
 
 
 SMALL = 0.03  # [rad] of an angle whose sine and cosine are a few terms of their series

@@ -32,23 +32,26 @@ def amended(condition: Any, regular: Any, exceptional: Callable[..., Any], *argu
     """
     if not isinstance(condition, np.ndarray):
         return exceptional(*arguments) if condition else regular
-    chosen = np.flatnonzero(condition)
-    if not len(chosen):
+    which = np.flatnonzero(condition)
+    if not len(which):
         return regular
-    instead = exceptional(*(part(argument, chosen) for argument in arguments))
+    instead = exceptional(*(part(argument, which) for argument in arguments))
     whole = []
     for one, other in zip(regular, instead, strict=True):
         one = np.array(np.broadcast_to(one, condition.shape))
-        one[chosen] = other
+        one[which] = other
         whole.append(one)
     return type(regular)(*whole)
 
 
 def chosen(condition: Any, this: Any, that: Any) -> Any:
-    """Dataclass with `this` one's numbers where `condition` (N,) holds, else with `that` one's."""
-    fields = dataclasses.fields(this)
-    pairs = {field.name: (getattr(this, field.name), getattr(that, field.name)) for field in fields}
+    """Tuple or dataclass with the numbers of `this` where `condition` holds, else of `that`."""
+    if not isinstance(condition, np.ndarray):
+        return this if condition else that
+    if isinstance(this, tuple):
+        return type(this)(*(np.where(condition, *pair) for pair in zip(this, that, strict=True)))
+    names = [field.name for field in dataclasses.fields(this)]
+    pairs = {name: (getattr(this, name), getattr(that, name)) for name in names}
     differ = {name: pair for name, pair in pairs.items() if not np.array_equal(*pair)}
-    return dataclasses.replace(
-        that, **{name: np.where(condition, *pair) for name, pair in differ.items()}
-    )
+    changed = {name: np.where(condition, *pair) for name, pair in differ.items()}
+    return dataclasses.replace(that, **changed)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from climber_uk.mechanics.climber import Climber
 
 Bounds = tuple[Any, Any]  # lowest and highest torque of a wheel [N m]
+# v̇ [m/s²] and θ̈ [rad/s²] asked of a climber, and the speed [m/s] whose sign friction will have
+Demand = tuple[Any, Any, Any]
 
 
 class Motion(NamedTuple):
@@ -41,14 +43,6 @@ class Target(NamedTuple):
     yaw_acceleration: Any  # [rad/s²]
     j_x: Any  # jerk [m/s³]
     j_y: Any  # [m/s³]
-
-
-class Demand(NamedTuple):
-    """What a constraint set asks of a climber."""
-
-    acceleration: Any  # v̇ [m/s²]
-    turning: Any  # θ̈ [rad/s²]
-    speed: Any  # forward [m/s]; its sign is the way friction will be met
 
 
 class Wrench(NamedTuple):

@@ -41,8 +41,8 @@ class Preview:
                 raise ValueError(f"{name} of a point is not finite")
 
     @cached_property
-    def _pieces(self) -> tuple[list[int], list[float], list[list[list[float]]]]:
-        """Times [ns], lengths h (n-1,) [s] and coefficients (n-1, 3, 6) of 1, u … u⁵, u = 0…1."""
+    def _pieces(self) -> tuple[list[int], list[list[list[float]]]]:
+        """Times [ns], and coefficients (n-1, 3, 6) of 1, t … t⁵, t [s] since each."""
         h = np.diff(self.times)[:, None] * 1e-9
         way = np.diff(self.pose, axis=0)
         way[:, 2] = np.mod(way[:, 2] + np.pi, 2 * np.pi) - np.pi
@@ -53,8 +53,8 @@ class Preview:
         c_3 = 10 * p_left - 4 * v_left + a_left / 2
         c_4 = -15 * p_left + 7 * v_left - a_left
         c_5 = 6 * p_left - 3 * v_left + a_left / 2
-        coefficients = np.stack([self.pose[:-1], v, a / 2, c_3, c_4, c_5], axis=2)
-        return self.times.tolist(), h[:, 0].tolist(), coefficients.tolist()
+        by_share = np.stack([self.pose[:-1], v, a / 2, c_3, c_4, c_5], axis=2)  # of h
+        return self.times.tolist(), (by_share / h[..., None] ** np.arange(6)).tolist()
 
     def at(self, time: int) -> Reference | None:
         """Reference at `time` [ns]; None outside of the points."""
@@ -63,16 +63,15 @@ class Preview:
 
     def target(self, time: int) -> Target | None:
         """The same in components."""
-        times, lengths, coefficients = self._pieces
+        times, coefficients = self._pieces
         if not times[0] <= time <= times[-1]:
             return None
         i = min(bisect_right(times, time), len(times) - 1) - 1
-        h = lengths[i]
-        u = float(time - times[i]) * 1e-9 / h
+        t = float(time - times[i]) * 1e-9
         along_x, along_y, turning = coefficients[i]
-        x, v_x, a_x, j_x = _derivatives(along_x, u, h)
-        y, v_y, a_y, j_y = _derivatives(along_y, u, h)
-        heading, omega, omega_1, _ = _derivatives(turning, u, h)
+        x, v_x, a_x, j_x = _derivatives(along_x, t)
+        y, v_y, a_y, j_y = _derivatives(along_y, t)
+        heading, omega, omega_1, _ = _derivatives(turning, t)
         return Target(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
 
     def goes_on_with(self, newer: "Preview", tolerance: float) -> bool:
@@ -95,14 +94,14 @@ class Preview:
         )
 
 
-def _derivatives(c: list[float], u: float, h: float) -> tuple[float, float, float, float]:
-    """Polynomial c₀ + c₁ u + … + c₅ u⁵ and its first three derivatives by the time u h."""
-    c_0, c_1, c_2, c_3, c_4, c_5 = c
+def _derivatives(coefficients: list[float], t: float) -> tuple[float, float, float, float]:
+    """Polynomial c₀ + c₁ t + … + c₅ t⁵ and its first three derivatives."""
+    c_0, c_1, c_2, c_3, c_4, c_5 = coefficients
     return (
-        c_0 + u * (c_1 + u * (c_2 + u * (c_3 + u * (c_4 + u * c_5)))),
-        (c_1 + u * (2 * c_2 + u * (3 * c_3 + u * (4 * c_4 + u * 5 * c_5)))) / h,
-        (2 * c_2 + u * (6 * c_3 + u * (12 * c_4 + u * 20 * c_5))) / (h * h),
-        (6 * c_3 + u * (24 * c_4 + u * 60 * c_5)) / (h * h * h),
+        c_0 + t * (c_1 + t * (c_2 + t * (c_3 + t * (c_4 + t * c_5)))),
+        c_1 + t * (2 * c_2 + t * (3 * c_3 + t * (4 * c_4 + t * 5 * c_5))),
+        2 * c_2 + t * (6 * c_3 + t * (12 * c_4 + t * 20 * c_5)),
+        6 * c_3 + t * (24 * c_4 + t * 60 * c_5),
     )
 
 

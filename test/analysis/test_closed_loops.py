@@ -157,6 +157,9 @@ def test_friction_that_jumps_is_learnt():
     outcome = loops.run(Course(EIGHT, 1.0))
     assert (outcome.peak_torque[:2] > outcome.peak_torque[2:].max() + 0.1).all()
     assert (outcome.worst < 0.05).all()
+    all_of_them = replace(loops, changes=(Change(0.2, rough),)).run(Course(EIGHT, 1.0))
+    np.testing.assert_allclose(all_of_them.rms[:2], outcome.rms[:2], rtol=1e-12)
+    assert (all_of_them.peak_torque[2:] > outcome.peak_torque[2:] + 0.1).all()
 
 
 @pytest.mark.parametrize(
