@@ -23,7 +23,6 @@ from climber_uk.mechanics.motion import (
     forces,
     limited,
     torque_bounds,
-    torques,
 )
 from climber_uk.mechanics.parameter import check, parameter
 
@@ -105,9 +104,9 @@ class Controller:
             aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)
             wanted, turned, lateral = self.force(self.constraints.demand(track, aim), aim)
             wanted, turned = wanted - r_drive, turned - r_turn
-            drive, turn = limited(climber, wanted, turned, right, left)
+            drive, turn, one, other = limited(climber, wanted, turned, right, left)
         lost = Wrench(wanted - drive, turned - turn)
-        return Command(torques(climber, drive, turn), Wrench(wanted, turned), lateral, lost)
+        return Command(Torques(one, other), Wrench(wanted, turned), lateral, lost)
 
     def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
         """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
@@ -124,7 +123,7 @@ class Controller:
         weight = climber.weight_along_wall * motion.sine
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
-        return torques(climber, *limited(climber, drive, turn, *self._bounds(situation)))
+        return Torques(*limited(climber, drive, turn, *self._bounds(situation))[2:])
 
     def _bounds(self, situation: Situation) -> tuple[Bounds, Bounds]:
         right, left = torque_bounds(self.climber, situation.motion)

@@ -98,8 +98,11 @@ def _bounds(limit: Any, part: Any) -> Bounds:
 
 def limited(
     climber: "Climber", drive: Any, turn: Any, right: Bounds, left: Bounds
-) -> tuple[Any, Any]:
-    """What wheels within their bounds can do of both, the turn served before the drive."""
+) -> tuple[Any, Any, Any, Any]:
+    """What wheels within their bounds can do of drive and turn, the turn served first.
+
+    Drive and turn, and the torques of the right wheel and of the left one that do it.
+    """
     (right_low, right_high), (left_low, left_high) = right, left
     to_mean = climber.wheel_radius / 2
     to_twist = to_mean / climber.half_track
@@ -108,9 +111,10 @@ def limited(
     if everywhere(
         (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
     ):
-        return drive, turn
+        return drive, turn, one, other
     twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
     lowest, highest = right_low - twist, right_high - twist
     lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
     highest = highest - clipped(highest - (left_high + twist), 0.0, float("inf"))
-    return clipped(mean, lowest, highest) / to_mean, twist / to_twist
+    mean = clipped(mean, lowest, highest)
+    return mean / to_mean, twist / to_twist, mean + twist, mean - twist

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from climber_uk.control.constraints import Exact, Guidance, demanded, rows
 from climber_uk.control.controller import Controller, Law, Situation
 from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, limited, torques
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, limited
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -59,8 +59,10 @@ bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[
 @given(st.floats(-50, 50), st.floats(-50, 50), bounds, bounds)
 def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
     climber = Climber()
-    wrench = limited(climber, *forces(climber, right, left), right_bounds, left_bounds)
-    got = torques(climber, *wrench)
+    wrench = forces(climber, right, left)
+    *done, one, other = limited(climber, *wrench, right_bounds, left_bounds)
+    got = one, other
+    np.testing.assert_allclose(done, forces(climber, *got), atol=1e-9)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
         assert low - 1e-9 <= torque <= high + 1e-9
     turn, drive = (right - left) / 2, (right + left) / 2
@@ -71,6 +73,14 @@ def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_b
     lowest = max(right_bounds[0] - best_turn, left_bounds[0] + best_turn)
     highest = min(right_bounds[1] - best_turn, left_bounds[1] + best_turn)
     assert (got[0] + got[1]) / 2 == pytest.approx(np.clip(drive, lowest, highest), abs=1e-9)
+
+
+def test_a_limit_is_not_passed_by_rounding():
+    climber, random = Climber(max_wheel_torque=4.0), np.random.default_rng(1)
+    for _ in range(1000):
+        drive, turn = (1000 * random.normal(size=2)).tolist()
+        *_, right, left = limited(climber, drive, turn, (-4.0, 4.0), (-4.0, 4.0))
+        assert max(abs(right), abs(left)) <= 4.0
 
 
 def test_what_the_limits_take_away_is_told():
