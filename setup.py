@@ -24,6 +24,8 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
         "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard"],
+        # thousands of closed loops at once, their plants compiled
+        "fast": ["numba"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo"],
     },
     zip_safe=False,

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.analysis.closed_loop import Link
-from climber_uk.control.constraints import Guidance, tracking_error
+from climber_uk.control.constraints import Guidance, demanded, tracking_error
 from climber_uk.control.controller import Command
 from climber_uk.control.follower import Answer
 from climber_uk.control.tracker import Tracker
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import arctan, cos, sin
+from climber_uk.mechanics.motion import Wrench
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Reference
 
@@ -100,8 +101,9 @@ class AdaptiveRobust(Tracker):
     def answer(self, preview: Preview, age: float) -> Command | None:
         """Torques for the last odometry."""
         reference = preview.at(self.stamp)
-        if reference is not None and self.state is not None:
-            errors = constraint_errors(self.controller.constraints, self.state, reference)
+        if reference is not None and self.motion is not None:
+            state = State.moving(self.motion)
+            errors = constraint_errors(self.controller.constraints, state, reference)
             forces = []
             for i, gains in enumerate((self.drive_gains, self.turn_gains)):
                 beta, bound = errors[i], self.bounds[i]
@@ -110,7 +112,7 @@ class AdaptiveRobust(Tracker):
                 forces.append(-gamma * mu * bound)
                 growth = gains.growth * abs(beta) - gains.leakage * bound
                 self.bounds[i] = max(bound + self.period * growth, 0.0)
-            self.disturbance = -np.array(forces)
+            self.disturbance = Wrench(*(-force for force in forces))
         return super().answer(preview, age)
 
 
@@ -123,4 +125,5 @@ def constraint_errors(gains: Guidance, state: State, reference: Reference) -> tu
     w_1 = g * (state.forward_speed * sin(turned) - reference.yaw_rate * e_x)
     led_1 = state.yaw_rate - reference.yaw_rate + w_1 / (1 + w**2)
     heading = led_1 + gains.heading_frequency * (turned + arctan(w))
-    return float(state.forward_speed - gains.speed(state, reference)), float(heading)
+    _, _, wanted = demanded(gains, state, reference)
+    return float(state.forward_speed - wanted), float(heading)

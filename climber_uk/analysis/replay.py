@@ -16,6 +16,7 @@ from climber_uk.analysis.topics import ODOMETRY, REFERENCE
 from climber_uk.control.follower import Answer
 from climber_uk.control.settings import KINDS, new_follower, settings
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.motion import Torques
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 from climber_uk.messages.names import Names
@@ -145,4 +146,4 @@ class Replay:
             self.torques[answer.stamp] = answer.torques
             sent = self.recorded.torques.get(answer.stamp)
             if sent is not None:
-                self.follower.tracker.correct(sent)
+                self.follower.tracker.correct(Torques(*sent.tolist()))

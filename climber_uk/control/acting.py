@@ -3,32 +3,32 @@
 from collections import deque
 from collections.abc import Iterator
 
-import numpy as np
-
-from climber_uk.mechanics import Array
+from climber_uk.mechanics.motion import Torques
 from climber_uk.mechanics.preview import SECOND
+
+NONE = Torques(0.0, 0.0)
 
 
 class Acting:
-    """Torques (2,) right, left [N m] in the order in which they act; none before the first."""
+    """Torques in the order in which they act; none before the first."""
 
     def __init__(self) -> None:
-        self._begun: deque[tuple[int, Array]] = deque()  # [ns] from when, torques
+        self._begun: deque[tuple[int, Torques]] = deque()  # [ns] from when, torques
 
     @property
-    def last(self) -> Array:
+    def last(self) -> Torques:
         """The torques that will act in the end."""
-        return self._begun[-1][1] if self._begun else np.zeros(2)
+        return self._begun[-1][1] if self._begun else NONE
 
     def begin(self, wanted: int) -> int:
         """When torques would begin to act [ns]: as wanted, but none overtakes the last ones."""
         return max(wanted, self._begun[-1][0]) if self._begun else wanted
 
-    def add(self, begins: int, torques: Array) -> None:
+    def add(self, begins: int, torques: Torques) -> None:
         """Torques that act from `begins` [ns] on."""
         self._begun.append((begins, torques))
 
-    def correct(self, torques: Array) -> None:
+    def correct(self, torques: Torques) -> None:
         """Have other torques acting in the place of the last ones."""
         begins, _ = self._begun.pop()
         self.add(begins, torques)
@@ -47,9 +47,9 @@ class Acting:
         """Whether it is known what acts from `time` [ns] on."""
         return bool(self._begun) and self._begun[0][0] <= time
 
-    def between(self, start: int, end: int) -> Iterator[tuple[Array, float]]:
+    def between(self, start: int, end: int) -> Iterator[tuple[Torques, float]]:
         """Torques that act from `start` to `end` [ns], each with how long it does [s]."""
-        torques: Array = np.zeros(2)
+        torques = NONE
         for begins, following in self._begun:
             if begins >= end:
                 break

@@ -6,14 +6,25 @@ torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 """
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.model import rolled
-from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.climber import Bounds, Climber, State
-from climber_uk.mechanics.elementary import clipped, cos, sin, tanh
+from climber_uk.mechanics import Array, pack
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.elementary import clipped, everywhere, tanh
+from climber_uk.mechanics.motion import (
+    Bounds,
+    Demand,
+    Motion,
+    Target,
+    Torques,
+    Wrench,
+    forces,
+    limited,
+    torque_bounds,
+)
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.trajectory import Reference
 
 
 @dataclass(frozen=True)
@@ -38,23 +49,37 @@ class Law:
         return period / 2 if self.predict else 0.0
 
 
-@dataclass(frozen=True)
-class Situation:
-    """What the controller answers: the state at which its torques will begin to act, and more."""
+class Situation(NamedTuple):
+    """What the controller answers: the motion at which its torques will begin to act, and more."""
 
-    state: State
-    held: Array  # (..., 2) torques acting until then, right, left [N m]
-    disturbance: Array  # (..., 2) on drive [N] and turn [N m]; see `Observer`
+    motion: Motion
+    held: Torques  # that act until then
+    disturbance: Wrench  # see `Observer`
     period: float  # [s] for which the answer is going to act
 
 
-@dataclass(frozen=True)
-class Command:
-    """What the controller answers to a state."""
+class Command(NamedTuple):
+    """What the controller answers; a wrench and a reaction in the body's frame."""
 
-    torques: Array  # (..., 2) right, left [N m], within the limits
-    constraint_force: Array  # (..., 3) drive [N], lateral [N], about z [N m], in the body's frame
-    missing: Array  # (..., 2) drive [N] and turn [N m] that the limits took away
+    wheels: Torques  # within the limits
+    demanded: Wrench
+    lateral: Any  # [N] reaction of the wheels
+    lost: Wrench  # what the limits took away
+
+    @property
+    def torques(self) -> Array:
+        """Torques (..., 2) right, left [N m]."""
+        return pack(*self.wheels)
+
+    @property
+    def constraint_force(self) -> Array:
+        """Drive [N], lateral [N], about z [N m], (..., 3)."""
+        return pack(self.demanded.drive, self.lateral, self.demanded.turn)
+
+    @property
+    def missing(self) -> Array:
+        """Drive [N] and turn [N m] that the limits took away, (..., 2)."""
+        return pack(*self.lost)
 
 
 @dataclass(frozen=True)
@@ -65,67 +90,50 @@ class Controller:
     constraints: ConstraintSet
     law: Law
 
-    def command(self, situation: Situation, reference: Reference) -> Command:
-        """Torques for a situation; `reference` is that of half a period after it begins.
+    def command(self, situation: Situation, target: Target) -> Command:
+        """Torques for a situation; `target` is that of half a period after it begins.
 
         The answer itself acts on the state it is for: it is computed twice, the second time
         knowing what it will be.
         """
-        ahead = self.law.lookahead(situation.period)
-        torques = situation.held
+        climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
+        ahead = self.law.lookahead(period)
+        track, (right, left) = self.constraints.track(target), self._bounds(situation)
+        drive, turn = forces(climber, held.right, held.left)
         for _ in range(2 if ahead else 1):
-            aim = rolled(self.climber, situation.state, torques, situation.disturbance, ahead)
-            command = self._command(situation, aim, reference)
-            torques = command.torques
-        return command
+            aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)
+            wanted, turned, lateral = self.force(self.constraints.demand(track, aim), aim)
+            wanted, turned = wanted - r_drive, turned - r_turn
+            drive, turn, one, other = limited(climber, wanted, turned, right, left)
+        lost = Wrench(wanted - drive, turned - turn)
+        return Command(Torques(one, other), Wrench(wanted, turned), lateral, lost)
 
-    def _command(self, situation: Situation, state: State, reference: Reference) -> Command:
-        climber, heading = self.climber, state.heading
-        direction = tanh(self.constraints.speed(state, reference) / self.law.friction_speed)
-        v_1, turning = self.constraints.demand(state, reference)
-        weight, (r_drive, r_turn) = climber.weight_along_wall, unpack(situation.disturbance)
-        # M Aᵀ b - Q in the climber's frame: forward, to the left, about z
-        drive = climber.mass * v_1 + climber.seal_friction * direction + weight * sin(heading)
-        drive = drive - r_drive
-        lateral = climber.mass * state.forward_speed * state.yaw_rate + weight * cos(heading)
-        turn = climber.yaw_inertia * turning - r_turn
-        torques = self.limited(climber.wheel_torques(drive, turn), situation)
-        got_drive, got_turn = climber.drive_and_turn(torques)
-        return Command(
-            torques=torques,
-            constraint_force=pack(drive, lateral, turn),
-            missing=pack(drive - got_drive, turn - got_turn),
-        )
+    def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
+        """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
+        climber, (v_1, turning, speed) = self.climber, demand
+        weight = climber.weight_along_wall
+        rubbing = climber.seal_friction * tanh(speed / self.law.friction_speed)
+        drive = climber.mass * v_1 + rubbing + weight * motion.sine
+        lateral = climber.mass * motion.speed * motion.yaw_rate + weight * motion.cosine
+        return drive, climber.yaw_inertia * turning, lateral
 
-    def holding(self, situation: Situation, braking_rate: float) -> Array:
-        """Torques (..., 2) that carry the weight and brake what moves, at `braking_rate` [1/s]."""
-        climber, state = self.climber, situation.state
-        weight = climber.weight_along_wall * sin(state.heading)
-        drive = weight - climber.mass * braking_rate * state.forward_speed
-        turn = -climber.yaw_inertia * braking_rate * state.yaw_rate
-        return self.limited(climber.wheel_torques(drive, turn), situation)
+    def holding(self, situation: Situation, braking_rate: float) -> Torques:
+        """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
+        climber, motion = self.climber, situation.motion
+        weight = climber.weight_along_wall * motion.sine
+        drive = weight - climber.mass * braking_rate * motion.speed
+        turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
+        return Torques(*limited(climber, drive, turn, *self._bounds(situation))[2:])
 
-    def limited(self, torques: Array, situation: Situation) -> Array:
-        """Torques (..., 2) as near as the limits allow, turning served before driving."""
-        right, left = self.climber.torque_bounds(situation.state)
-        if self.law.max_torque_rate > 0:
-            change = self.law.max_torque_rate * situation.period
-            right_was, left_was = unpack(situation.held)
-            right, left = _near(right, right_was, change), _near(left, left_was, change)
-        return limited(torques, right, left)
+    def _bounds(self, situation: Situation) -> tuple[Bounds, Bounds]:
+        right, left = torque_bounds(self.climber, situation.motion)
+        if everywhere(self.law.max_torque_rate == 0):
+            return right, left
+        change = self.law.max_torque_rate * situation.period
+        held = situation.held
+        return _near(right, held.right, change), _near(left, held.left, change)
 
 
-def _near(bounds: Bounds, torque: Array, change: float) -> Bounds:
-    return clipped(torque - change, *bounds), clipped(torque + change, *bounds)
-
-
-def limited(torques: Array, right_bounds: Bounds, left_bounds: Bounds) -> Array:
-    """Torques (..., 2) within each wheel's bounds, the turn served before the drive."""
-    right, left = unpack(torques)
-    (right_low, right_high), (left_low, left_high) = right_bounds, left_bounds
-    turn = clipped((right - left) / 2, (right_low - left_high) / 2, (right_high - left_low) / 2)
-    lowest, highest = right_low - turn, right_high - turn
-    lowest = lowest + clipped(left_low + turn - lowest, 0.0, float("inf"))
-    highest = highest - clipped(highest - (left_high + turn), 0.0, float("inf"))
-    drive = clipped((right + left) / 2, lowest, highest)
-    return pack(drive + turn, drive - turn)
+def _near(bounds: Bounds, torque: Any, change: Any) -> Bounds:
+    lowest, highest = bounds
+    return clipped(torque - change, lowest, highest), clipped(torque + change, lowest, highest)

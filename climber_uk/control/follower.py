@@ -4,15 +4,15 @@ Times are integers in nanoseconds: stamps on the odometry's clock, `now` on the 
 while there is none.
 """
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from climber_uk.control.controller import Command
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import LONGEST_STEP, Tracker
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, pack
 from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.motion import Motion, Torques
 from climber_uk.mechanics.preview import SECOND, Preview
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
@@ -51,7 +51,8 @@ class Follower:
     @property
     def state(self) -> State | None:
         """State at the last good odometry, as it is believed to be."""
-        return self.tracker.state
+        motion = self.tracker.motion
+        return None if motion is None else State.moving(motion)
 
     def enable(self, enabled: bool) -> None:
         """Follow the reference, or give the safe output."""
@@ -76,7 +77,7 @@ class Follower:
         if stamp != self._stamp:
             if abs(stamp - self._stamp) > timeout:
                 self._start_anew()
-            self._trouble = self._take(stamp, state)
+            self._trouble = self._take(stamp, state.motion)
             self._stamp = stamp
         return self._answer(now)
 
@@ -105,25 +106,25 @@ class Follower:
         mode, _ = self._find_mode(now)
         return None if mode in (Mode.FOLLOWING, Mode.WAITING) else self._answer(now)
 
-    def _take(self, stamp: int, state: State) -> tuple[Mode, str] | None:
+    def _take(self, stamp: int, motion: Motion) -> tuple[Mode, str] | None:
         """Give the tracker an odometry; return what is wrong with it."""
-        tracker, last = self.tracker, self.tracker.state
+        tracker, last = self.tracker, self.tracker.motion
         if last is None:
-            tracker.see(stamp, state)
+            tracker.see(stamp, motion)
         else:
             expected = tracker.expected_at(stamp)
             if tracker.observer.velocity_source == "pose":
-                state = State(state.pose, expected.velocity)
-            elif state.velocity.any():
+                motion = motion._replace(speed=expected.speed, yaw_rate=expected.yaw_rate)
+            elif motion.speed != 0 or motion.yaw_rate != 0:
                 self._moved_without_twist = 0.0
             else:
-                self._moved_without_twist += float(np.hypot(*(state.pose - last.pose)[:2]))
+                self._moved_without_twist += math.hypot(motion.x - last.x, motion.y - last.y)
             half_track = tracker.controller.climber.half_track
-            if self.safety.has_jumped(expected, state, half_track):
+            if self.safety.has_jumped(expected, motion, half_track):
                 self._start_anew()
                 self._unsettled = self.safety.settling_messages
             self._unsettled -= self._unsettled > 0
-            tracker.see(stamp, state)
+            tracker.see(stamp, motion, expected)
         if self._unsettled:
             return Mode.JUMPED, ""
         if self._moved_without_twist > MOVED:
@@ -178,12 +179,12 @@ class Follower:
         self.mode, self.detail = mode, detail
         if mode is Mode.WAITING:
             return None
-        torques = command.torques if command else self._safe_torques(age)
-        self.answer = Answer(self._stamp, torques, command)
+        torques = command.wheels if command else self._safe_torques(age)
+        self.answer = Answer(self._stamp, pack(*torques), command)
         return self.answer
 
-    def _safe_torques(self, age: float) -> Array:
-        if self.safety.safe_output == "hold" and self.tracker.state is not None:
+    def _safe_torques(self, age: float) -> Torques:
+        if self.safety.safe_output == "hold" and self.tracker.motion is not None:
             try:
                 return self.tracker.hold(age, self.safety.braking_rate)
             except (ValueError, ArithmeticError):

@@ -6,45 +6,43 @@
 other friction, mass or suction, a payload, a push.
 """
 
-import math
 from dataclasses import dataclass
+from typing import Any
 
-from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.elementary import clipped, cos, select, sign, sin, wrapped
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.elementary import (
+    clipped,
+    everywhere,
+    exp,
+    rotated,
+    select,
+    wrapped,
+)
+from climber_uk.mechanics.motion import Motion, Wrench
 from climber_uk.mechanics.parameter import check, parameter
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
+AMPLE = 1e9  # [N s/m] by a speed of that: more than any friction
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
-NO_FRICTION = 1e-9  # [N] too little to hold anything
 
 
-def rolled(
-    climber: Climber, state: State, torques: Array, disturbance: Array, time: float
-) -> State:
-    """State `time` [s] later under constant torques (..., 2), by the midpoint rule.
+def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float) -> Motion:
+    """Motion `time` [s] later under a constant drive [N] and turn [N m], by the midpoint rule.
 
-    At rest friction takes whatever value holds the climber, up to f; `disturbance` is (..., 2).
+    Both include the disturbance. At rest friction takes whatever value holds the climber, up to f.
     """
-    if time == 0:
-        return state
-    x, y, heading = unpack(state.pose)
-    v, omega = state.forward_speed, state.yaw_rate
-    drive, turn = climber.drive_and_turn(torques)
-    r_drive, r_turn = unpack(disturbance)
-    omega_1 = (turn + r_turn) / climber.yaw_inertia
-    middle = heading + omega * time / 2 + omega_1 * time**2 / 8
-    push = drive - climber.weight_along_wall * sin(middle) + r_drive
-    friction = climber.seal_friction
-    held = clipped(push / max(friction, NO_FRICTION), -1.0, 1.0)
-    v_1 = (push - friction * select(abs(v) > SLOW, sign(v), held)) / climber.mass
-    way = time * (v + time / 2 * v_1)
-    pose = pack(
-        x + way * cos(middle),
-        y + way * sin(middle),
-        heading + time * (omega + time / 2 * omega_1),
-    )
-    return State.rolling(pose, v + time * v_1, omega + time * omega_1)
+    x, y, heading, cosine, sine, v, omega = motion
+    half, friction = time / 2, climber.seal_friction
+    omega_1 = turn / climber.yaw_inertia
+    _, c, s = rotated(heading, cosine, sine, half * (omega + half / 2 * omega_1))
+    push = drive - climber.weight_along_wall * s
+    # sliding, friction is all of f, against the motion; at rest, as much as is pushed against it
+    rubbing = clipped(select(abs(v) > SLOW, v * AMPLE, push), -friction, friction)
+    v_1 = (push - rubbing) / climber.mass
+    way = time * (v + half * v_1)
+    heading, cosine, sine = rotated(heading, cosine, sine, time * (omega + half * omega_1))
+    v, omega = v + time * v_1, omega + time * omega_1
+    return Motion(x + way * c, y + way * s, heading, cosine, sine, v, omega)
 
 
 @dataclass(frozen=True)
@@ -73,47 +71,44 @@ class Observer:
         check(self)
 
     def corrected(
-        self, climber: Climber, disturbance: Array, expected: State, found: State, time: float
-    ) -> tuple[State, Array]:
-        """State and disturbance (..., 2) after `time` [s] in which `expected` became `found`."""
+        self, climber: Climber, disturbance: Wrench, expected: Motion, found: Motion, time: float
+    ) -> tuple[Motion, Wrench]:
+        """Motion and disturbance after `time` [s] in which `expected` became `found`."""
         if self.velocity_source == "pose":
             return self._from_pose(climber, disturbance, expected, found, time)
-        if self.bandwidth == 0:
-            return found, disturbance * math.exp(-time / FORGETTING_TIME)
-        share = (1 - math.exp(-self.bandwidth * time)) / time
-        faster = found.forward_speed - expected.forward_speed
-        turning = found.yaw_rate - expected.yaw_rate
+        if everywhere(self.bandwidth == 0):
+            return found, _faded(disturbance, time)
+        share = (1 - exp(-self.bandwidth * time)) / time
+        faster, turning = found.speed - expected.speed, found.yaw_rate - expected.yaw_rate
         return found, _more(climber, disturbance, share * faster, share * turning)
 
     def _from_pose(
-        self, climber: Climber, disturbance: Array, expected: State, found: State, time: float
-    ) -> tuple[State, Array]:
-        offset, heading = found.pose - expected.pose, expected.heading
-        ahead, beside = along(heading, offset), across(heading, offset)
-        turned = wrapped(unpack(offset)[2])
+        self, climber: Climber, disturbance: Wrench, expected: Motion, found: Motion, time: float
+    ) -> tuple[Motion, Wrench]:
+        x, y, heading, cosine, sine, v, omega = expected
+        ahead = (found.x - x) * cosine + (found.y - y) * sine
+        beside = (found.y - y) * cosine - (found.x - x) * sine
+        turned = wrapped(found.heading - heading)
 
-        memory = math.exp(-self.pose_bandwidth * time)
+        memory = exp(-self.pose_bandwidth * time)
         new = 1 - memory
-        if self.bandwidth > 0:
+        if everywhere(self.bandwidth > 0):
             g, h, k = 1 - memory**3, 1.5 * (1 - memory**2) * new, new**3
         else:
             g, h, k = 1 - memory**2, new**2, 0.0
-            disturbance = disturbance * math.exp(-time / FORGETTING_TIME)
-        x, y, _ = unpack(expected.pose)
-        cosine, sine = cos(heading), sin(heading)
-        pose = pack(
-            x + g * (ahead * cosine - beside * sine),
-            y + g * (ahead * sine + beside * cosine),
-            heading + g * turned,
-        )
-        state = State.rolling(
-            pose,
-            expected.forward_speed + h / time * ahead,
-            expected.yaw_rate + h / time * turned,
-        )
-        return state, _more(climber, disturbance, k / time**2 * ahead, k / time**2 * turned)
+            disturbance = _faded(disturbance, time)
+        x, y = x + g * (ahead * cosine - beside * sine), y + g * (ahead * sine + beside * cosine)
+        v, omega = v + h / time * ahead, omega + h / time * turned
+        motion = Motion(x, y, *rotated(heading, cosine, sine, g * turned), v, omega)
+        return motion, _more(climber, disturbance, k / time**2 * ahead, k / time**2 * turned)
 
 
-def _more(climber: Climber, disturbance: Array, v_1: Array, omega_1: Array) -> Array:
-    r_drive, r_turn = unpack(disturbance)
-    return pack(r_drive + climber.mass * v_1, r_turn + climber.yaw_inertia * omega_1)
+def _more(climber: Climber, disturbance: Wrench, v_1: Any, omega_1: Any) -> Wrench:
+    r_drive, r_turn = disturbance
+    return Wrench(r_drive + climber.mass * v_1, r_turn + climber.yaw_inertia * omega_1)
+
+
+def _faded(disturbance: Wrench, time: float) -> Wrench:
+    r_drive, r_turn = disturbance
+    left = exp(-time / FORGETTING_TIME)
+    return Wrench(r_drive * left, r_turn * left)

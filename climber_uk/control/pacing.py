@@ -5,14 +5,14 @@ turning falls short of the demand, then just small enough that it suffices (Dahl
 doi 10.1109/70.63270). So the climber stays on the path and lags along it.
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
-
+from climber_uk.mechanics.motion import Target
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND, Preview
 from climber_uk.mechanics.time_laws import compose
-from climber_uk.mechanics.trajectory import Reference
 
 SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
 
@@ -40,8 +40,7 @@ class Pacing:
         check(self)
 
 
-@dataclass(frozen=True)
-class Pace:
+class Pace(NamedTuple):
     """How far a reference is behind its time, and how fast it goes on."""
 
     lag: float = 0.0  # [s] t - s
@@ -50,6 +49,8 @@ class Pace:
 
     def after(self, time: float, pacing: Pacing) -> "Pace":
         """Pace `time` [s] later, on its way back to no lag."""
+        if self == IN_TIME:
+            return IN_TIME
         rate = max(self.rate + time * self.change, 0.0)
         lag = max(self.lag + time * (1 - (self.rate + rate) / 2), 0.0)
         wanted = 1 + min(lag / pacing.recovery_time, pacing.catch_up)
@@ -57,19 +58,27 @@ class Pace:
 
     def slowed(self, missing: float, preview: Preview, time: int, step: float) -> "Pace":
         """Pace that asks `missing` [m/s²] less along the climber, as far as `step` [s] can do."""
-        found = preview.at(time - round(self.lag * SECOND))
-        speed = float(found.speed) if found else 0.0
+        found = preview.target(time - round(self.lag * SECOND))
+        if found is None:
+            return self
+        cosine, sine = math.cos(found.heading), math.sin(found.heading)
+        speed = found.v_x * cosine + found.v_y * sine
         if missing * speed <= 0 or abs(speed) < SLOW:
             return self
-        return replace(self, change=max(self.change - missing / speed, -self.rate / step))
+        return self._replace(change=max(self.change - missing / speed, -self.rate / step))
 
-    def reference(self, preview: Preview, time: int) -> Reference | None:
-        """Reference for `time` [ns] at this pace; None outside of the preview."""
-        found = preview.at(time - round(self.lag * SECOND))
+    def target(self, preview: Preview, time: int) -> Target | None:
+        """Target for `time` [ns] at this pace; None outside of the preview."""
+        found = preview.target(time - round(self.lag * SECOND))
         if found is None or (self.rate == 1 and self.change == 0):
             return found
-        jerk = np.append(found.jerk, 0.0)  # of the heading it is not known, nor needed
-        derivatives = (found.pose, found.velocity, found.acceleration, jerk)
-        rates = (np.array(self.rate), np.array(self.change), np.array(0.0))
-        pose, velocity, acceleration, jerk = compose(derivatives, rates)
-        return Reference(pose, velocity, acceleration, jerk[:2])
+        x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y = found
+        rates = self.rate, self.change, 0.0
+        _, v_x, a_x, j_x = compose((x, v_x, a_x, j_x), rates)
+        _, v_y, a_y, j_y = compose((y, v_y, a_y, j_y), rates)
+        # the jerk of the heading is not known, nor needed
+        _, omega, omega_1, _ = compose((heading, omega, omega_1, 0.0), rates)
+        return Target(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
+
+
+IN_TIME = Pace()

@@ -4,13 +4,12 @@ Its state is a `Mode`; `Follower` asks after every odometry, reference and look 
 one it is now.
 """
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-
-from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.motion import Motion
 from climber_uk.mechanics.parameter import check, parameter
 
 SPEED_TIME = 0.1  # [s] in which a jump of the speed would become one of the place
@@ -64,9 +63,12 @@ class Safety:
     def __post_init__(self) -> None:
         check(self)
 
-    def has_jumped(self, expected: State, found: State, half_track: float) -> bool:
+    def has_jumped(self, expected: Motion, found: Motion, half_track: float) -> bool:
         """Whether a wheel is, or will soon be, further than `max_jump` from where expected."""
-        offset, faster = found.pose - expected.pose, found.velocity - expected.velocity
-        gone = np.hypot(*offset[:2]) + half_track * abs(wrapped(float(offset[2])))
-        going = np.hypot(*faster[:2]) + half_track * abs(float(faster[2]))
+        turned = wrapped(found.heading - expected.heading)
+        gone = math.hypot(found.x - expected.x, found.y - expected.y) + half_track * abs(turned)
+        going = half_track * abs(found.yaw_rate - expected.yaw_rate) + math.hypot(
+            found.speed * found.cosine - expected.speed * expected.cosine,
+            found.speed * found.sine - expected.speed * expected.sine,
+        )
         return not max(gone, going * SPEED_TIME) <= self.max_jump

@@ -4,17 +4,17 @@ Stamps are integers in nanoseconds, on the clock of the odometry.
 """
 
 import dataclasses
+import math
 from dataclasses import dataclass, replace
+from typing import Any
 
-import numpy as np
-
-from climber_uk.control.acting import Acting
+from climber_uk.control.acting import NONE, Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
 from climber_uk.control.model import Observer, rolled
-from climber_uk.control.pacing import Pace, Pacing
-from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import State
+from climber_uk.control.pacing import IN_TIME, Pacing
+from climber_uk.mechanics.many import chosen
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import SECOND, Preview
 
@@ -68,18 +68,18 @@ class Tracker:
         """Start anew, from an unknown state at an unknown time."""
         self.stamp = 0  # [ns]
         self._acting.restart()
-        self.state: State | None = None
+        self.motion: Motion | None = None
         self.forget()
 
     def forget(self) -> None:
         """Forget what was learnt, and that the reference waited."""
-        self.disturbance: Array = np.zeros(2)  # on drive [N] and turn [N m]
-        self._learning = False
+        self.disturbance = Wrench(0.0, 0.0)
+        self._learning: Any = False
         self.start_pace()
 
     def start_pace(self) -> None:
         """Follow the reference in its own time."""
-        self.pace = Pace()
+        self.pace = IN_TIME
         self._paced_at: int | None = None
 
     def retune(
@@ -91,22 +91,22 @@ class Tracker:
         self.controller, self.observer = controller, observer
         self.timing, self.pacing = timing, pacing
 
-    def see(self, stamp: int, state: State) -> None:
-        """Take in a newer odometry."""
-        if self.state is not None:
+    def see(self, stamp: int, motion: Motion, expected: Motion | None = None) -> None:
+        """Take in a newer odometry; who has asked for what is expected by then may hand it back."""
+        if self.motion is not None:
             time = (stamp - self.stamp) / SECOND
             share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
             self.period += share * (time - self.period)
             self._period_is_measured = True
-            expected = self.expected_at(stamp)
-            state, learnt = self.observer.corrected(
-                self.controller.climber, self.disturbance, expected, state, time
+            expected = expected or self.expected_at(stamp)
+            motion, learnt = self.observer.corrected(
+                self.controller.climber, self.disturbance, expected, motion, time
             )
-            if self._learning and self._acting.are_known_since(self.stamp):
-                self.disturbance = learnt
+            if self._acting.are_known_since(self.stamp):
+                self.disturbance = chosen(self._learning, learnt, self.disturbance)
         elif self.observer.velocity_source == "pose":
-            state = State(state.pose, np.zeros(3))
-        self.stamp, self.state = stamp, state
+            motion = motion._replace(speed=0.0, yaw_rate=0.0)
+        self.stamp, self.motion = stamp, motion
 
     def answer(self, preview: Preview, age: float) -> Command | None:
         """Torques for the last odometry, of `age` [s]; None where the preview does not reach.
@@ -121,51 +121,55 @@ class Tracker:
         if self.pacing.catch_up > 0:
             since = begins if self._paced_at is None else self._paced_at
             pace = pace.after((begins - since) / SECOND, self.pacing)
-        reference = pace.reference(preview, aim)
-        if reference is None:
+        target = preview.target(aim) if pace is IN_TIME else pace.target(preview, aim)
+        if target is None:
             return None
-        command = controller.command(situation, reference)
-        if self.pacing.catch_up > 0 and abs(command.missing[0]) > CUT:
-            missing = float(command.missing[0]) / controller.climber.mass
-            pace = pace.slowed(missing, preview, aim, self.period)
-            command = controller.command(situation, pace.reference(preview, aim) or reference)
-        if not np.isfinite(command.torques).all():
-            raise ValueError(f"torques {command.torques} are not finite")
+        command = controller.command(situation, target)
+        if self.pacing.catch_up > 0 and abs(command.lost.drive) > CUT:
+            pace = pace.slowed(
+                command.lost.drive / controller.climber.mass, preview, aim, self.period
+            )
+            command = controller.command(situation, pace.target(preview, aim) or target)
+        _check(command.wheels)
         self.pace, self._paced_at = pace, begins
-        self._learning = bool(np.abs(command.missing).max() <= CUT)
-        self._send(begins, command.torques)
+        drive, turn = command.lost
+        self._learning = (abs(drive) <= CUT) & (abs(turn) <= CUT)
+        self._send(begins, command.wheels)
         return command
 
-    def hold(self, age: float, braking_rate: float) -> Array:
-        """Torques (2,) that carry the weight and brake; raises as `answer` does."""
+    def hold(self, age: float, braking_rate: float) -> Torques:
+        """Torques that carry the weight and brake; raises as `answer` does."""
         begins, situation = self._situation(age)
         if age >= LONGEST_STEP:  # it has been braked, as far as can be known
-            at_rest = State(situation.state.pose, np.zeros(3))
-            situation = replace(situation, state=at_rest)
+            at_rest = situation.motion._replace(speed=0.0, yaw_rate=0.0)
+            situation = situation._replace(motion=at_rest)
         torques = self.controller.holding(situation, braking_rate)
-        if not np.isfinite(torques).all():
-            raise ValueError(f"torques {torques} are not finite")
+        _check(torques)
         self._learning = False
         self._send(begins, torques)
         return torques
 
-    def let_go(self, age: float) -> Array:
-        """Zero torques (2,)."""
+    def let_go(self, age: float) -> Torques:
+        """No torques."""
         self._learning = False
-        self._send(self._begin(age), np.zeros(2))
-        return np.zeros(2)
+        self._send(self._begin(age), NONE)
+        return NONE
 
-    def correct(self, torques: Array) -> None:
-        """Believe that other torques (2,) were sent than it answered last."""
+    def correct(self, torques: Torques) -> None:
+        """Believe that other torques were sent than it answered last."""
         self._acting.correct(torques)
 
-    def expected_at(self, stamp: int) -> State:
-        """State at `stamp` [ns] as the model rolls on from the last odometry."""
-        assert self.state is not None
-        state = self.state
+    def expected_at(self, stamp: int) -> Motion:
+        """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
+        assert self.motion is not None
+        motion, climber, disturbance = self.motion, self.controller.climber, self.disturbance
+        if stamp == self.stamp:
+            return motion
         for torques, time in self._acting.between(self.stamp, stamp):
-            state = rolled(self.controller.climber, state, torques, self.disturbance, time)
-        return state
+            drive, turn = forces(climber, *torques)
+            drive, turn = drive + disturbance.drive, turn + disturbance.turn
+            motion = rolled(climber, motion, drive, turn, time)
+        return motion
 
     def _constraints(self) -> ConstraintSet:
         """Constraints as they are now, on their way from the gains that were before."""
@@ -191,10 +195,16 @@ class Tracker:
 
     def _situation(self, age: float) -> tuple[int, Situation]:
         begins = self._begin(age)
-        state = self.expected_at(begins)
-        return begins, Situation(state, self._acting.last, self.disturbance, self.period)
+        motion = self.expected_at(begins)
+        return begins, Situation(motion, self._acting.last, self.disturbance, self.period)
 
-    def _send(self, begins: int, torques: Array) -> None:
+    def _send(self, begins: int, torques: Torques) -> None:
         self._acting.add(begins, torques)
         # without odometry, too, that of long ago is not needed
         self._acting.forget_before(max(self.stamp, begins - round(2 * LONGEST_STEP * SECOND)))
+
+
+def _check(torques: Torques) -> None:
+    """Raise `ValueError` if a climber's torques are not finite; of many, each has its own."""
+    if isinstance(torques.right, float) and not math.isfinite(torques.right + torques.left):
+        raise ValueError(f"torques {torques} are not finite")

@@ -7,16 +7,16 @@ from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (r
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.elementary import clipped, cos, sin
+from climber_uk.mechanics import Array, motion, pack, unpack
+from climber_uk.mechanics.elementary import cos, sin
+from climber_uk.mechanics.motion import Bounds, Motion
 from climber_uk.mechanics.parameter import check, parameter
 
 GRAVITY = 9.81  # [m/s²]
-Bounds = tuple[Any, Any]  # lowest and highest torque of a wheel, each (...) [N m]
+DEGREE = math.pi / 180  # [rad]
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,22 @@ class State:
         """State at `pose` (..., 3) that moves along its heading (17)."""
         heading = unpack(pose)[2]
         return cls(pose, pack(speed * cos(heading), speed * sin(heading), yaw_rate))
+
+    @classmethod
+    def moving(cls, motion: Motion) -> "State":
+        """State of a climber in `motion`."""
+        return cls(
+            pack(motion.x, motion.y, motion.heading),
+            pack(motion.speed * motion.cosine, motion.speed * motion.sine, motion.yaw_rate),
+        )
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The same in components, without the side slip."""
+        x, y, heading = unpack(self.pose)
+        v_x, v_y, yaw_rate = unpack(self.velocity)
+        cosine, sine = cos(heading), sin(heading)
+        return Motion(x, y, heading, cosine, sine, v_x * cosine + v_y * sine, yaw_rate)
 
     @cached_property
     def heading(self) -> Array:
@@ -99,7 +115,8 @@ class Climber:
     @cached_property
     def weight_along_wall(self) -> float:
         """m g_t, the part of the weight that pulls along -y [N]."""
-        return self.mass * GRAVITY * math.sin(math.radians(self.inclination))
+        weight: float = self.mass * GRAVITY * sin(self.inclination * DEGREE)
+        return weight
 
     def applied_force(self, heading: Array, direction: Array | float) -> Array:
         """Q without the motors: seal friction against the motion, and gravity, (..., 3) [N, N m].
@@ -116,35 +133,19 @@ class Climber:
 
     def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:
         """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
-        right, left = unpack(torques)
-        drive, turn = right + left, self.half_track * (right - left)
-        return drive / self.wheel_radius, turn / self.wheel_radius
+        return motion.forces(self, *unpack(torques))
 
     def wheel_torques(self, drive: Array, turn: Array) -> Array:
         """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N, (..., 2) [N m]."""
-        half_drive = self.wheel_radius / 2 * drive
-        half_turn = self.wheel_radius / 2 * turn / self.half_track
-        return pack(half_drive + half_turn, half_drive - half_turn)
+        return pack(*motion.torques(self, drive, turn))
 
     def wheel_rates(self, state: State) -> Array:
         """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
-        v, turning = state.forward_speed, self.half_track * state.yaw_rate
-        return pack((v + turning) / self.wheel_radius, (v - turning) / self.wheel_radius)
+        return pack(*motion.wheel_rates(self, state.motion))
 
     def torque_bounds(self, state: State) -> tuple[Bounds, Bounds]:
-        """Lowest and highest torque [N m] of the right wheel, and of the left one, each (...).
-
-        That of a DC motor falls in a straight line with the rate at which it drives its wheel, and
-        not with the rate at which it brakes it.
-        """
-        limit, no_load = self.max_wheel_torque, self.no_load_wheel_rate
-        if no_load == 0:
-            return (-limit, limit), (-limit, limit)
-        right, left = (rate / no_load for rate in unpack(self.wheel_rates(state)))
-        return (
-            (-limit * clipped(1 + right, 0.0, 1.0), limit * clipped(1 - right, 0.0, 1.0)),
-            (-limit * clipped(1 + left, 0.0, 1.0), limit * clipped(1 - left, 0.0, 1.0)),
-        )
+        """Lowest and highest torque [N m] of the right wheel, and of the left one, each (...)."""
+        return motion.torque_bounds(self, state.motion)
 
     def rolling_acceleration(self, state: State, torques: Array, direction: Array | float) -> Array:
         """q̈ of the climber that rolls without side slip under `torques`, (..., 3).

@@ -12,6 +12,8 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 
+TURN = 2 * math.pi  # [rad]
+
 
 def _either(of_float: Callable[[float], float], of_array: Callable[[Array], Array]) -> Any:
     return lambda x: of_float(x) if isinstance(x, float) else of_array(x)
@@ -26,20 +28,55 @@ exp = _either(math.exp, np.exp)
 sign = _either(lambda x: float((x > 0) - (x < 0)), np.sign)
 
 
+def with_sign_of(size: Any, of: Any) -> Any:
+    """`size` (>= 0) with the sign of `of`."""
+    return math.copysign(size, of) if isinstance(of, float) else np.copysign(size, of)
+
+
 def wrapped(angle: Any) -> Any:
     """The same angle in [-π, π)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
+    if isinstance(angle, float):
+        return (angle + math.pi) % TURN - math.pi
+    return angle - TURN * np.floor(angle / TURN + 0.5)  # numpy's remainder takes ten times as long
 
 
 def clipped(value: Any, lowest: Any, highest: Any) -> Any:
     """`value` within its bounds; `highest` if they contradict each other."""
     if isinstance(value, float):
-        return min(max(value, lowest), highest)
+        raised = lowest if value < lowest else value
+        return highest if raised > highest else raised
     return np.clip(value, lowest, highest)
 
 
 def select(condition: Any, this: Any, that: Any) -> Any:
     """`this` where `condition` holds, else `that`."""
-    if isinstance(condition, bool | np.bool):
-        return this if condition else that
-    return np.where(condition, this, that)
+    if condition is True:
+        return this
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, this, that)
+    return this if condition else that
+
+
+def everywhere(condition: Any) -> Any:
+    """Whether `condition` holds for the one, or for all of many."""
+    return condition if condition is True or condition is False else bool(np.all(condition))
+
+
+SMALL = 0.03  # [rad] of an angle whose sine and cosine are a few terms of their series
+
+
+def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
+    """Heading, cosine and sine after a turn by `angle` [rad].
+
+    Of many small angles the series takes half as long as numpy's cosine and sine; what it leaves
+    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
+    """
+    end = heading + angle
+    if isinstance(end, float):
+        return end, math.cos(end), math.sin(end)
+    square = angle * angle
+    if not np.max(square, initial=0.0) < SMALL * SMALL:
+        return end, np.cos(end), np.sin(end)
+    c = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720)))
+    s = angle * (1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040))))
+    return end, c * cosine - s * sine, s * cosine + c * sine

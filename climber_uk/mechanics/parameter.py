@@ -2,9 +2,11 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
+
+import numpy as np
 
 
 def parameter(
@@ -45,7 +47,10 @@ def check(instance: Any) -> None:
 
 
 def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
-    """Raise `ValueError` if `value` is not one that `field`, made by `parameter`, allows."""
+    """Raise `ValueError` if `value` is not one that `field`, made by `parameter`, allows.
+
+    An array (N,) has one value for each of many climbers.
+    """
     rule = field.metadata
     said = f"{field.name}={value!r} must be"
     unit = f" [{rule['unit']}]" if rule["unit"] else ""
@@ -55,6 +60,12 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
         if type(value) is not type(field.default):
             raise ValueError(f"{said} a {type(field.default).__name__}")
         return
+    # bounds are intervals: all are within if the extremes are, and these are nan if any is
+    for number in (value.min(), value.max()) if isinstance(value, np.ndarray) else (value,):
+        _check_number(rule, f"{field.name}={number!r} must be", number, unit)
+
+
+def _check_number(rule: Mapping[str, Any], said: str, value: Any, unit: str) -> None:
     if isinstance(value, bool) or not (isinstance(value, Real) and math.isfinite(value)):
         raise ValueError(f"{said} a finite number{unit}")
     if rule["above"] is not None and not value > rule["above"]:

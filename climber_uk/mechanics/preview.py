@@ -5,6 +5,7 @@ than h⁶ |p⁽⁶⁾| / 46080. A piece depends on its two ends only, so that ov
 trajectory agree to the last bit.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.motion import Target
 from climber_uk.mechanics.trajectory import Reference
 
 SECOND = 1_000_000_000  # [ns]
@@ -39,8 +41,8 @@ class Preview:
                 raise ValueError(f"{name} of a point is not finite")
 
     @cached_property
-    def _pieces(self) -> tuple[Array, Array]:
-        """Lengths h (n-1,) [s] and coefficients (n-1, 6, 3) of 1, u … u⁵, u from 0 to 1."""
+    def _pieces(self) -> tuple[list[int], list[list[list[float]]]]:
+        """Times [ns], and coefficients (n-1, 3, 6) of 1, t … t⁵, t [s] since each."""
         h = np.diff(self.times)[:, None] * 1e-9
         way = np.diff(self.pose, axis=0)
         way[:, 2] = np.mod(way[:, 2] + np.pi, 2 * np.pi) - np.pi
@@ -51,26 +53,26 @@ class Preview:
         c_3 = 10 * p_left - 4 * v_left + a_left / 2
         c_4 = -15 * p_left + 7 * v_left - a_left
         c_5 = 6 * p_left - 3 * v_left + a_left / 2
-        return h[:, 0], np.stack([self.pose[:-1], v, a / 2, c_3, c_4, c_5], axis=1)
+        by_share = np.stack([self.pose[:-1], v, a / 2, c_3, c_4, c_5], axis=2)  # of h
+        return self.times.tolist(), (by_share / h[..., None] ** np.arange(6)).tolist()
 
     def at(self, time: int) -> Reference | None:
         """Reference at `time` [ns]; None outside of the points."""
-        if not self.times[0] <= time <= self.times[-1]:
+        target = self.target(time)
+        return None if target is None else Reference.of(target)
+
+    def target(self, time: int) -> Target | None:
+        """The same in components."""
+        times, coefficients = self._pieces
+        if not times[0] <= time <= times[-1]:
             return None
-        i = min(int(np.searchsorted(self.times, time, side="right")), len(self.times) - 1) - 1
-        lengths, coefficients = self._pieces
-        h = float(lengths[i])
-        u = float(time - self.times[i]) * 1e-9 / h
-        basis = np.array(
-            [
-                [1, u, u**2, u**3, u**4, u**5],
-                [0, 1 / h, 2 * u / h, 3 * u**2 / h, 4 * u**3 / h, 5 * u**4 / h],
-                [0, 0, 2 / h**2, 6 * u / h**2, 12 * u**2 / h**2, 20 * u**3 / h**2],
-                [0, 0, 0, 6 / h**3, 24 * u / h**3, 60 * u**2 / h**3],
-            ]
-        )
-        pose, velocity, acceleration, jerk = basis @ coefficients[i]
-        return Reference(pose, velocity, acceleration, jerk[:2])
+        i = min(bisect_right(times, time), len(times) - 1) - 1
+        t = float(time - times[i]) * 1e-9
+        along_x, along_y, turning = coefficients[i]
+        x, v_x, a_x, j_x = _derivatives(along_x, t)
+        y, v_y, a_y, j_y = _derivatives(along_y, t)
+        heading, omega, omega_1, _ = _derivatives(turning, t)
+        return Target(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
 
     def goes_on_with(self, newer: "Preview", tolerance: float) -> bool:
         """Whether `newer` begins within `tolerance` [m, rad] of where this one is by then."""
@@ -90,6 +92,17 @@ class Preview:
             velocity=np.concatenate([self.velocity[old], newer.velocity]),
             acceleration=np.concatenate([self.acceleration[old], newer.acceleration]),
         )
+
+
+def _derivatives(coefficients: list[float], t: float) -> tuple[float, float, float, float]:
+    """Polynomial c₀ + c₁ t + … + c₅ t⁵ and its first three derivatives."""
+    c_0, c_1, c_2, c_3, c_4, c_5 = coefficients
+    return (
+        c_0 + t * (c_1 + t * (c_2 + t * (c_3 + t * (c_4 + t * c_5)))),
+        c_1 + t * (2 * c_2 + t * (3 * c_3 + t * (4 * c_4 + t * 5 * c_5))),
+        2 * c_2 + t * (6 * c_3 + t * (12 * c_4 + t * 20 * c_5)),
+        6 * c_3 + t * (24 * c_4 + t * 60 * c_5),
+    )
 
 
 def joined(previews: Iterable[Preview]) -> Preview:

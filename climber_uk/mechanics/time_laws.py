@@ -5,7 +5,7 @@ A new law is one class with `duration` and `progress`, and one entry in `TIME_LA
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.shapes import Shape
 
-Derivatives = tuple[Array, Array, Array, Array]  # of order 0, 1, 2, 3
+Derivatives = tuple[Any, Any, Any, Any]  # (...) of order 0, 1, 2, 3
 
 
 class TimeLaw(Protocol):
@@ -119,7 +119,7 @@ class Stopping:
 TIME_LAWS = {"constant_rate": ConstantRate, "rest_to_rest": RestToRest}
 
 
-def compose(f: Derivatives, inner: tuple[Array, Array, Array]) -> Derivatives:
+def compose(f: Derivatives, inner: tuple[Any, Any, Any]) -> Derivatives:
     """Derivatives by t of f(s(t)), of those of f by s, and ṡ, s̈, s⃛."""
     s_1, s_2, s_3 = inner
     _, f_1, f_2, f_3 = f

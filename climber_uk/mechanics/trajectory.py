@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from climber_uk.mechanics import Array, unpack
+from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import along
+from climber_uk.mechanics.motion import Target
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.mechanics.time_laws import ConstantRate, Derivatives, TimeLaw, compose
 
@@ -22,6 +23,17 @@ class Reference:
     velocity: Array  # (..., 3) ẋ [m/s], ẏ [m/s], θ̇ [rad/s]
     acceleration: Array  # (..., 3) ẍ [m/s²], ÿ [m/s²], θ̈ [rad/s²]
     jerk: Array  # (..., 2) of x and y [m/s³]
+
+    @classmethod
+    def of(cls, target: Target) -> "Reference":
+        """Reference of a target."""
+        return cls(pack(*target[:3]), pack(*target[3:6]), pack(*target[6:9]), pack(*target[9:]))
+
+    @cached_property
+    def target(self) -> Target:
+        """The same in components."""
+        vectors = self.pose, self.velocity, self.acceleration, self.jerk
+        return Target(*(part for vector in vectors for part in unpack(vector)))
 
     @cached_property
     def heading(self) -> Array:

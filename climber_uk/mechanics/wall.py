@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
-from climber_uk.mechanics.climber import GRAVITY
+from climber_uk.mechanics.climber import DEGREE, GRAVITY
 from climber_uk.mechanics.elementary import cos, sin
 from climber_uk.mechanics.parameter import check, parameter
 
@@ -21,10 +21,10 @@ class Wall(Protocol):
 
     flat: ClassVar[bool]
 
-    def along(self, inclination: float, y: Any) -> tuple[Any, Any]:
+    def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
         """Parts (s_x, s_y) of gravity along the wall at height `y` (...) [m], each (...)."""
 
-    def into(self, inclination: float, y: Any, y_speed: Any) -> Any:
+    def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
         """g_n (...) [m/s²] into the wall, with what the way's curvature adds at ẏ = `y_speed`."""
 
 
@@ -41,14 +41,14 @@ class Plane:
     def __post_init__(self) -> None:
         check(self)
 
-    def along(self, inclination: float, y: Any) -> tuple[Any, Any]:
+    def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
-        pull, tilt = math.sin(math.radians(inclination)), math.radians(self.tilt)
+        pull, tilt = sin(inclination * DEGREE), math.radians(self.tilt)
         return pull * math.sin(tilt) + 0.0 * y, -pull * math.cos(tilt) + 0.0 * y
 
-    def into(self, inclination: float, y: Any, y_speed: Any) -> Any:
+    def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
         """See `Wall`."""
-        return GRAVITY * math.cos(math.radians(inclination)) + 0.0 * y
+        return GRAVITY * cos(inclination * DEGREE) + 0.0 * y
 
 
 @dataclass(frozen=True)
@@ -64,13 +64,13 @@ class Cylinder:
         if self.radius == 0:
             raise ValueError("radius=0.0 must not be 0 [m]")
 
-    def along(self, inclination: float, y: Any) -> tuple[Any, Any]:
+    def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
-        return 0.0 * y, -sin(math.radians(inclination) + y / self.radius)
+        return 0.0 * y, -sin(inclination * DEGREE + y / self.radius)
 
-    def into(self, inclination: float, y: Any, y_speed: Any) -> Any:
+    def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
         """See `Wall`."""
-        steep = math.radians(inclination) + y / self.radius
+        steep = inclination * DEGREE + y / self.radius
         return GRAVITY * cos(steep) + y_speed * y_speed / self.radius
 
 

@@ -163,10 +163,11 @@ class UkTorqueController(ManagedNode):
             self.say("safe output", trouble, self.follower.detail, mode.is_fault)
         if answer is not None:
             self.publish_torques(answer)
+            state = self.follower.state
             if answer.command is not None:
-                self.publish_causes(answer.stamp, answer.command)
-            if self.follower.state is not None:
-                self.take_margins(answer, self.follower.state)
+                self.publish_causes(answer.stamp, answer.command, state)
+            if state is not None:
+                self.take_margins(answer, state)
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
@@ -178,7 +179,7 @@ class UkTorqueController(ManagedNode):
             ordered = [left, right] if self.options.effort_order == "left_right" else [right, left]
             self.efforts.publish(Float64MultiArray(data=ordered))
 
-    def publish_causes(self, stamp: int, command: Command) -> None:
+    def publish_causes(self, stamp: int, command: Command, state: State | None) -> None:
         """Publish what an answer came from."""
         self.answers += 1
         self.saturations += int(command.missing.any())
@@ -188,8 +189,8 @@ class UkTorqueController(ManagedNode):
             drive, turn = follower.tracker.disturbance
             self.disturbance.publish(writing.wrench((drive, 0.0, turn), stamp, base_frame))
         desired = follower.preview.at(stamp) if follower.preview else None
-        if follower.state is not None and desired is not None:
-            error = tracking_error(follower.state.pose, desired)
+        if state is not None and desired is not None:
+            error = tracking_error(state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
 
     def take_margins(self, answer: Answer, state: State) -> None:

@@ -2,12 +2,17 @@
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.elementary import rotated
+from climber_uk.mechanics.motion import Motion
 from climber_uk.mechanics.parameter import check, parameter
 
 
@@ -47,6 +52,26 @@ class Sensors:
                 f"control_period={period} [s]"
             )
         return periods
+
+    @cached_property
+    def are_exact(self) -> bool:
+        """Whether they tell the truth."""
+        noise = self.position_noise, self.heading_noise, self.speed_noise, self.yaw_rate_noise
+        place_bias = self.x_bias, self.y_bias, self.heading_bias
+        errors = (*noise, *place_bias, self.speed_bias, self.yaw_rate_bias)
+        return not any(np.any(error) for error in errors)
+
+    def told(self, motion: Motion, noise: Iterable[Any]) -> Motion:
+        """Motion with bias and noise, of five numbers of unit variance: x, y, θ, v, ω."""
+        x, y, heading, cosine, sine, speed, yaw_rate = motion
+        right, up, turned, faster, turning = noise
+        return Motion(
+            x + self.x_bias + self.position_noise * right,
+            y + self.y_bias + self.position_noise * up,
+            *rotated(heading, cosine, sine, self.heading_bias + self.heading_noise * turned),
+            speed + self.speed_bias + self.speed_noise * faster,
+            yaw_rate + self.yaw_rate_bias + self.yaw_rate_noise * turning,
+        )
 
 
 class Odometer:
@@ -92,17 +117,13 @@ class Odometer:
         return State.rolling(self._pose, float(wheels.forward_speed), float(wheels.yaw_rate))
 
     def _measured(self, state: State) -> State:
-        sensors = self.sensors
-        pose_noise = sensors.position_noise, sensors.position_noise, sensors.heading_noise
-        pose_bias = np.array([sensors.x_bias, sensors.y_bias, sensors.heading_bias])
-        twist_noise = sensors.speed_noise, sensors.yaw_rate_noise
-        twist_bias = sensors.speed_bias, sensors.yaw_rate_bias
-        if not (any(pose_noise) or any(twist_noise) or any(twist_bias) or pose_bias.any()):
+        if self.sensors.are_exact:
             return state
-        noise = self._random.normal(size=5)
-        pose = state.pose + pose_bias + noise[:3] * pose_noise
-        forward, turning = noise[3:] * twist_noise + twist_bias
-        speed, yaw_rate = state.forward_speed + forward, state.yaw_rate + turning
-        cosine, sine, aside = math.cos(pose[2]), math.sin(pose[2]), float(state.side_slip)
-        velocity = [speed * cosine - aside * sine, speed * sine + aside * cosine, yaw_rate]
-        return State(pose, np.array(velocity))
+        noise = self._random.normal(size=5).tolist()
+        told, aside = self.sensors.told(state.motion, noise), float(state.side_slip)
+        velocity = [
+            told.speed * told.cosine - aside * told.sine,
+            told.speed * told.sine + aside * told.cosine,
+            told.yaw_rate,
+        ]
+        return State(np.array([told.x, told.y, told.heading]), np.array(velocity))

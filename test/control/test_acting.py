@@ -1,7 +1,7 @@
-import numpy as np
 import pytest
 
 from climber_uk.control.acting import Acting
+from climber_uk.mechanics.motion import Torques
 from climber_uk.mechanics.preview import SECOND
 
 
@@ -9,7 +9,7 @@ from climber_uk.mechanics.preview import SECOND
 def acting():
     acting = Acting()
     for second, torque in ((1, 1.0), (2, 2.0), (4, 3.0)):
-        acting.add(second * SECOND, np.full(2, torque))
+        acting.add(second * SECOND, Torques(torque, torque))
     return acting
 
 
@@ -46,4 +46,4 @@ def test_after_a_restart_the_last_torques_have_always_acted(acting):
 
 def test_nothing_is_known_at_first():
     assert not Acting().are_known_since(0)
-    assert not Acting().last.any()
+    assert Acting().last == (0, 0)

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from climber_uk.control.constraints import Exact, Guidance, rows
-from climber_uk.control.controller import Controller, Law, Situation, limited
+from climber_uk.control.constraints import Exact, Guidance, demanded, rows
+from climber_uk.control.controller import Controller, Law, Situation
 from climber_uk.mechanics.climber import Climber, State, across, along
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, limited
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -20,7 +21,7 @@ PERIOD = 0.005  # [s]
 
 
 def situation(state, held=(0.0, 0.0), disturbance=(0.0, 0.0)):
-    return Situation(state, np.array(held), np.array(disturbance), PERIOD)
+    return Situation(state.motion, Torques(*held), Wrench(*disturbance), PERIOD)
 
 
 @settings(max_examples=50, deadline=None)
@@ -38,9 +39,9 @@ def test_the_closed_form_is_the_udwadia_kalaba_force(time, offset, turned, v, di
     state = State.rolling(reference.pose + np.array([offset, -offset, turned]), v, turned)
     for constraints in (Guidance(), Exact()):
         command = Controller(climber, constraints, Law(predict=False)).command(
-            situation(state, disturbance=disturbance), reference
+            situation(state, disturbance=disturbance), reference.target
         )
-        A, b = rows(state, constraints.demand(state, reference))
+        A, b = rows(state, demanded(constraints, state, reference))
         pushed = State.rolling(np.array([0.0, 0.0, state.heading]), disturbance[0], disturbance[1])
         Q = climber.applied_force(state.heading, 1.0) + pushed.velocity
         Qc = constraint_force(climber.mass_matrix, Q, A, b)
@@ -57,8 +58,11 @@ bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[
 
 @given(st.floats(-50, 50), st.floats(-50, 50), bounds, bounds)
 def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
-    wanted = np.array([right, left])
-    got = limited(wanted, right_bounds, left_bounds)
+    climber = Climber()
+    wrench = forces(climber, right, left)
+    *done, one, other = limited(climber, *wrench, right_bounds, left_bounds)
+    got = one, other
+    np.testing.assert_allclose(done, forces(climber, *got), atol=1e-9)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
         assert low - 1e-9 <= torque <= high + 1e-9
     turn, drive = (right - left) / 2, (right + left) / 2
@@ -71,11 +75,19 @@ def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_b
     assert (got[0] + got[1]) / 2 == pytest.approx(np.clip(drive, lowest, highest), abs=1e-9)
 
 
+def test_a_limit_is_not_passed_by_rounding():
+    climber, random = Climber(max_wheel_torque=4.0), np.random.default_rng(1)
+    for _ in range(1000):
+        drive, turn = (1000 * random.normal(size=2)).tolist()
+        *_, right, left = limited(climber, drive, turn, (-4.0, 4.0), (-4.0, 4.0))
+        assert max(abs(right), abs(left)) <= 4.0
+
+
 def test_what_the_limits_take_away_is_told():
     reference = PAPER.at(0.0)
     for limit, is_cut in ((20.0, False), (0.2, True)):
         controller = Controller(Climber(max_wheel_torque=limit), Guidance(), Law())
-        command = controller.command(situation(START), reference)
+        command = controller.command(situation(START), reference.target)
         assert np.abs(command.torques).max() <= limit
         assert bool(np.abs(command.missing).max() > 1e-9) is is_cut
         demanded = controller.climber.drive_and_turn(command.torques) + command.missing
@@ -87,12 +99,12 @@ def test_a_dc_motor_has_less_torque_the_faster_its_wheel_and_full_torque_to_brak
     climber = Climber(no_load_wheel_rate=400.0)  # START turns its wheels at 364 and 377 rad/s
     controller = Controller(climber, Guidance(), Law())
     uphill = replace(PAPER.at(0.0), acceleration=np.array([500.0, 0.0, 0.0]))
-    torques = controller.command(situation(START), uphill).torques
+    torques = controller.command(situation(START), uphill.target).torques
     rates = climber.wheel_rates(START)
     assert (torques <= 20.0 * (1 - rates / 400.0) + 1e-12).all()
     assert (torques > 0).all()
     braking = replace(PAPER.at(0.0), acceleration=np.array([-500.0, 0.0, 0.0]))
-    torques = controller.command(situation(START), braking).torques
+    torques = controller.command(situation(START), braking.target).torques
     assert torques.min() == -20.0
 
 
@@ -101,7 +113,7 @@ def test_a_torque_changes_no_faster_than_its_limit():
     controller = Controller(Climber(), Guidance(), law)
     hard = replace(PAPER.at(0.0), acceleration=np.array([200.0, 0.0, 50.0]))
     held = np.array([0.3, -0.1])
-    torques = controller.command(situation(START, held), hard).torques
+    torques = controller.command(situation(START, held), hard.target).torques
     assert np.abs(torques - held).max() == pytest.approx(40.0 * PERIOD)
 
 
@@ -110,5 +122,32 @@ def test_holding_torques_keep_the_climber_where_it_is():
     controller, plant = Controller(climber, Guidance(), Law()), Plant(climber, 0.0025)
     state = State.rolling(np.array([0.0, 0.0, 1.0]), 0.3, 0.4)
     for _ in range(1000):
-        state = plant.advance(state, controller.holding(situation(state), 5.0), steps=2)
+        torques = controller.holding(situation(state), 5.0)
+        state = plant.advance(state, np.array(torques), steps=2)
     np.testing.assert_allclose(state.velocity, 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("constraints", [Guidance(), Exact()], ids=["guidance", "exact"])
+@pytest.mark.parametrize("limit", [1.2, 20.0])
+def test_one_call_serves_many_climbers(constraints, limit):
+    random, n = np.random.default_rng(9), 40
+    climber = Climber(max_wheel_torque=limit)
+    controller = Controller(climber, constraints, Law(max_torque_rate=1000.0))
+    reference = PAPER.at(1.0)
+    pose = reference.pose + random.normal(size=(n, 3)) * 0.1
+    motion = State.rolling(pose, 8 + random.normal(size=n), random.normal(size=n)).motion
+    held, disturbance = random.normal(size=(2, n)), 10 * random.normal(size=(2, n))
+    many = Situation(motion, Torques(*held), Wrench(*disturbance), PERIOD)
+    together = controller.command(many, reference.target)
+    for i in range(n):
+        one = Situation(
+            Motion(*(float(number[i]) for number in motion)),
+            Torques(*held[:, i].tolist()),
+            Wrench(*disturbance[:, i].tolist()),
+            PERIOD,
+        )
+        alone = controller.command(one, reference.target)
+        for name in ("torques", "constraint_force", "missing"):
+            expected = getattr(alone, name)
+            got = getattr(together, name)[i]
+            np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * 100)

@@ -14,6 +14,7 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.motion import Wrench
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.shapes import Circle, Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
@@ -179,7 +180,7 @@ def test_a_single_wrong_odometry_never_reaches_the_wheels(loop):
 
 
 def test_a_fault_forgets_what_was_learnt(loop):
-    loop.follower.tracker.disturbance = np.array([5.0, 1.0])
+    loop.follower.tracker.disturbance = Wrench(5.0, 1.0)
     loop.tell(moved=(1.0, 0.0, 0.0))
     np.testing.assert_array_equal(loop.follower.tracker.disturbance, 0)
 

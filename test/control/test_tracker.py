@@ -224,7 +224,7 @@ def test_gains_change_without_a_jump_of_the_torque():
         ours = follower(constraints=before)
         offset = State(START.pose + np.array([-0.05, 0.05, 0.1]), START.velocity)
         tracker = ours.tracker
-        tracker.see(SECOND, offset)
+        tracker.see(SECOND, offset.motion)
         preview = sampled(PAPER, 1.0)
         old = tracker.answer(preview, 0.0).torques
         change(tracker)
@@ -245,7 +245,7 @@ def test_gains_change_without_a_jump_of_the_torque():
 def test_changed_gains_act_in_full_half_a_second_later():
     ours = follower()
     tracker = ours.tracker
-    tracker.see(SECOND, START)
+    tracker.see(SECOND, START.motion)
     changed = replace(tracker.controller, constraints=Guidance(along_track_gain=6.0))
     tracker.retune(changed, tracker.observer, tracker.timing, tracker.pacing)
     assert tracker._constraints().along_track_gain == 5.0

@@ -84,3 +84,12 @@ def test_one_call_serves_many_climbers():
 def test_an_impossible_parameter_is_named_with_its_bound(name, value, bound):
     with pytest.raises(ValueError, match=bound):
         dataclasses.replace(PAPER, **{name: value})
+
+
+def test_a_climber_may_be_many_and_each_is_checked():
+    many = dataclasses.replace(PAPER, mass=np.array([4.0, 5.0]), inclination=np.array([0.0, 90.0]))
+    np.testing.assert_allclose(many.weight_along_wall, [0, 49.05])
+    with pytest.raises(ValueError, match=r"mass=.*-1.0.* must be > 0 \[kg\]"):
+        dataclasses.replace(PAPER, mass=np.array([4.0, -1.0]))
+    with pytest.raises(ValueError, match=r"mass=.*nan.* must be a finite number"):
+        dataclasses.replace(PAPER, mass=np.array([4.0, np.nan, 3.0]))

@@ -15,6 +15,7 @@ VALUES = [-4.0, -0.5, -0.0, 0.3, 2.0, 7.0]
         *(lambda x: elementary.sqrt(abs(x)), elementary.wrapped),
         lambda x: elementary.clipped(x, -1.5, 0.5),
         lambda x: elementary.select(x > 0.1, x, -2 * x),
+        lambda x: elementary.with_sign_of(2.0, x),
     ],
 )
 def test_one_number_gives_what_it_gives_among_many_and_stays_a_float(function):
@@ -28,3 +29,22 @@ def test_one_number_gives_what_it_gives_among_many_and_stays_a_float(function):
 def test_angles_are_wrapped_to_half_a_turn_either_way():
     assert elementary.wrapped(math.pi) == -math.pi
     assert elementary.wrapped(3 * math.pi / 2) == pytest.approx(-math.pi / 2)
+
+
+@pytest.mark.parametrize("largest", [0.02, 3.0])
+def test_turning_many_is_turning_each(largest):
+    random = np.random.default_rng(2)
+    heading, angle = random.uniform(-4, 4, 50), random.uniform(-largest, largest, 50)
+    end, cosine, sine = elementary.rotated(heading, np.cos(heading), np.sin(heading), angle)
+    for i in range(50):
+        alone = elementary.rotated(*(float(v) for v in (heading[i], 0.0, 0.0, angle[i])))
+        assert (end[i], cosine[i], sine[i]) == pytest.approx(alone, abs=3e-16)
+
+
+def test_after_many_small_turns_cosine_and_sine_still_have_length_one():
+    heading, angle = np.array([0.3]), np.array([0.0299])
+    cosine, sine = np.cos(heading), np.sin(heading)
+    for _ in range(20_000):
+        heading, cosine, sine = elementary.rotated(heading, cosine, sine, angle)
+    np.testing.assert_allclose(cosine**2 + sine**2, 1, atol=1e-12)
+    np.testing.assert_allclose(cosine, np.cos(heading), atol=1e-10)

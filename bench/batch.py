@@ -1,0 +1,212 @@
+"""`python bench/batch.py`: climber-steps a second of many climbers at once.
+
+Open loop: plain climbers under constant torques. Closed loop: each with its controller at 200 Hz,
+observer on, its mass and friction its own, on the paper's ellipse. All in turns in one process; the
+least time of many counts. One step is one step of the plant.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from limit import Limit, climber_numbers, controller_numbers
+
+from climber_uk.analysis import closed_loops
+from climber_uk.analysis.closed_loop import sampled
+from climber_uk.analysis.closed_loops import Course, Loops
+from climber_uk.control.constraints import Guidance
+from climber_uk.control.controller import Controller, Law
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.motion import Motion, Wrench
+from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics.shapes import Ellipse
+from climber_uk.mechanics.time_laws import ConstantRate
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.simulation.plain import Plain, advanced_often
+
+PAPER = Climber()
+ELLIPSE = Trajectory(Ellipse(), ConstantRate())
+OPEN, CLOSED, IN_C = 10_000, 8192, 512  # climbers; C needs no large blocks
+STEP, STEPS, TICKS = 0.0025, 20, 40  # [s]; steps, and ticks, in a measurement
+RATES = {"2.5 ms": 2, "1 ms": 5}  # steps of the plant in a tick of 5 ms
+
+
+def spread(number: int) -> Motion:
+    """Starts around that of the paper's ellipse."""
+    random = np.random.default_rng(1)
+    x, y, heading, v, omega = 0.05 * random.normal(size=(5, number))
+    return Motion(x, 6 + y, heading, np.cos(heading), np.sin(heading), 10 + v, omega - 0.6)
+
+
+@dataclass
+class Way:
+    """A way to compute steps; `run` returns its own time [s] for `steps` climber-steps."""
+
+    run: Callable[[], float]
+    steps: int
+    best: float = np.inf
+
+    @property
+    def rate(self) -> float:
+        """Climber-steps a second, in millions."""
+        return self.steps / self.best / 1e6
+
+
+def measured(ways: dict[str, Way], rounds: int) -> None:
+    """Run all in turns."""
+    for _ in range(rounds):
+        for way in ways.values():
+            way.best = min(way.best, way.run())
+
+
+def timed(function: Callable[[], object]) -> Callable[[], float]:
+    """The function, with the time it takes."""
+
+    def run() -> float:
+        start = time.perf_counter()
+        function()
+        return time.perf_counter() - start
+
+    return run
+
+
+def open_loop(limit: Limit | None, with_numba: bool) -> dict[str, Way]:
+    """Ways to advance climbers under constant torques."""
+    body, motion = Plain.of(PAPER), spread(OPEN)
+    wrench = Wrench(np.full(OPEN, PAPER.seal_friction), np.full(OPEN, 0.01))
+    steps = OPEN * STEPS
+    run = {"numpy": timed(lambda: advanced_often(body, motion, wrench, STEP, STEPS))}
+    if with_numba:
+        from climber_uk.simulation import compiled
+
+        run["numba"] = timed(lambda: compiled.advanced(body, motion, wrench, STEP, STEPS))
+    if limit is not None:
+        numbers, wrenches, motions = climber_numbers(PAPER, 1), np.array(wrench), np.array(motion)
+        given = limit.pointer("Climber", numbers), limit.pointer("double", wrenches)
+
+        def in_c() -> Array:
+            rows = motions.copy()
+            limit.library.open_loops(OPEN, STEPS, STEP, *given, limit.pointer("double", rows))
+            return rows
+
+        if np.abs(in_c() - advanced_often(body, motion, wrench, STEP, STEPS)).max() > 1e-9:
+            raise RuntimeError("the C does something else")
+        run["C"] = timed(in_c)
+    return {name: Way(function, steps) for name, function in run.items()}
+
+
+def many_loops(number: int) -> Loops:
+    """Loops of climbers that are not quite as their controllers believe."""
+    random = np.random.default_rng(2)
+    true = replace(
+        PAPER,
+        mass=5 * random.uniform(0.9, 1.1, number),
+        seal_friction_coefficient=0.8 * random.uniform(0.9, 1.1, number),
+    )
+    return Loops(spread(number), true, Controller(PAPER, Guidance(), Law()))
+
+
+def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, Way]:
+    """Ways to run closed loops; start-up is not counted."""
+    loops, preview = many_loops(CLOSED), sampled(ELLIPSE, 1.0)
+    closed_loops.keep_what_is_freed()
+
+    def ours(compiled: bool) -> Callable[[], float]:
+        def by_tick() -> float:
+            """Ticks as long as the shortest of them."""
+            course = Course(ELLIPSE, TICKS * 0.005, steps=steps, compiled=compiled)
+            ends: list[float] = []
+            loops.run_block(course, preview, lambda: ends.append(time.perf_counter()))
+            return float(np.diff(ends).min()) * TICKS
+
+        return by_tick
+
+    run = {"numpy": ours(False)}
+    if with_numba:
+        run["numpy, numba's plant"] = ours(True)
+    if limit is not None:
+        run["C"] = closed_in_c(limit, many_loops(IN_C), steps)
+    return {
+        name: Way(function, (IN_C if name == "C" else CLOSED) * TICKS * steps)
+        for name, function in run.items()
+    }
+
+
+def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
+    """The same in C."""
+    controllers = controller_numbers(loops.controller, loops.observer, IN_C)
+    climbers, start = climber_numbers(loops.climber, IN_C), np.array(loops.start).T.copy()
+    preview = sampled(ELLIPSE, 1.0)
+    times = (SECOND + round((tick + 0.5) * 0.005 * SECOND) for tick in range(TICKS))
+    aims = np.array([preview.target(time) for time in times])
+    memories = np.zeros((IN_C, 12))
+    memories[:, :7] = start
+    given = (
+        limit.pointer("Controller", controllers),
+        limit.pointer("Climber", climbers),
+        limit.pointer("Target", aims),
+    )
+
+    def in_c() -> Array:
+        motions, memory = start.copy(), memories.copy()
+        mutable = limit.pointer("Motion", motions), limit.pointer("Memory", memory)
+        limit.library.closed_loops(IN_C, TICKS, steps, 0.005, *given, *mutable)
+        return motions
+
+    end = ELLIPSE.at(TICKS * 0.005).target
+    far = np.hypot(*(in_c()[:, :2] - (end.x, end.y)).T)
+    ours = loops.run(Course(ELLIPSE, TICKS * 0.005, steps=steps)).last
+    if np.abs(far - ours).max() > 1e-9:
+        raise RuntimeError(f"the C is {np.abs(far - ours).max()} m elsewhere")
+    return timed(in_c)
+
+
+def half(number: int) -> float:
+    """Time of some loops [s], in a process of their own."""
+    loops = many_loops(number)
+    return timed(lambda: loops.run(Course(ELLIPSE, 0.5)))()
+
+
+def two_processes() -> float:
+    """How many times as fast two processes are as one, for the same loops."""
+    with ProcessPoolExecutor(2) as pool:
+        list(pool.map(half, [CLOSED // 8] * 2))  # they have started
+        ratios = []
+        for _ in range(3):
+            one = timed(lambda: pool.submit(half, 2 * CLOSED).result())()
+            ratios.append(one / timed(lambda: list(pool.map(half, [CLOSED] * 2)))())
+    return float(np.median(ratios))
+
+
+def table(title: str, ways: dict[str, Way]) -> None:
+    """Print rates."""
+    first = next(iter(ways.values()))
+    print(f"{title:<44}{'million/s':>12}{'ratio':>8}")
+    for name, way in ways.items():
+        print(f"{name:<44}{way.rate:>12.1f}{way.rate / first.rate:>8.2f}")
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=20, help="measurements of each")
+    parser.add_argument("--no-c", action="store_true", help="without gcc and cffi")
+    parser.add_argument("--no-numba", action="store_true", help="without numba")
+    options = parser.parse_args()
+    limit = None if options.no_c else Limit()
+    ways = open_loop(limit, not options.no_numba)
+    measured(ways, options.rounds)
+    table(f"open loop, {OPEN} climbers, {1e3 * STEP:g} ms", ways)
+    for name, steps in RATES.items():
+        ways = closed_loop(limit, not options.no_numba, steps)
+        measured(ways, options.rounds)
+        table(f"closed loop, {CLOSED} climbers, {name} / 5 ms", ways)
+    print(f"two processes, closed loop: {two_processes():.2f} times one")
+
+
+if __name__ == "__main__":
+    main()

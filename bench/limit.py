@@ -1,0 +1,60 @@
+"""The C in climber.c, built with gcc and called through cffi (bench/requirements.txt)."""
+
+import re
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from climber_uk.control.constraints import Guidance
+from climber_uk.control.controller import Controller
+from climber_uk.control.model import Observer
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber
+
+SOURCE = Path(__file__).parent / "climber.c"
+FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC"]
+
+
+class Limit:
+    """The library, and its arguments."""
+
+    def __init__(self) -> None:
+        from cffi import FFI
+
+        self.ffi, source = FFI(), SOURCE.read_text()
+        types = re.findall(r"^typedef struct \{[^}]*\} \w+;", source, re.MULTILINE)
+        functions = re.findall(r"^(void [^{]*?) \{", source, re.MULTILINE)
+        self.ffi.cdef("\n".join([*types, *(f"{function};" for function in functions)]))
+        with tempfile.TemporaryDirectory() as directory:
+            library = f"{directory}/climber.so"
+            subprocess.run(["gcc", *FLAGS, "-o", library, SOURCE, "-lm"], check=True)
+            self.library: Any = self.ffi.dlopen(library)
+
+    def pointer(self, kind: str, numbers: Array) -> Any:
+        """Contiguous numbers as structs of a kind."""
+        return self.ffi.from_buffer(f"{kind}[]", numbers)
+
+
+def climber_numbers(climber: Climber, number: int) -> Array:
+    """Numbers (number, 7) of a `Climber` in C, or of many."""
+    numbers = (
+        *(climber.mass, climber.yaw_inertia, climber.wheel_radius, climber.half_track),
+        *(climber.seal_friction, climber.weight_along_wall, climber.max_wheel_torque),
+    )
+    return np.stack([np.broadcast_to(each, number) for each in numbers], axis=1).astype(float)
+
+
+def controller_numbers(controller: Controller, observer: Observer, number: int) -> Array:
+    """Numbers (number, 16) of a `Controller` in C."""
+    gains = controller.constraints
+    assert isinstance(gains, Guidance)
+    numbers = (
+        *(gains.along_track_gain, gains.cross_track_gain, gains.speed_rate),
+        *(gains.heading_frequency, gains.fade_speed, gains.catch_up_speed, gains.turn_rate),
+        *(controller.law.friction_speed, observer.bandwidth),
+    )
+    rest = np.broadcast_to(numbers, (number, 9))
+    return np.concatenate([climber_numbers(controller.climber, number), rest], axis=1)

@@ -1,0 +1,187 @@
+"""`python bench/tick.py`: what a controller's tick costs, beside other ways to compute the same.
+
+A tick is `Tracker.see` and `Tracker.answer`: prediction, constraints, UK, observer, saturation,
+without messages. All ways are measured in turns in one process; the least time of many counts.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from limit import Limit, controller_numbers
+from scipy.linalg import sqrtm
+
+from climber_uk.analysis.closed_loop import sampled
+from climber_uk.control.constraints import CONSTRAINTS, rows
+from climber_uk.control.controller import Controller, Law, Situation
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber, State, across, along
+from climber_uk.mechanics.motion import Demand, Motion, Torques, Wrench
+from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics.shapes import Ellipse
+from climber_uk.mechanics.time_laws import ConstantRate
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.udwadia_kalaba import constraint_force
+
+PAPER = Trajectory(Ellipse(), ConstantRate())
+PERIOD, TICKS = 0.005, 20  # [s], and in a measurement
+
+
+def as_the_paper(M: Array, Q: Array, A: Array, b: Array) -> Array:
+    """Qc = M^(1/2) B⁺ (b - A a), B = A M^(-1/2) (8), as it is written."""
+    root = sqrtm(M)
+    B = A @ np.linalg.inv(root)
+    return root @ np.linalg.pinv(B) @ (b - A @ np.linalg.solve(M, Q))
+
+
+@dataclass(frozen=True)
+class WithMatrices(Controller):
+    """The same law, but with M, Q, A and b, and a function that solves them."""
+
+    solve: Callable[[Array, Array, Array, Array], Array] = constraint_force
+
+    def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
+        """See `Controller`."""
+        climber, state, heading = self.climber, State.moving(motion), motion.heading
+        direction = np.tanh(demand[2] / self.law.friction_speed)
+        Q = climber.applied_force(heading, direction)
+        Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
+        return float(along(heading, Qc)), float(Qc[2]), float(across(heading, Qc))
+
+
+def motions_on_the_way(number: int) -> list[Motion]:
+    """Motions of a climber that is where it should be."""
+    reference = PAPER.at(np.arange(number) * PERIOD)
+    states = zip(reference.pose, reference.velocity, strict=True)
+    return [State(pose, velocity).motion for pose, velocity in states]
+
+
+def ticks(tracker: Tracker) -> Callable[[], None]:
+    """Ticks of a tracker on its way along the paper's ellipse."""
+    preview = sampled(PAPER, 60.0)
+    stamps = (SECOND + round(number * PERIOD * SECOND) for number in range(10_000))
+    all_of_them = list(zip(stamps, motions_on_the_way(10_000), strict=True))
+    number = 0
+
+    def some() -> None:
+        nonlocal number
+        if number + TICKS > len(all_of_them):
+            tracker.reset()
+            number = 0
+        for stamp, motion in all_of_them[number : number + TICKS]:
+            tracker.see(stamp, motion)
+            tracker.answer(preview, 0.0)
+        number += TICKS
+
+    return some
+
+
+def ticks_in_c(limit: Limit, tracker: Tracker) -> tuple[Callable[[], None], Array]:
+    """Ticks of the same law in C, of targets that are known; and their torques (n, 2)."""
+    controllers = controller_numbers(tracker.controller, tracker.observer, 1)
+    numbers, preview = np.array(motions_on_the_way(TICKS)), sampled(PAPER, 1.0)
+    times = (SECOND + round((number + 0.5) * PERIOD * SECOND) for number in range(TICKS))
+    aims = np.array([preview.target(time) for time in times])
+    memory, torques = np.zeros((1, 12)), np.zeros((TICKS, 2))
+    memory[0, :7] = numbers[0]
+    arrays = (("Controller", controllers), ("Memory", memory), ("Motion", numbers))
+    controller, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
+    targets, told = limit.pointer("Target", aims), limit.pointer("double", torques)
+    tick = limit.library.tick
+
+    def some() -> None:
+        for i in range(TICKS):
+            tick(controller, past, motions + i, targets + i, PERIOD, told + 2 * i)
+
+    return some, torques
+
+
+def bare(controller: Controller) -> Callable[[], None]:
+    """The law alone: a torque from state and reference."""
+    reference = PAPER.at(1.0)
+    target, motion = reference.target, State(reference.pose, reference.velocity).motion
+    situation = Situation(motion, Torques(0.0, 0.0), Wrench(0.0, 0.0), PERIOD)
+
+    def some() -> None:
+        for _ in range(TICKS):
+            controller.command(situation, target)
+
+    return some
+
+
+def least(ways: dict[str, Callable[[], None]], rounds: int) -> dict[str, float]:
+    """Least time of a tick [µs], of measurements in turns."""
+    best = dict.fromkeys(ways, np.inf)
+    for _ in range(rounds):
+        for name, run in ways.items():
+            run()  # what the one before has left in the caches does not count
+            start = time.perf_counter()
+            run()
+            best[name] = min(best[name], (time.perf_counter() - start) / TICKS * 1e6)
+    return best
+
+
+def ways(constraints: str, law: Law) -> dict[str, Controller]:
+    """Controllers that give the same torques."""
+    gains = CONSTRAINTS[constraints]()
+    return {
+        "closed form, floats": Controller(Climber(), gains, law),
+        "generic UK, numpy": WithMatrices(Climber(), gains, law),
+        "the paper's formula": WithMatrices(Climber(), gains, law, as_the_paper),
+    }
+
+
+def check(tracker: Tracker, run: Callable[[], None], torques: Array) -> None:
+    """Raise `RuntimeError` unless the C gives what the tracker answers."""
+    run()
+    preview = sampled(PAPER, 1.0)
+    for number, motion in enumerate(motions_on_the_way(TICKS)):
+        tracker.see(SECOND + round(number * PERIOD * SECOND), motion)
+        command = tracker.answer(preview, 0.0)
+        if command is None or np.abs(command.torques - torques[number]).max() > 1e-9:
+            raise RuntimeError(f"tick {number}: {command} is not {torques[number]}")
+    tracker.reset()
+
+
+def table(title: str, times: dict[str, float]) -> None:
+    """Print times, and how many times as long each is as the first."""
+    first = next(iter(times.values()))
+    print(f"{title:<40}{'µs':>10}{'ratio':>10}")
+    for name, least_time in times.items():
+        print(f"{name:<40}{least_time:>10.2f}{least_time / first:>10.3g}")
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=200, help="measurements of each")
+    parser.add_argument("--no-c", action="store_true", help="without gcc and cffi")
+    options = parser.parse_args()
+    limit = None if options.no_c else Limit()
+    for constraints in CONSTRAINTS:
+        trackers = {
+            name: Tracker(controller, Observer(), Timing(), Pacing())
+            for name, controller in ways(constraints, Law()).items()
+        }
+        whole = {name: ticks(tracker) for name, tracker in trackers.items()}
+        if limit is not None and constraints == "guidance":
+            ours = next(iter(trackers.values()))
+            run, torques = ticks_in_c(limit, ours)
+            check(ours, run, torques)
+            whole["C through cffi, preview not counted"] = run
+        table(f"tick, {constraints}", least(whole, options.rounds))
+        alone = {
+            name: bare(controller)
+            for name, controller in ways(constraints, Law(predict=False)).items()
+        }
+        table(f"law alone, {constraints}", least(alone, options.rounds))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""What became of many closed loops, gathered while they run."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from climber_uk.control.controller import Command
+from climber_uk.control.tracker import CUT
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import GRAVITY, Climber
+from climber_uk.mechanics.contact import AMPLE, Contact
+from climber_uk.mechanics.motion import Motion, Target, Torques, forces
+from climber_uk.mechanics.wall import Plane
+
+NEAR = 0.01  # [m] from the reference within which a loop has settled
+
+
+class Outcome(NamedTuple):
+    """What became of each loop, arrays (N,): until it fell, if it did."""
+
+    rms: Array  # of the distance from the reference [m]
+    worst: Array  # distance [m]
+    last: Array  # distance, at the end [m]
+    settled: Array  # last time further than `NEAR` from it [s]
+    peak_torque: Array  # of a wheel [N m]
+    saturated: Array  # share of the answers that limits cut
+    slip_margin: Array  # lowest
+    tip_margin: Array  # lowest
+    fell: Array  # when [s]; infinite if it did not
+
+
+class Tally:
+    """Sums and extremes of n loops."""
+
+    def __init__(self, number: int, contact: Contact) -> None:
+        self.contact, self.times = contact, np.zeros(number)
+        self.squares, self.cuts = np.zeros(number), np.zeros(number)
+        self.worst, self.last, self.late = np.zeros(number), np.zeros(number), np.zeros(number)
+        self.peak = np.zeros(number)
+        self.slip, self.tip = np.full(number, AMPLE), np.full(number, AMPLE)
+        self.fell = np.full(number, np.inf)
+        self._climber: Climber | None = None
+        self._on_wall: Any = 1.0  # 0 for those that fell
+
+    def add(
+        self,
+        time: float,
+        motion: Motion,
+        target: Target,
+        command: Command,
+        wheels: Torques,
+        climber: Climber,
+    ) -> None:
+        """Take in a period that begins at `time` [s], in which `wheels` act."""
+        if climber is not self._climber:
+            self._hold(time, climber)
+        x, y = motion.x - target.x, motion.y - target.y
+        square = (x * x + y * y) * self._on_wall
+        self.times += self._on_wall
+        self.squares += square
+        np.maximum(self.worst, square, out=self.worst)
+        self.last = np.where(self._on_wall, square, self.last)
+        self.late[square > NEAR * NEAR] = time
+        cut = (np.abs(command.lost.drive) > CUT) | (np.abs(command.lost.turn) > CUT)
+        self.cuts += cut * self._on_wall
+        for torque in wheels:
+            np.maximum(self.peak, np.abs(torque) * self._on_wall, out=self.peak)
+        lateral = climber.mass * motion.speed * motion.yaw_rate
+        lateral = lateral + climber.weight_along_wall * motion.cosine
+        margin = self.contact.slip_margin(climber, self._into, forces(climber, *wheels)[0], lateral)
+        self.slip = np.where(self._on_wall, np.minimum(self.slip, margin), self.slip)
+
+    def _hold(self, time: float, climber: Climber) -> None:
+        """Tell who falls off, now that the climbers are these."""
+        self._climber = climber
+        self._into = Plane().into(climber.inclination, 0.0, 0.0)
+        hold = self.contact.hold(climber, self._into)
+        along = climber.weight_along_wall / climber.mass
+        tip = self.contact.tip_margin(climber, self._into, along)
+        falls = (hold < 1e-9 * climber.mass * GRAVITY) | (tip < 1)
+        self.tip = np.minimum(self.tip, tip)
+        self.fell = np.minimum(self.fell, np.where(falls, time, np.inf))
+        if np.isfinite(self.fell).any():
+            self._on_wall = np.where(np.isfinite(self.fell), 0.0, 1.0)
+
+    def outcome(self) -> Outcome:
+        """All of it."""
+        times = np.maximum(self.times, 1)
+        return Outcome(
+            *(np.sqrt(self.squares / times), np.sqrt(self.worst), np.sqrt(self.last)),
+            *(self.late, self.peak, self.cuts / times, self.slip, self.tip, self.fell),
+        )

@@ -1,0 +1,57 @@
+"""Many climbers in the place of one: arrays (N,) where there are floats."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+
+def part(of: Any, index: Any) -> Any:
+    """Those of many that `index` picks, of arrays within tuples and dataclasses, too."""
+    if isinstance(of, np.ndarray):
+        return of[index]
+    if isinstance(of, tuple):
+        parts = (part(each, index) for each in of)
+        return type(of)(*parts) if hasattr(of, "_fields") else tuple(parts)
+    if dataclasses.is_dataclass(of) and not isinstance(of, type):
+        changed = {}
+        for field in dataclasses.fields(of):
+            value = getattr(of, field.name)
+            picked = part(value, index)
+            if picked is not value:
+                changed[field.name] = picked
+        return dataclasses.replace(of, **changed) if changed else of
+    return of
+
+
+def amended(condition: Any, regular: Any, exceptional: Callable[..., Any], *arguments: Any) -> Any:
+    """`regular` but, where `condition` holds, `exceptional` of the `arguments` instead.
+
+    Both are named tuples of numbers; what is exceptional is computed for those only that need it.
+    """
+    if not isinstance(condition, np.ndarray):
+        return exceptional(*arguments) if condition else regular
+    which = np.flatnonzero(condition)
+    if not len(which):
+        return regular
+    instead = exceptional(*(part(argument, which) for argument in arguments))
+    whole = []
+    for one, other in zip(regular, instead, strict=True):
+        one = np.array(np.broadcast_to(one, condition.shape))
+        one[which] = other
+        whole.append(one)
+    return type(regular)(*whole)
+
+
+def chosen(condition: Any, this: Any, that: Any) -> Any:
+    """Tuple or dataclass with the numbers of `this` where `condition` holds, else of `that`."""
+    if not isinstance(condition, np.ndarray):
+        return this if condition else that
+    if isinstance(this, tuple):
+        return type(this)(*(np.where(condition, *pair) for pair in zip(this, that, strict=True)))
+    names = [field.name for field in dataclasses.fields(this)]
+    pairs = {name: (getattr(this, name), getattr(that, name)) for name in names}
+    differ = {name: pair for name, pair in pairs.items() if not np.array_equal(*pair)}
+    changed = {name: np.where(condition, *pair) for name, pair in differ.items()}
+    return dataclasses.replace(that, **changed)
