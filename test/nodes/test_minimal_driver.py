@@ -74,14 +74,14 @@ class Board:
 
     def tell(self, *numbers, time=5000, again=False):
         """Odometry of a frame, sent `again` until the driver has found this test."""
-        seen = len(self.odometry)
+        before = {stamp(message) for message in self.odometry}
         self.send(*numbers, time=time)
 
         def are_heard():
             if again and not (self.odometry and self.joints):
                 self.send(*numbers, time=0)
-            told = [stamp(message) for message in self.joints]
-            return len(self.odometry) > seen and stamp(self.odometry[-1]) in told
+            told = {stamp(message) for message in self.joints} - before
+            return self.odometry and stamp(self.odometry[-1]) in told
 
         self.world.wait(are_heard, "odometry and joint states")
         return self.odometry[-1]

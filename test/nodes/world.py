@@ -3,6 +3,7 @@
 import itertools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -17,15 +18,26 @@ from rclpy.node import Node
 TIMEOUT = 60.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
 EXAMPLES = Path(__file__).parents[2] / "examples"
-# above 101, ports may be taken by others; two test runs at a time should not meet
+# above 101, ports may be taken by others
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 DOMAINS = itertools.count(os.getppid() * WORKERS + WORKER, WORKERS)
 
 
 def new_domain():
-    """Return a ROS domain that no other test of this run has."""
-    return next(DOMAINS) % (100 - 100 % WORKERS) + 1
+    """Return a ROS domain that no other test of this run has, nor anybody else now."""
+    domains = (number % (100 - 100 % WORKERS) + 1 for number in DOMAINS)
+    return next(domain for domain in domains if is_free(domain))
+
+
+def is_free(domain):
+    """Whether nobody has the port of a domain's first participant."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", 7410 + 250 * domain))
+        except OSError:
+            return False
+    return True
 
 
 def executable(name):
