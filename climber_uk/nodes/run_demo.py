@@ -131,7 +131,7 @@ def has_answered(torques: list[JointState]) -> bool:
 
 @contextmanager
 def running(commands: dict[str, list[str]], logs: Path) -> Iterator[Processes]:
-    """Processes of some commands, all ended whatever happens, the first one last."""
+    """Processes of some commands, all ended whatever happens, the first one, a recorder, first."""
     processes: Processes = {}
     try:
         for name, command in commands.items():
@@ -143,7 +143,8 @@ def running(commands: dict[str, list[str]], logs: Path) -> Iterator[Processes]:
         yield processes
     finally:
         recorder, *nodes = processes.values()
-        for group in (nodes, [recorder]):  # it records what the others say to the end
+        # what a node sent last would be lost where its end is heard of first
+        for group in ([recorder], nodes):
             for process in group:
                 process.send_signal(signal.SIGTERM)
             for process in group:
