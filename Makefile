@@ -11,7 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 
-.PHONY: demo paper docs test lint unit soak colcon clean
+.PHONY: demo paper docs bench test lint unit soak colcon clean
 
 demo: $(SET_UP)
 	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
@@ -24,6 +24,15 @@ paper: $(SET_UP)
 # The references of parameters, topics, services and metrics
 docs: $(SET_UP)
 	$(BIN)/python docs/generate.py
+
+# Beside MuJoCo and Pinocchio, which are installed for it
+bench: $(VENV)/bench
+	@$(BIN)/python bench/all.py
+
+$(VENV)/bench: $(SET_UP) bench/requirements.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint requirements.txt \
+		--requirement bench/requirements.txt
+	touch $@
 
 test: lint unit colcon
 

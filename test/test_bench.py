@@ -28,3 +28,21 @@ SCRIPTS = sorted(path.name for path in BENCH.glob("*.py") if "argparse" in path.
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_every_script_starts(script):
     assert "usage" in run(script, "--help")
+
+
+def test_ways_are_measured_in_turns_and_compared_within_a_round(monkeypatch, capsys):
+    monkeypatch.syspath_prepend(BENCH)
+    from side_by_side import in_turns, table
+
+    begun = []
+
+    def giving(name, *times):
+        rest = iter(times)
+        return lambda: begun.append(name) or next(rest)
+
+    times = in_turns({"ours": giving("a", 9, 1, 2, 4), "theirs": giving("b", 9, 3, 8, 8)}, 3)
+    assert "".join(begun) == "abababab"
+    assert [of_each.tolist() for of_each in times.values()] == [[1, 2, 4], [3, 8, 8]]
+    table("title", times, "ms", lambda time: time * 1000)
+    row = capsys.readouterr().out.splitlines()[-1].split()
+    assert row == ["theirs", "8000", "5500", "…", "8000", "3", "2.5", "…", "3.5"]
