@@ -13,6 +13,7 @@ COMPARISONS = {
     "rollouts": "peers.rollouts",
     "batches": "peers.batches",
     "accuracy": "peers.accuracy",
+    "nodes": "nodes",
 }
 
 

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from climber_uk.analysis.recorded_run import read_run
 BIN = Path(sys.executable).parent
 CONFIG = Path(__file__).parents[1] / "config" / "climber.yaml"
 NODES = "trajectory_publisher", "uk_torque_controller", "plant_simulator"
+RATES = [100, 200, 500, 1000]  # [Hz]
 SETTLING = 5.0  # [s] after the start of the processes that does not count
 START = """
 import sys, time
@@ -82,8 +84,8 @@ def loop(rate: int, duration: float) -> str:
         if demo.wait() != 0:
             sys.exit(f"run_demo ended with status {demo.returncode}")
         run = read_run(directory / "run" / "bag")
-    latency = run.latency[run.torque_time > 1.0]
-    missed = int(np.sum(latency > 1 / rate)) + len(run.time) - len(run.torque_time)
+    latency = run.latency[run.seconds(run.commands) > 1.0]
+    missed = int(np.sum(latency > 1 / rate)) + len(run.time) - len(run.torques)
     percent = [100 * (after[name] - before[name]) / passed for name in NODES]
     quantiles = 1e3 * np.quantile(latency, [0.5, 0.9, 0.99, 0.999, 1.0])
     figures = [*(f"{p:6.1f}" for p in percent), *(f"{q:6.2f}" for q in quantiles)]
@@ -107,21 +109,32 @@ def start() -> None:
         print(f"{module:24s}{figures}{100 * parts[1] / parts.sum():10.1f} %")
 
 
+def loops(rates: Sequence[int], duration: float) -> None:
+    """Print a row for each rate."""
+    print(
+        "   Hz  CPU [%]: planner, controller, plant; latency [ms]: 50, 90, 99, 99.9 %, most; missed"
+    )
+    for rate in rates:
+        print(loop(rate, duration), flush=True)
+
+
+def compare(rounds: int) -> None:
+    """Print both tables; a run of `rounds` seconds at each rate."""
+    start()
+    loops(RATES, max(rounds, 2 * SETTLING))
+
+
 def main() -> None:
-    """Print the table, a row for each rate."""
+    """Print the table that is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--rates", nargs="+", type=int, default=[100, 200, 500, 1000], help="[Hz]")
+    parser.add_argument("--rates", nargs="+", type=int, default=RATES, help="[Hz]")
     parser.add_argument("--duration", type=float, default=20.0, help="[s] of each run")
     parser.add_argument("--start", action="store_true", help="how long the nodes take to start")
     options = parser.parse_args()
     if options.start:
         start()
-        return
-    print(
-        "   Hz  CPU [%]: planner, controller, plant; latency [ms]: 50, 90, 99, 99.9 %, most; missed"
-    )
-    for rate in options.rates:
-        print(loop(rate, options.duration), flush=True)
+    else:
+        loops(options.rates, options.duration)
 
 
 if __name__ == "__main__":
