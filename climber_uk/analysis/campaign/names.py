@@ -4,7 +4,6 @@ A name is that of a node and of its parameter, as in `plant_simulator.mass`.
 """
 
 import dataclasses
-from collections.abc import Iterable
 from typing import Any
 
 from climber_uk.control.constraints import CONSTRAINTS
@@ -22,10 +21,10 @@ PLANNER, CONTROLLER, PLANT = NODES = (
     "uk_torque_controller",
     "plant_simulator",
 )
-SEED, MEASURED = f"{PLANT}.seed", f"{CONTROLLER}.suction_pressure"
+SEED, PRESSURE = f"{PLANT}.seed", f"{PLANT}.suction_pressure"
+MEASURED = f"{CONTROLLER}.suction_pressure"
 CONSTRAINT_SET = f"{CONTROLLER}.constraints"
 LOSS_TIME = f"{PLANT}.pressure_loss_time"
-Kinds = Iterable[tuple[type, str]]  # classes of parameters with the prefix of their names
 
 
 def _names(node: str, *kinds: tuple[type, str]) -> dict[str, "dataclasses.Field[Any]"]:
@@ -110,6 +109,6 @@ def _check_known(name: str) -> None:
     if name == SEED:
         raise ValueError(f"{name}: each run has one of its own, which `seed` begins")
     if name == MEASURED:
-        raise ValueError(f"{name} is measured: set {PLANT}.suction_pressure")
+        raise ValueError(f"{name} is measured: set {PRESSURE}")
     if name not in PARAMETERS:
         raise ValueError(f"{name} is not a parameter that a campaign knows")

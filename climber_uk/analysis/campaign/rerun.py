@@ -7,7 +7,7 @@ from typing import Any
 
 from climber_uk.analysis.campaign.campaign import Campaign
 from climber_uk.analysis.campaign.limits import METRICS
-from climber_uk.analysis.campaign.names import MEASURED, PLANT
+from climber_uk.analysis.campaign.names import MEASURED, PARAMETERS, PRESSURE
 from climber_uk.analysis.campaign.parts import computed
 from climber_uk.analysis.changed_parameters import write_changed
 
@@ -19,7 +19,8 @@ def rerun(campaign: Campaign, run: int, output: Path) -> int:
     write_changed(campaign.base, parameters(campaign, run), config)
     row = computed(campaign, run, 1).to_pylist()[0]
     print(f"run {run} in the campaign: {row['verdict']}")
-    print("\n".join(f"{name:<28} {row[name]:>12.6g} {unit}" for name, (unit, _) in METRICS.items()))
+    for name, (unit, _) in METRICS.items():
+        print(f"{name:<28} {row[name]:>12.6g} {unit}", flush=True)
     duration = str(campaign.size.duration)
     for command in (
         ["run_demo", "--config", str(config), "--output", str(demo), "--duration", duration],
@@ -35,7 +36,7 @@ def parameters(campaign: Campaign, run: int) -> dict[str, dict[str, Any]]:
     """All parameters of a run, by node and name."""
     own = {name: column.tolist()[0] for name, column in campaign.columns(run, 1).items()}
     values = {**campaign.scenario.values, **own}
-    values[MEASURED] = values.get(f"{PLANT}.suction_pressure")
+    values[MEASURED] = values.get(PRESSURE, PARAMETERS[PRESSURE].default)
     by_node: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         node, _, parameter = name.partition(".")
