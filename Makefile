@@ -7,11 +7,13 @@ CONFIG ?= config/$(if $(CLIMBERS),four_climbers,paper).yaml
 CLOCK ?= sim
 OUTPUT ?= demo_output/$(basename $(notdir $(CONFIG)))-$(CLOCK)-$(shell date +%Y%m%d-%H%M%S)
 PAPER_OUTPUT ?= demo_output/paper
+CAMPAIGN ?= config/campaign.yaml
+CAMPAIGN_OUTPUT ?= demo_output/$(basename $(notdir $(CAMPAIGN)))
 VENV := .venv
 BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 
-.PHONY: demo paper docs bench test lint unit soak colcon clean
+.PHONY: demo paper campaign docs bench test lint unit soak colcon clean
 
 demo: $(SET_UP)
 	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
@@ -20,6 +22,10 @@ demo: $(SET_UP)
 
 paper: $(SET_UP)
 	@$(BIN)/reproduce_paper --output $(PAPER_OUTPUT)
+
+# What was finished is kept: the same again goes on
+campaign: $(SET_UP)
+	@$(BIN)/campaign $(CAMPAIGN) --output $(CAMPAIGN_OUTPUT)
 
 # The references of parameters, topics, services and metrics
 docs: $(SET_UP)

@@ -24,6 +24,9 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
         "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard"],
+        # campaigns of many runs, and to have them run on a Dask cluster
+        "campaign": ["pyarrow", "matplotlib", "tqdm"],
+        "cluster": ["distributed"],
         # thousands of closed loops at once, their plants compiled
         "fast": ["numba"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo"],
@@ -50,6 +53,7 @@ setup(
                 "replay_controller": "analysis.replay_controller",
                 "export_tum": "analysis.export_tum",
                 "reproduce_paper": "analysis.reproduce_paper",
+                "campaign": "analysis.campaign.command",
             }.items()
         ]
     },

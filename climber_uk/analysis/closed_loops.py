@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from climber_uk.analysis import pressure_gauge
 from climber_uk.analysis.closed_loop import sampled
 from climber_uk.analysis.tally import Outcome, Tally
 from climber_uk.control.controller import Controller
@@ -68,6 +69,7 @@ class Loops:
     changes: tuple[Change, ...] = ()
     timing: Timing = field(default_factory=Timing)
     contact: Contact = field(default_factory=Contact)  # for the margins
+    gauge: float = 0.0  # [s] between two times that the controllers hear of the pressure; 0: never
 
     def __post_init__(self) -> None:
         if self.seeds is None and not self.sensors.are_exact:
@@ -104,9 +106,16 @@ class Loops:
         advance = _advancing(course.compiled)
         on_their_way: deque[Torques] = deque()
         ticks = round(course.duration / course.period)
-        given = self._noise(ticks), self._climbers(course, ticks), _targets(course, ticks)
-        for tick, (noise, climber, target) in enumerate(zip(*given, strict=True)):
+        controllers = pressure_gauge.controllers(
+            self.controller, self._climbers(course, ticks), course.period, self.gauge
+        )
+        given = (
+            *(self._noise(ticks), self._climbers(course, ticks)),
+            *(controllers, _targets(course, ticks)),
+        )
+        for tick, (noise, climber, controller, target) in enumerate(zip(*given, strict=True)):
             told = motion if noise is None else self.sensors.told(motion, noise)
+            tracker.controller = controller
             tracker.see(SECOND + round(tick * course.period * SECOND), told)
             command = tracker.answer(preview, 0.0)
             assert command is not None  # the preview goes beyond the duration

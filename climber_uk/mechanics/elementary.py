@@ -70,13 +70,18 @@ def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any,
 
     Of many small angles the series takes half as long as numpy's cosine and sine; what it leaves
     out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
+    Each gets the same whatever the others are.
     """
     end = heading + angle
     if isinstance(end, float):
         return end, math.cos(end), math.sin(end)
     square = angle * angle
-    if not np.max(square, initial=0.0) < SMALL * SMALL:
+    small = np.less(square, SMALL * SMALL)
+    if not small.any():
         return end, np.cos(end), np.sin(end)
     c = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720)))
     s = angle * (1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040))))
-    return end, c * cosine - s * sine, s * cosine + c * sine
+    c, s = c * cosine - s * sine, s * cosine + c * sine
+    if small.all():
+        return end, c, s
+    return end, np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))

@@ -108,13 +108,17 @@ def limited(
     to_twist = to_mean / climber.half_track
     mean, twist = to_mean * drive, to_twist * turn  # τR,L = mean ± twist
     one, other = mean + twist, mean - twist
-    if everywhere(
-        (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
-    ):
+    fits = (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
+    if everywhere(fits):
         return drive, turn, one, other
     twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
     lowest, highest = right_low - twist, right_high - twist
     lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
     highest = highest - clipped(highest - (left_high + twist), 0.0, float("inf"))
     mean = clipped(mean, lowest, highest)
-    return mean / to_mean, twist / to_twist, mean + twist, mean - twist
+    return (
+        select(fits, drive, mean / to_mean),
+        select(fits, turn, twist / to_twist),
+        select(fits, one, mean + twist),
+        select(fits, other, mean - twist),
+    )

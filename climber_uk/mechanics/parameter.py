@@ -61,7 +61,8 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
             raise ValueError(f"{said} a {type(field.default).__name__}")
         return
     # bounds are intervals: all are within if the extremes are, and these are nan if any is
-    for number in (value.min(), value.max()) if isinstance(value, np.ndarray) else (value,):
+    is_many = isinstance(value, np.ndarray)
+    for number in (value.min().item(), value.max().item()) if is_many else (value,):
         _check_number(rule, f"{field.name}={number!r} must be", number, unit)
 
 

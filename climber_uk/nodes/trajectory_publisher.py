@@ -9,10 +9,9 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.plan import KINDS, Plan, planned
 from climber_uk.mechanics.preview import SECOND
-from climber_uk.mechanics.shapes import SHAPES
-from climber_uk.mechanics.time_laws import TIME_LAWS, Stopping
-from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
 
@@ -22,13 +21,8 @@ ODOMETRY_AGE = 1.0  # [s] of an odometry that is too old to start at
 
 @dataclass(frozen=True)
 class Options:
-    """What to follow, and how it is told."""
+    """How it is told."""
 
-    shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
-    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=tuple(TIME_LAWS))
-    reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
-    origin_x: float = parameter(0.0, "m", "x of the shape's origin")
-    origin_y: float = parameter(0.0, "m", "y of the shape's origin")
     autostart: bool = parameter(True, "", "start at the first odometry, not at ~/start")
     start_delay: float = parameter(0.0, "s", "from that odometry to the start", at_least=0)
     preview: float = parameter(1.0, "s", "how far ahead is published", above=0)
@@ -49,18 +43,11 @@ class TrajectoryPublisher(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__("trajectory_publisher")
-        self.parameters.declare(Options)
-        for name, kind in {**SHAPES, **TIME_LAWS}.items():
-            self.parameters.declare(kind, f"{name}.")
+        for kind, prefix in [*KINDS, (Options, "")]:
+            self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
-        shape, law = self.options.shape, self.options.time_law
-        self.planned = Trajectory(
-            shape=self.parameters.read(SHAPES[shape], f"{shape}."),
-            law=self.parameters.read(TIME_LAWS[law], f"{law}."),
-            reverse_gear=self.options.reverse_gear,
-            origin=(self.options.origin_x, self.options.origin_y),
-        )
+        self.planned = planned(self.parameters.read)
         self.trajectory = self.planned
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
         self.last_look = self.stood_at = 0  # [ns] what the clock said
@@ -119,7 +106,8 @@ class TrajectoryPublisher(ClimberNode):
         self.points.clear()
         self.start = stamp + round(self.options.start_delay * SECOND)
         self.publish_around(self.start)
-        self.get_logger().info(f"{self.options.shape} starts at {self.start / SECOND:.3f} s")
+        shape = self.parameters.read(Plan).shape
+        self.get_logger().info(f"{shape} starts at {self.start / SECOND:.3f} s")
         path = writing.path(self.planned.path(points=400), self.start, self.names.odom_frame)
         self.path.publish(path)
 

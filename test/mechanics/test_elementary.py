@@ -48,3 +48,14 @@ def test_after_many_small_turns_cosine_and_sine_still_have_length_one():
         heading, cosine, sine = elementary.rotated(heading, cosine, sine, angle)
     np.testing.assert_allclose(cosine**2 + sine**2, 1, atol=1e-12)
     np.testing.assert_allclose(cosine, np.cos(heading), atol=1e-10)
+
+
+def test_an_angle_is_turned_by_the_same_bits_in_any_company():
+    random = np.random.default_rng(3)
+    heading, angle = random.uniform(-4, 4, 50), random.uniform(-0.06, 0.06, 50)
+    given = heading, np.cos(heading), np.sin(heading), angle
+    together = elementary.rotated(*given)
+    for few in (slice(0, 1), slice(7, 8), slice(10, 35), np.abs(angle) < elementary.SMALL):
+        alone = elementary.rotated(*(numbers[few] for numbers in given))
+        for part, whole in zip(alone, together, strict=True):
+            np.testing.assert_array_equal(part, whole[few])

@@ -1,0 +1,91 @@
+"""Run what is missing of a campaign: in processes of this machine, or on a Dask cluster."""
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from itertools import islice
+
+import pyarrow as pa
+from tqdm import tqdm
+
+from climber_uk.analysis.campaign.campaign import Campaign
+from climber_uk.analysis.campaign.parts import Part, Store, computed
+
+Workers = tuple[Executor, int]  # and how many parts they may have in hand at a time
+
+
+def run_missing(campaign: Campaign, store: Store, workers: Workers) -> None:
+    """Keep each part as it is finished, and tell the time that is left."""
+    missing, total = store.missing, campaign.size.runs
+    done = total - sum(part.runs for part in missing)
+    with tqdm(total=total, initial=done, unit=" runs", file=sys.stderr) as progress:
+        for part, table in _finished(campaign, missing, workers):
+            store.keep(part, table)
+            progress.update(part.runs)
+
+
+def _finished(
+    campaign: Campaign, missing: list[Part], workers: Workers
+) -> Iterator[tuple[Part, pa.Table]]:
+    """Parts in the order in which they are finished; no more are in hand than workers can take."""
+    executor, at_once = workers
+    waiting, in_hand = iter(missing), dict[Future[pa.Table], Part]()
+    while True:
+        for part in islice(waiting, at_once - len(in_hand)):
+            in_hand[executor.submit(computed, campaign, part.first, part.runs)] = part
+        if not in_hand:
+            return
+        for future in wait(in_hand, return_when=FIRST_COMPLETED).done:
+            yield in_hand.pop(future), future.result()
+
+
+@contextmanager
+def processes(jobs: int) -> Iterator[Workers]:
+    """Processes of this machine, which end when this one does, however it ends."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, _start_worker) as executor:
+        try:
+            yield executor, 2 * jobs
+        except BaseException:
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
+
+
+def _start_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Workers]:
+    """Workers of the Dask scheduler at `address`, which computes again what a lost one had."""
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError:
+        raise ValueError("--scheduler needs Dask: pip install distributed") from None
+    # pure tasks would be recognised by a hash of the campaign, which nobody needs
+    with Client(address) as client, client.get_executor(pure=False) as executor:
+        try:
+            yield executor, 2 * sum(client.nthreads().values())
+        except KilledWorker as error:
+            raise BrokenExecutor(str(error)) from None
