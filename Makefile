@@ -48,7 +48,8 @@ lint: $(SET_UP)
 	$(BIN)/mypy
 
 unit: $(SET_UP)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (nodes or soak)"
+	$(BIN)/python -m pytest -m "nodes and not soak"
 
 # Longer tests than CI has time for
 soak: $(SET_UP)

@@ -71,6 +71,7 @@ def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(w
             assert points.setdefault(time, point) == point
 
 
+@pytest.mark.soak  # not each time: see the planner's timers under a clock that goes back
 def test_where_the_clock_goes_back_the_trajectory_starts_again(world):
     references = start(world, "use_sim_time:=true")
     clock, odometry = world.speak(Clock, "/clock"), world.speak(Odometry, "odom")
