@@ -152,7 +152,11 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
     reference, odometry, truth = (
         read(tmp_path / f"{name}.tum") for name in ("reference", "odom", "ground_truth")
     )
-    assert odometry == truth  # these sensors have no errors
+    # these sensors have no errors; the recorder may have ended between the two
+    number = min(odometry.num_poses, truth.num_poses)
+    assert number >= 4000
+    for one in ("timestamps", "positions_xyz", "orientations_quat_wxyz"):
+        np.testing.assert_array_equal(getattr(odometry, one)[:number], getattr(truth, one)[:number])
     run = read_run(paper_bags[0])
     assert odometry.num_poses == len(run.time)
     both = run.reference, run.pose

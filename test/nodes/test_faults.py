@@ -195,13 +195,17 @@ def test_in_lock_step_a_plant_whose_time_starts_again_is_brought_to_the_path(wor
     climb = Climb(world, LOCK_STEP)
     climb.is_under_way()
     climb.kill(PLANT)
+    heard = climb.odometry, climb.torques, climb.joints, climb.errors
+
+    def is_silent():
+        before = [len(messages) for messages in heard]
+        world.executor.spin_once(timeout_sec=0.2)
+        return before == [len(messages) for messages in heard]
+
+    world.wait(is_silent, "silence of a plant that is dead")
     climb.odometry.clear()
     climb.start(PLANT)
-
-    def has_begun_anew():
-        return any(reading.nanoseconds(m.header.stamp) == SECOND for m in climb.odometry)
-
-    world.wait(has_begun_anew, "a start with a new time")
+    world.wait(lambda: climb.odometry, "odometry in a new time")
     climb.is_on_path()
 
 
