@@ -60,7 +60,7 @@ class BagRecorder(Node):
         self.stop_time = 0  # [ns] system clock; 0: not asked to stop
 
     def run(self) -> None:
-        """Record until asked to stop, and then what had arrived by then."""
+        """Record until asked to stop, and then what had been sent or had arrived by then."""
         next_discovery = next_flush = 0.0
         is_behind = True  # whether messages from before the stop still come in
         while not self.stop_time or is_behind:
@@ -145,9 +145,12 @@ class BagRecorder(Node):
                 while taken := take():
                     data, info = taken
                     log_time = info["received_timestamp"] or time.time_ns()
-                    self.introduce(name, self.types[name])
-                    self.bag.write(name, log_time, info["source_timestamp"] or log_time, data)
+                    published = info["source_timestamp"] or log_time
                     oldest = min(oldest, log_time)
+                    # else a bag would end with answers to what is no longer in it
+                    if not self.stop_time or min(log_time, published) <= self.stop_time:
+                        self.introduce(name, self.types[name])
+                        self.bag.write(name, log_time, published, data)
         return oldest
 
     def stop(self, *_: object) -> None:

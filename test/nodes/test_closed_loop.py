@@ -230,11 +230,14 @@ def test_four_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
 
 
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
-    # the machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`
+    # The machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`. And once, a
+    # second after the start, Fast DDS may stop a process for a third of a second, to find out
+    # whether another still listens to its shared memory: the climber is to be back after that.
     finished(demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6"))
     run = read_run(tmp_path / "run" / "bag")
     assert 5 < run.time[-1] < 10
-    assert run.distance.max() < 0.05
+    assert run.distance[run.time > 4.0].max() < 0.05
+    assert np.abs(run.error[:, 1]).max() < 0.05
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
