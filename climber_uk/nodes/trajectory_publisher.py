@@ -104,7 +104,7 @@ class TrajectoryPublisher(ClimberNode):
         self.odometry = None
         self.trajectory, self.next_point = self.planned, 0
         self.points.clear()
-        self.start = stamp + round(self.options.start_delay * SECOND)
+        self.start, self.last_look = stamp + round(self.options.start_delay * SECOND), now
         self.publish_around(self.start)
         shape = self.parameters.read(Plan).shape
         self.get_logger().info(f"{shape} starts at {self.start / SECOND:.3f} s")

@@ -71,23 +71,27 @@ def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(w
             assert points.setdefault(time, point) == point
 
 
-@pytest.mark.soak  # not each time: see the planner's timers under a clock that goes back
-def test_where_the_clock_goes_back_the_trajectory_starts_again(world):
+@pytest.mark.parametrize("seconds", [0, 5])
+def test_where_the_clock_goes_back_the_trajectory_starts_again_and_goes_on(world, seconds):
     references = start(world, "use_sim_time:=true")
     clock, odometry = world.speak(Clock, "/clock"), world.speak(Odometry, "odom")
     at_rest = State(np.zeros(3), np.zeros(3))
 
-    def starts_with_a_time_from(begin):
+    def goes_on_from(begin, seconds):
+        """In a time that goes on in steps of 20 ms, some seconds are published."""
+        references.clear()
         stamps = itertools.count(begin * SECOND, SECOND // 50)
 
-        def is_started():
+        def is_ahead():
             stamp = next(stamps)
             clock.publish(Clock(clock=writing.time(stamp)))
             odometry.publish(writing.odometry(at_rest, stamp, "odom", "base_link"))
-            starts = [reading.nanoseconds(message.header.stamp) for message in references]
-            return any(begin * SECOND <= start <= stamp for start in starts)
+            told = [m for m in references if reading.nanoseconds(m.header.stamp) >= begin * SECOND]
+            told = [m for m in told if reading.nanoseconds(m.header.stamp) <= stamp]
+            return told and told[-1].points[-1].time_from_start.sec >= seconds
 
-        world.wait(is_started, f"start after {begin} s")
+        world.wait(is_ahead, f"a trajectory that goes on after {begin} s")
+        return next(stamps) / SECOND - begin
 
-    starts_with_a_time_from(200)
-    starts_with_a_time_from(1)
+    goes_on_from(200, seconds)
+    assert goes_on_from(1, 5) < 20
