@@ -1,18 +1,20 @@
 """`python bench/batch.py`: climber-steps a second of many climbers at once.
 
 Open loop: plain climbers under constant torques. Closed loop: each with its controller at 200 Hz,
-observer on, its mass and friction its own, on the paper's ellipse. All in turns in one process; the
-least time of many counts. One step is one step of the plant.
+observer on, its mass and friction its own, on the paper's ellipse. All in turns in one
+process, by the processor's time, without start-up. One step is one step of the plant.
 """
 
 import argparse
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from limit import Limit, climber_numbers, controller_numbers
+from side_by_side import in_turns, rate, table, timed
 
 from climber_uk.analysis import closed_loops
 from climber_uk.analysis.closed_loop import sampled
@@ -42,36 +44,17 @@ def spread(number: int) -> Motion:
     return Motion(x, 6 + y, heading, np.cos(heading), np.sin(heading), 10 + v, omega - 0.6)
 
 
-@dataclass
-class Way:
-    """A way to compute steps; `run` returns its own time [s] for `steps` climber-steps."""
+class Way(NamedTuple):
+    """A way to compute steps."""
 
-    run: Callable[[], float]
-    steps: int
-    best: float = np.inf
-
-    @property
-    def rate(self) -> float:
-        """Climber-steps a second, in millions."""
-        return self.steps / self.best / 1e6
+    run: Callable[[], float]  # its own time [s]
+    steps: int  # climber-steps that it takes
 
 
-def measured(ways: dict[str, Way], rounds: int) -> None:
-    """Run all in turns."""
-    for _ in range(rounds):
-        for way in ways.values():
-            way.best = min(way.best, way.run())
-
-
-def timed(function: Callable[[], object]) -> Callable[[], float]:
-    """The function, with the time it takes."""
-
-    def run() -> float:
-        start = time.perf_counter()
-        function()
-        return time.perf_counter() - start
-
-    return run
+def compared(title: str, ways: dict[str, Way], rounds: int) -> None:
+    """Run all in turns, and print their rates."""
+    times = in_turns({name: way.run for name, way in ways.items()}, rounds)
+    table(title, {name: times[name] / way.steps for name, way in ways.items()}, "M/s", rate)
 
 
 def open_loop(limit: Limit | None, with_numba: bool) -> dict[str, Way]:
@@ -90,7 +73,7 @@ def open_loop(limit: Limit | None, with_numba: bool) -> dict[str, Way]:
 
         def in_c() -> Array:
             rows = motions.copy()
-            limit.library.open_loops(OPEN, STEPS, STEP, *given, limit.pointer("double", rows))
+            limit.functions.open_loops(OPEN, STEPS, STEP, *given, limit.pointer("double", rows))
             return rows
 
         if np.abs(in_c() - advanced_often(body, motion, wrench, STEP, STEPS)).max() > 1e-9:
@@ -117,11 +100,11 @@ def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, 
 
     def ours(compiled: bool) -> Callable[[], float]:
         def by_tick() -> float:
-            """Ticks as long as the shortest of them."""
+            """Ticks without the first, which is one of start-up."""
             course = Course(ELLIPSE, TICKS * 0.005, steps=steps, compiled=compiled)
             ends: list[float] = []
-            loops.run_block(course, preview, lambda: ends.append(time.perf_counter()))
-            return float(np.diff(ends).min()) * TICKS
+            loops.run_block(course, preview, lambda: ends.append(time.process_time()))
+            return (ends[-1] - ends[0]) / (len(ends) - 1) * TICKS
 
         return by_tick
 
@@ -154,7 +137,7 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
     def in_c() -> Array:
         motions, memory = start.copy(), memories.copy()
         mutable = limit.pointer("Motion", motions), limit.pointer("Memory", memory)
-        limit.library.closed_loops(IN_C, TICKS, steps, 0.005, *given, *mutable)
+        limit.functions.closed_loops(IN_C, TICKS, steps, 0.005, *given, *mutable)
         return motions
 
     end = ELLIPSE.at(TICKS * 0.005).target
@@ -165,10 +148,9 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
     return timed(in_c)
 
 
-def half(number: int) -> float:
-    """Time of some loops [s], in a process of their own."""
-    loops = many_loops(number)
-    return timed(lambda: loops.run(Course(ELLIPSE, 0.5)))()
+def half(number: int) -> None:
+    """Some loops, in a process of their own."""
+    many_loops(number).run(Course(ELLIPSE, 0.5))
 
 
 def two_processes() -> float:
@@ -177,17 +159,10 @@ def two_processes() -> float:
         list(pool.map(half, [CLOSED // 8] * 2))  # they have started
         ratios = []
         for _ in range(3):
-            one = timed(lambda: pool.submit(half, 2 * CLOSED).result())()
-            ratios.append(one / timed(lambda: list(pool.map(half, [CLOSED] * 2)))())
+            one = timed(lambda: pool.submit(half, 2 * CLOSED).result(), time.perf_counter)()
+            two = timed(lambda: list(pool.map(half, [CLOSED] * 2)), time.perf_counter)()
+            ratios.append(one / two)
     return float(np.median(ratios))
-
-
-def table(title: str, ways: dict[str, Way]) -> None:
-    """Print rates."""
-    first = next(iter(ways.values()))
-    print(f"{title:<44}{'million/s':>12}{'ratio':>8}")
-    for name, way in ways.items():
-        print(f"{name:<44}{way.rate:>12.1f}{way.rate / first.rate:>8.2f}")
 
 
 def main() -> None:
@@ -199,13 +174,11 @@ def main() -> None:
     options = parser.parse_args()
     limit = None if options.no_c else Limit()
     ways = open_loop(limit, not options.no_numba)
-    measured(ways, options.rounds)
-    table(f"open loop, {OPEN} climbers, {1e3 * STEP:g} ms", ways)
+    compared(f"open loop, {OPEN} climbers, {1e3 * STEP:g} ms", ways, options.rounds)
     for name, steps in RATES.items():
         ways = closed_loop(limit, not options.no_numba, steps)
-        measured(ways, options.rounds)
-        table(f"closed loop, {CLOSED} climbers, {name} / 5 ms", ways)
-    print(f"two processes, closed loop: {two_processes():.2f} times one")
+        compared(f"closed loop, {CLOSED} climbers, {name} / 5 ms", ways, options.rounds)
+    print(f"\ntwo processes, closed loop, by the wall clock: {two_processes():.2f} times one")
 
 
 if __name__ == "__main__":

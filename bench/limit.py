@@ -31,7 +31,7 @@ class Limit:
         with tempfile.TemporaryDirectory() as directory:
             library = f"{directory}/climber.so"
             subprocess.run(["gcc", *FLAGS, "-o", library, SOURCE, "-lm"], check=True)
-            self.library: Any = self.ffi.dlopen(library)
+            self.functions: Any = self.ffi.dlopen(library)
 
     def pointer(self, kind: str, numbers: Array) -> Any:
         """Contiguous numbers as structs of a kind."""

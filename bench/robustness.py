@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
 from climber_uk.analysis.closed_loop import Controlling, Link, Run, as_commanded, simulate
+from climber_uk.analysis.identification_experiments import SCENARIOS
 from climber_uk.control.constraints import ConstraintSet, Exact, Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
@@ -21,24 +22,17 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.shapes import Ellipse, Lemniscate
-from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
+from climber_uk.mechanics.shapes import Ellipse
+from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
-PAPER = Climber()
-BUILT = Climber(
-    seal_friction_coefficient=0.6,
-    wheel_load_share=0.8,
-    suction_pressure=8000.0,
-    max_wheel_torque=4.0,
-)
-ELLIPSE = Trajectory(Ellipse(), ConstantRate())
-IN_MOTION = State(np.array([0.0, 6.0, 0.0]), np.array([10.0, 0.0, -0.6]))
+PAPER_RUN, BUILT_RUN = SCENARIOS["paper.yaml"], SCENARIOS["climber.yaml"]
+PAPER, BUILT = PAPER_RUN.believed, BUILT_RUN.believed
+ELLIPSE, EIGHT = PAPER_RUN.trajectory, BUILT_RUN.trajectory
+IN_MOTION, AT_REST = PAPER_RUN.start, BUILT_RUN.start
 RAMPED = Trajectory(Ellipse(), RestToRest(rate=1.0, ramp_time=3.0, laps=9))
-EIGHT = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))
-AT_REST = State(np.array([0.0, 3.0, np.pi / 4]), np.zeros(3))
-GUIDANCE, OBSERVER, IDEAL = Guidance(), Observer(), Link()
-SLOW_GUIDANCE = Guidance(cross_track_gain=3.0, fade_speed=0.1)
+GUIDANCE, OBSERVER, IDEAL = PAPER_RUN.guidance, Observer(), Link()
+SLOW_GUIDANCE = BUILT_RUN.guidance
 NOISE = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
 
 

@@ -49,6 +49,11 @@ def table(
         print(f"{name:<54}{_spread(number(of_each), 10, 20)}{_spread(of_each / first, 9, 18)}")
 
 
+def rate(time: Array) -> Array:
+    """Climber-steps a second, in millions, of the time for one."""
+    return 1e-6 / time
+
+
 def _spread(values: Array, median_width: int, quartiles_width: int) -> str:
     low, median, high = np.quantile(values, [0.25, 0.5, 0.75])
     quartiles = f"{low:.4g} … {high:.4g}"

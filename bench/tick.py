@@ -93,9 +93,9 @@ def ticks_in_c(limit: Limit, tracker: Tracker) -> tuple[Callable[[], None], Arra
     arrays = (("Controller", controllers), ("Memory", memory), ("Motion", numbers))
     controller, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
     targets, told = limit.pointer("Target", aims), limit.pointer("double", torques)
-    tick = limit.library.tick
 
     def some() -> None:
+        tick = limit.functions.tick  # which lives as long as the library does
         for i in range(TICKS):
             tick(controller, past, motions + i, targets + i, PERIOD, told + 2 * i)
 

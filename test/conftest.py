@@ -9,8 +9,6 @@ from contextlib import suppress
 
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-# over shared memory, discovery takes seconds longer now and then
-os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
 
 with suppress(ImportError):
     import rclpy  # noqa: F401

@@ -1,12 +1,12 @@
 """Batches of climbers, with their loops closed and without, beside MuJoCo's rollout.
 
-The ways are those of `batch.py`, but the time is the processor's, start-up and all.
+The ways are those of `batch.py`.
 """
 
 import batch
 from limit import Limit
-from peers.rollouts import MODELS, by_mujoco, inputs, named, rate
-from side_by_side import in_turns, table, timed
+from peers.rollouts import MODELS, by_mujoco, inputs, named
+from side_by_side import timed
 
 SLOW = 3  # of the rounds asked for, one in so many
 
@@ -20,8 +20,5 @@ def compare(rounds: int) -> None:
         title = f"closed loop, N = {batch.CLOSED}, {name} / 5 ms"
         kinds[title] = batch.closed_loop(limit, True, steps)
     for title, ways in kinds.items():
-        runs = {name: timed(way.run) for name, way in ways.items()}
-        work = {name: way.steps for name, way in ways.items()}
-        runs[named(MODELS[0])], work[named(MODELS[0])] = rollout, batch.OPEN * batch.STEPS
-        times = in_turns(runs, -(-rounds // SLOW))
-        table(title, {name: t / work[name] for name, t in times.items()}, "M/s", rate)
+        ways[named(MODELS[0])] = batch.Way(rollout, batch.OPEN * batch.STEPS)
+        batch.compared(title, ways, -(-rounds // SLOW))

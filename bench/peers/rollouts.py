@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 from peers import mujoco_climber
-from side_by_side import in_turns, table, timed
+from side_by_side import in_turns, rate, table, timed
 
 from climber_uk.analysis.paper.consistent import PAPER_PATH, ConsistentSystem
 from climber_uk.analysis.paper.motion import DURATION, START
@@ -100,11 +100,6 @@ def _tell(name: str, offsets: list[Array], slip: float = 0.0) -> float:
 def named(model: tuple[str, str]) -> str:
     """What a row is called."""
     return f"MuJoCo, {', '.join(model)}"
-
-
-def rate(time: Array) -> Array:
-    """Climber-steps a second, in millions, of the time for one."""
-    return 1e-6 / time
 
 
 def compare(rounds: int) -> None:

@@ -204,8 +204,6 @@ def main() -> None:
     if options.output.exists():
         sys.exit(f"run_demo: {options.output} exists already")
     options.output.mkdir(parents=True)
-    # over shared memory, discovery takes seconds longer now and then
-    os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
 

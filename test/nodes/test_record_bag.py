@@ -33,12 +33,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning"
 
 ROOT = Path(__file__).parents[2]
 STORAGES = ["mcap", "sqlite3"]
-ENVIRONMENT = {
-    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    "ROS_PYTHON_CHECK_FIELDS": "1",
-    # over shared memory, discovery takes 3 s more in one of four cases
-    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
-}
+ENVIRONMENT = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_PYTHON_CHECK_FIELDS": "1"}
 TIMEOUT = 30.0  # [s] discovery has a long tail
 # a shell without a terminal lets what it puts into the background ignore SIGINT
 IN_BACKGROUND = ["sh", "-c", 'trap "" INT; exec "$@"', "sh"]
