@@ -1,6 +1,7 @@
 """Keeps all odometry that comes, and answers it with the torques of a trial."""
 
 import time
+from bisect import bisect_right
 
 import numpy as np
 from nav_msgs.msg import Odometry
@@ -17,7 +18,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.driver_graph import graph, others_commanding
-from climber_uk.nodes.running import BEST_EFFORT, ClimberNode
+from climber_uk.nodes.running import ClimberNode
 
 MANY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 SILENT, PATIENT = 0.5, 5.0  # [s] without odometry: no torque more; no trial more
@@ -33,21 +34,28 @@ class DriverNode(ClimberNode):
             self.parameters.declare(kind)
         self.parameters.refuse_unknown()
         self.arrivals: list[Arrival] = []
-        self.simulated = self.heard_at = 0  # [ns] of /clock; on the steady clock
+        self.simulated: list[tuple[int, int]] = []  # [ns] when it came, what /clock said
+        self.heard_at = 0  # [ns] on the steady clock
         self.trial: Trial | None = None
         self.torques: Publisher | None = None  # only once it is clear that nobody else commands
         self.answer: JointState | None = None
         self.odometry = self.subscription(Odometry, "odom", self.on_odometry, MANY)
-        self.subscription(Clock, "/clock", self.on_clock, BEST_EFFORT)
+        self.subscription(Clock, "/clock", self.on_clock, MANY)
 
-    def on_clock(self, message: Clock) -> None:
+    def on_clock(self, message: Clock, info: dict[str, int]) -> None:
         """Keep the simulated time."""
-        self.simulated = reading.nanoseconds(message.clock)
+        self.simulated.append((info["received_timestamp"], reading.nanoseconds(message.clock)))
 
-    def on_odometry(self, message: Odometry) -> None:
-        """Keep an odometry, and answer it if it is on this node to do so."""
+    def on_odometry(self, message: Odometry, info: dict[str, int]) -> None:
+        """Keep an odometry, and answer it if it is on this node to do so.
+
+        It came when the middleware received it: how long it then waited for this node is no
+        property of the driver.
+        """
         self.heard_at = time.monotonic_ns()
-        self.arrivals.append(Arrival(message, time.time_ns(), self.heard_at, self.simulated))
+        came = info["received_timestamp"]
+        boot = self.heard_at - (time.time_ns() - came)
+        self.arrivals.append(Arrival(message, came, boot, simulated=0))
         if self.torques is not None:
             self.tell(message)
 
@@ -83,7 +91,7 @@ class DriverNode(ClimberNode):
     @property
     def hears(self) -> bool:
         """Whether odometry comes, and the simulated time if there is one."""
-        return bool(self.arrivals) and (self.simulated > 0 or not self.has_clock())
+        return bool(self.arrivals) and (bool(self.simulated) or not self.has_clock())
 
     @property
     def simulated_for(self) -> float:
@@ -147,6 +155,12 @@ class DriverNode(ClimberNode):
         if self.torques is not None:
             self.torques.wait_for_all_acked(Duration(seconds=1.0))
 
+    def clocked_arrivals(self) -> list[Arrival]:
+        """All that arrived, each with the simulated time that had come before it."""
+        came = [came for came, _ in self.simulated]
+        told = [0, *(told for _, told in self.simulated)]
+        return [a._replace(simulated=told[bisect_right(came, a.wall)]) for a in self.arrivals]
+
     def evidence(self) -> Evidence:
         """All that was seen until now."""
         return Evidence(
@@ -155,7 +169,7 @@ class DriverNode(ClimberNode):
             frames=(self.names.odom_frame, self.names.base_frame),
             use_sim_time=self.use_sim_time,
             graph=graph(self, self.odometry.topic_name),
-            arrivals=list(self.arrivals),
+            arrivals=self.clocked_arrivals(),
             trial=self.trial.record() if self.trial else None,
         )
 

@@ -4,7 +4,6 @@ import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -68,7 +67,7 @@ class ClimberNode(Node):
         return self.create_publisher(kind, topic, qos, qos_overriding_options=options)
 
     def subscription(
-        self, kind: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile = RELIABLE
+        self, kind: type, topic: str, callback: Callable[..., None], qos: QoSProfile = RELIABLE
     ) -> Subscription:
         """Subscription whose QoS the parameters `qos_overrides.<topic>.subscription.*` override."""
         options = QoSOverridingOptions.with_default_policies()

@@ -7,9 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
+import rclpy
 from nav_msgs.msg import Odometry
+from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from world import CONFIG, TIMEOUT, executable
+
+from climber_uk.analysis.driver import timing
+from climber_uk.nodes.driver_node import DriverNode
 
 pytestmark = pytest.mark.nodes
 
@@ -121,6 +126,28 @@ def test_with_a_controller_in_lock_step_it_listens_and_refuses_to_move(world):
     assert "/uk_torque_controller publishes wheel_torques" in rows["trial"]["said"]
     assert not those(rows, "warn"), told(rows)
     assert {"heading", "twist", "slip", "clock"} <= set(those(rows, "pass"))
+
+
+def test_odometry_that_waited_for_it_is_no_older(world):
+    """In lock-step with a controller it may be slower than the two, and must not blame them."""
+    world.start_node("plant_simulator", "simulated_time:=true", config="climber.yaml")
+    rclpy.init(args=[*PARAMETERS, "-p", "use_sim_time:=true"], domain_id=world.domain)
+    node, executor = DriverNode(), SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        odometry = world.listen(Odometry, "odom")
+        world.wait(node.has_clock, "clock")
+        for other in ("uk_torque_controller", "trajectory_publisher"):
+            world.start_node(other, "use_sim_time:=true", config="climber.yaml")
+        world.wait(lambda: len(odometry) > 400, "2 s of simulated time")
+        while len(node.arrivals) < 300:
+            executor.spin_once(timeout_sec=TIMEOUT)
+        said = timing.age(node.evidence()).said
+        assert float(said.split()[0]) < 10, said  # two control periods [ms]
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.shutdown()
 
 
 def test_when_it_is_interrupted_its_last_word_is_no_torque(world):

@@ -58,7 +58,7 @@ class Graph:
 
 
 class Arrival(NamedTuple):
-    """An odometry, and what the clocks said when it came [ns]."""
+    """An odometry, and what the clocks said when the middleware received it [ns]."""
 
     message: "Odometry"
     wall: int
