@@ -40,6 +40,7 @@ FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received withi
 DISCOVERY_PERIOD = 0.2  # [s]
 TAKE_PERIOD = 0.01  # [s]
 GRACE = 0.1  # [s] for what was on its way when the stop came
+REPAIR = 3.5  # [s] in which a publisher repeats what was lost: Fast DDS asks every 3 s for it
 QUEUE_DEPTH = 5000  # messages of one topic that may wait: seconds, even at 1 kHz
 
 
@@ -57,6 +58,7 @@ class BagRecorder(Node):
         self.recorded: dict[str, Subscription] = {}
         self.types: dict[str, str] = {}  # of the recorded topics
         self.bag = BagWriter(options.output, options.storage)
+        self.heard: dict[str, int] = {}  # [ns] when the latest message of a topic was published
         self.stop_time = 0  # [ns] system clock; 0: not asked to stop
 
     def run(self) -> None:
@@ -74,7 +76,7 @@ class BagRecorder(Node):
             was_asked = bool(self.stop_time)
             time.sleep(GRACE if was_asked else TAKE_PERIOD)
             oldest = self.take()
-            is_behind = not was_asked or oldest <= self.stop_time
+            is_behind = not was_asked or oldest <= self.stop_time or self.misses_some()
 
     def discover(self) -> None:
         """Record new topics, and follow what the publishers of the recorded ones offer."""
@@ -147,11 +149,28 @@ class BagRecorder(Node):
                     log_time = info["received_timestamp"] or time.time_ns()
                     published = info["source_timestamp"] or log_time
                     oldest = min(oldest, log_time)
+                    self.heard[name] = published
                     # else a bag would end with answers to what is no longer in it
                     if not self.stop_time or min(log_time, published) <= self.stop_time:
                         self.introduce(name, self.types[name])
                         self.bag.write(name, log_time, published, data)
         return oldest
+
+    def misses_some(self) -> bool:
+        """Whether a topic may still bring messages from before the stop.
+
+        Reliable ones come in order: while one is sent again, those after it wait. So a topic that
+        was published shortly before the stop is complete once it brings what is later than that.
+        """
+        if time.time_ns() > self.stop_time + REPAIR * 1e9:
+            return False
+        return any(
+            self.stop_time - REPAIR * 1e9 < heard <= self.stop_time
+            and self.recorded[name].qos_profile.reliability == ReliabilityPolicy.RELIABLE
+            and self.bag.count(name) > 1
+            and self.count_publishers(name)
+            for name, heard in self.heard.items()
+        )
 
     def stop(self, *_: object) -> None:
         """Finish when all that had arrived by the first call is recorded."""

@@ -230,9 +230,9 @@ def test_four_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
 
 
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
-    # The machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`. And once, a
-    # second after the start, Fast DDS may stop a process for a third of a second, to find out
-    # whether another still listens to its shared memory: the climber is to be back after that.
+    # The machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`. And soon
+    # after the start Fast DDS may stop a process for a third of a second, see "Middleware" in
+    # docs/hardware.md: the climber is to be back after that.
     finished(demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6"))
     run = read_run(tmp_path / "run" / "bag")
     assert 5 < run.time[-1] < 10

@@ -252,6 +252,25 @@ def test_a_killed_recorder_loses_at_most_the_last_second(graph, storage):
 
 
 @pytest.mark.nodes
+def test_what_was_lost_before_the_stop_and_is_sent_again_is_recorded(graph):
+    rare, frequent = graph.publisher("rare", Int64), graph.publisher("frequent", Int64)
+    recorder = graph.record()
+    wait_for_subscription(rare, frequent)
+    for number in range(2):
+        rare.publish(Int64(data=number))
+    recorder.wait_for({"/rare": 2})
+
+    recorder.process.send_signal(signal.SIGSTOP)
+    for number in range(5000):  # more than a process that does not read has room for
+        frequent.publish(Int64(data=number))
+    for number in range(2, 10):
+        rare.publish(Int64(data=number))
+    recorder.end(signal.SIGTERM, signal.SIGCONT)
+
+    assert recorder.numbers("/rare") == list(range(10))
+
+
+@pytest.mark.nodes
 @pytest.mark.parametrize("further", [1, 10_000])
 def test_further_interrupts_leave_the_bag_complete(graph, further):
     publisher = graph.publisher("numbers", Int64)
