@@ -38,11 +38,12 @@ class RecordedController:
     def __init__(self, bag: Path, namespace: str) -> None:
         self.node = f"{namespace}/{NODE}"
         self.torques: dict[int, Array] = {}  # right, left [N m], by the stamp that they answer
-        self.settings: dict[int, Setting] = {}  # new ones, by the first such stamp
+        # new ones, with when the first torques under them were published
+        self.settings: list[tuple[int, Setting]] = []
         self.modes: Modes = []
         self.parameters: Mapping[str, Any] | None = None  # those that were told first
         self.simulated = False  # whether there was a /clock
-        self.published: dict[int, int] = {}  # when, by that stamp
+        self.published: dict[int, int] = {}  # when first, by that stamp
         self._setting = self._set_before = Setting()
         takers = {
             f"{namespace}/{TORQUES}": self._on_torques,
@@ -63,7 +64,8 @@ class RecordedController:
             self.torques.setdefault(stamp, torques)
         self.published.setdefault(stamp, at)
         if self._setting != self._set_before:
-            self.settings[stamp] = self._set_before = self._setting
+            self.settings.append((at, self._setting))
+            self._set_before = self._setting
 
     def _on_parameters(self, _: int, message: Any) -> None:
         told = reading.parameters(message)

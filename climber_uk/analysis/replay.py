@@ -4,6 +4,7 @@ After each answer it is made to believe that the recorded torques were sent, for
 moved the climber: every answer is one to the run as it was, whatever the parameters are.
 """
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 from climber_uk.analysis.parameter_file import Values
 from climber_uk.analysis.publishing_order import read_published
 from climber_uk.analysis.recorded_controller import CLOCK, Modes, RecordedController
-from climber_uk.analysis.topics import ODOMETRY, REFERENCE
+from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TORQUES
 from climber_uk.control.follower import Answer
 from climber_uk.control.settings import KINDS, new_follower, settings
 from climber_uk.mechanics import Array
@@ -42,6 +43,7 @@ class Replay:
         self.names = self.parameters.read(Names).within(namespace)
         self.pressure: float | None = None  # [Pa] as last measured
         self.follower = new_follower(self.parameters, None)
+        self.settings = deque(recorded.settings)  # that are to come
         self.torques: dict[int, Array] = {}  # by stamp, right, left [N m]
         self.modes: Modes = []
         self.clock = self.looked = 0  # times of the node's clock, and of the wall clock
@@ -64,17 +66,21 @@ class Replay:
         """Answer all of a bag; raises as `read_controller` does."""
         odometry, reference = f"{namespace}/{ODOMETRY}", f"{namespace}/{REFERENCE}"
         missing = {odometry, reference}
+        torques = f"{namespace}/{TORQUES}"
         takers = {
             CLOCK: self.on_clock,
             odometry: self.on_odometry,
             reference: self.on_reference,
             f"{namespace}/{PRESSURE}": self.on_pressure,
         }
-        for topic, at, message in read_published(bag, takers):
+        for topic, at, message in read_published(bag, [*takers, torques]):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
-            takers[topic](message)
+            if topic == torques:
+                self.on_torques(at, message)
+            else:
+                takers[topic](message)
         if missing:
             raise ValueError(f"{bag} has no message on {' and '.join(sorted(missing))}")
 
@@ -98,9 +104,10 @@ class Replay:
     def on_odometry(self, message: Any) -> None:
         """Answer an odometry."""
         stamp = reading.nanoseconds(message.header.stamp)
-        self.set(stamp)
-        # it looked at its clock right before it answered
-        self.pass_time(self.recorded.published.get(stamp, self.clock))
+        answered = self.recorded.published.get(stamp)
+        if answered is not None:
+            self.set(answered)
+            self.pass_time(answered)  # it looked at its clock right before
         try:
             state = reading.state(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
@@ -126,9 +133,16 @@ class Replay:
             self.pressure = pressure
             self.retune()
 
-    def set(self, stamp: int) -> None:
-        """Set what others had set before the odometry of `stamp` was answered."""
-        if (setting := self.recorded.settings.get(stamp)) is not None:
+    def on_torques(self, at: int, message: Any) -> None:
+        """Look when the node did, and answered an odometry once more."""
+        if at != self.recorded.published.get(reading.nanoseconds(message.header.stamp)):
+            self.set(at)
+            self.keep(self.follower.look(self.clock))
+
+    def set(self, at: int) -> None:
+        """Set what others had set before the torques of some time were published."""
+        while self.settings and self.settings[0][0] <= at:
+            _, setting = self.settings.popleft()
             self.follower.enable(setting.enabled)
             self.parameters = Values(self.choose(setting.parameters or {}))
             self.retune()
@@ -142,7 +156,9 @@ class Replay:
         mode = self.follower.mode.value
         if not self.modes or mode != self.modes[-1][1]:
             self.modes.append((self.clock, mode))
-        if answer is not None and answer.stamp not in self.torques:
+        if answer is None or answer.stamp == 0:  # to no odometry
+            return
+        if answer.stamp not in self.torques:
             self.torques[answer.stamp] = answer.torques
             sent = self.recorded.torques.get(answer.stamp)
             if sent is not None:

@@ -94,6 +94,8 @@ def bag(tmp_path_factory):
     lockstep.pressure.publish(FluidPressure(fluid_pressure=2300.0))
     lockstep.go(60)
     lockstep.enable(False)
+    said = len(lockstep.torques)
+    world.wait(lambda: len(lockstep.torques) > said, "safe output for the same odometry")
     lockstep.go(20)
     lockstep.enable(True)
     lockstep.go(60)
