@@ -21,10 +21,9 @@ from climber_uk.analysis.closed_loop import sampled
 from climber_uk.analysis.closed_loops import Course, Loops
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.motion import Motion, Wrench
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

@@ -22,8 +22,9 @@ from climber_uk.analysis.plant_experiments import (
     swinging,
 )
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.contact import Contact, Grip, NoAdhesion, Suction
+from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Coulomb, LuGre, Stribeck, Viscous
+from climber_uk.mechanics.hold import Grip, NoAdhesion, Suction
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -120,9 +121,12 @@ def orders() -> Figure:
     push, parts = np.array([1.4, 1.5]), [25, 50, 100, 200, 400]
     cases: dict[str, tuple[Callable[[float], Plant], State]] = {
         "Coulomb": (lambda h: Plant(PAPER, h), fast),
-        "viscous": (lambda h: Plant(PAPER, h, Contact(Viscous(speed=5.0))), fast),
-        "Stribeck": (lambda h: Plant(PAPER, h, Contact(Stribeck(speed=2.0))), fast),
-        "LuGre": (lambda h: Plant(PAPER, h, Contact(LuGre(speed=2.0, deflection=1.0))), slow),
+        "viscous": (lambda h: Plant(PAPER, h, Contact(friction=Viscous(speed=5.0))), fast),
+        "Stribeck": (lambda h: Plant(PAPER, h, Contact(friction=Stribeck(speed=2.0))), fast),
+        "LuGre": (
+            lambda h: Plant(PAPER, h, Contact(friction=LuGre(speed=2.0, deflection=1.0))),
+            slow,
+        ),
         "ring, R = 0.1 m": (lambda h: Plant(PAPER, h, Contact(grip=Grip(seal_radius=0.1))), fast),
         "pipe, R = 2 m": (lambda h: Plant(PAPER, h, wall=Cylinder(2.0)), fast),
         "wheels that slip": (

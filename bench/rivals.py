@@ -14,7 +14,7 @@ from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import arctan, cos, sin
 from climber_uk.mechanics.motion import Wrench
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.trajectory import Reference
+from climber_uk.mechanics.reference import Reference
 
 IDEAL = Link()
 

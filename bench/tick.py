@@ -20,10 +20,9 @@ from climber_uk.control.controller import Controller, Law, Situation
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.tracker import Timing, Tracker
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State, across, along
 from climber_uk.mechanics.motion import Demand, Motion, Torques, Wrench
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

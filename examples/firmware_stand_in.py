@@ -25,8 +25,8 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import writing
 from climber_uk.nodes import plant_parts
 from climber_uk.nodes.plant_time import ASK_AGAIN, TICK

@@ -1,6 +1,8 @@
 """Imports run downwards only, and ROS stays where the nodes are."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,12 @@ BELOW = {
     "nodes": {"mechanics", "control", "simulation", "messages", "analysis"},
 }
 ROS_ALLOWED = {"nodes", "messages"}
+# what a node has no use for: importing it would make every start longer
+UNUSED = {
+    "trajectory_publisher": ["control", "simulation", "analysis", "mechanics.hold"],
+    "uk_torque_controller": ["simulation", "analysis", "mechanics.shapes", "mechanics.contact"],
+    "plant_simulator": ["control", "analysis", "mechanics.shapes", "mechanics.preview"],
+}
 
 
 def imported(file):
@@ -45,7 +53,7 @@ def test_imports_run_downwards(file):
     modules = set(imported(file))
     used = {m.split(".")[1] for m in modules if m.startswith("climber_uk.")} - {room}
     assert used <= BELOW[room]
-    if room not in ROS_ALLOWED or file.stem == "reading":
+    if room not in ROS_ALLOWED or file.stem.startswith("reading"):
         assert not [m for m in modules if is_ros(m)]
 
 
@@ -56,3 +64,12 @@ def test_nodes_do_not_import_nodes(file):
     shared = {f"climber_uk.nodes.{name}" for name in names}
     nodes = {m for m in imported(file) if m.startswith("climber_uk.nodes.")}
     assert {m for m in nodes if m.count(".") == 2} <= shared
+
+
+@pytest.mark.parametrize("name", UNUSED)
+def test_a_node_imports_only_what_it_uses(name):
+    code = f"import sys, climber_uk.nodes.{name}; print(*sys.modules)"
+    command = [sys.executable, "-c", code]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    assert f"climber_uk.nodes.{name}" in said
+    assert not {f"climber_uk.{unused}" for unused in UNUSED[name]} & set(said)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import Grip
+from climber_uk.mechanics.hold import Grip
 
 ROBOT = ElementTree.parse(Path(__file__).parents[1] / "urdf" / "climber.urdf").getroot()
 JOINTS = {joint.get("name"): joint for joint in ROBOT.iter("joint")}

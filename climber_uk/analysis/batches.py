@@ -14,8 +14,7 @@ from rosbags.typesys.store import Typestore
 
 from climber_uk.analysis.bag import Bag
 from climber_uk.analysis.layout import Layout
-from climber_uk.mechanics import Array
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND, Array
 
 LATEST = 2**63 - 1  # [ns]
 CHUNK = 4096  # messages of a topic that are decoded at a time

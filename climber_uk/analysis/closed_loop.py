@@ -13,9 +13,9 @@ import numpy as np
 
 from climber_uk.control.constraints import tracking_error
 from climber_uk.control.follower import Answer
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.preview import SECOND, Preview
+from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.plant import Plant
 

@@ -21,14 +21,14 @@ from climber_uk.control.controller import Controller
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.tracker import Timing, Tracker
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Wheeled
 from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, part
 from climber_uk.mechanics.motion import Motion, Target, Torques, Wrench, forces, torque_bounds
-from climber_uk.mechanics.preview import SECOND, Preview
+from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.plain import Plain, advanced_often
 from climber_uk.simulation.sensors import Sensors

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.topics import ODOMETRY, REFERENCE
-from climber_uk.mechanics import Array
-from climber_uk.mechanics.preview import SECOND, joined
-from climber_uk.messages import reading
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.preview import joined
+from climber_uk.messages import reading, reading_reference
 
 TRUTH = "ground_truth"
 Poses = dict[int, Array]  # x, y, heading by stamp [ns]
@@ -33,7 +33,7 @@ def read_poses(bag: Path, namespace: str) -> dict[str, Poses]:
         name, frame = topics[topic], message.header.frame_id
         with suppress(ValueError):
             if name == REFERENCE:
-                previews.append(reading.preview(message, frame))
+                previews.append(reading_reference.preview(message, frame))
             else:
                 stamp = reading.nanoseconds(message.header.stamp)
                 state = reading.state(message, frame, message.child_frame_id)

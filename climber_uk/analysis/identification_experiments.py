@@ -15,9 +15,9 @@ from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
 from climber_uk.control.tracker import Timing, Tracker
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.preview import SECOND, Preview
+from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory

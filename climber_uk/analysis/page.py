@@ -10,8 +10,8 @@ from html import escape
 from climber_uk.analysis.events import ERROR, OK, WARNING
 from climber_uk.analysis.page_template import PAGE
 from climber_uk.analysis.tables import Column, groups, ratio_heads, unknown
-from climber_uk.mechanics.contact import Alarm
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.hold import Alarm
 
 MOST_EVENTS = 200  # of a run
 STOPS = {0.0: "no stop", 1.0: "1 stop"}

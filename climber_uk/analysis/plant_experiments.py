@@ -44,7 +44,7 @@ def pulled(
     law: Friction, force: Callable[[float, float], float], duration: float, step: float = 1e-3
 ) -> Motion:
     """Motion of the block under `force` of time [s] and x [m], taken in the middle of a step."""
-    plant, state, rows = Plant(BLOCK, step, Contact(law)), AT_REST, []
+    plant, state, rows = Plant(BLOCK, step, Contact(friction=law)), AT_REST, []
     for number in range(round(duration / step)):
         time, (x, *_), v = number * step, state.pose.tolist(), float(state.forward_speed)
         rows.append([time, x, v, force(time, x)])
@@ -103,7 +103,7 @@ def found_period(motion: Motion) -> float:
 
 def friction_at(law: Friction, speed: float, step: float = 1e-3) -> float:
     """Force [N] that the plant's block feels once it has slid at `speed` [m/s] for long."""
-    plant = Plant(BLOCK, step, Contact(law))
+    plant = Plant(BLOCK, step, Contact(friction=law))
     state = State(np.zeros(3), np.array([speed, 0.0, 0.0]))
     lengths = 20 * law.deflection if isinstance(law, LuGre) else 0.0  # e^-20 from the start
     for _ in range(1 + round(lengths / speed / step)):

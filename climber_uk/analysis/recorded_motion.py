@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.analysis.bag import read_messages
-from climber_uk.mechanics import Array
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading
 
 Indices = NDArray[np.intp]

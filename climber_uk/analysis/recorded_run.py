@@ -18,10 +18,9 @@ from climber_uk.analysis.reference import poses_at
 from climber_uk.analysis.taking import TAKEN
 from climber_uk.analysis.topics import Topics
 from climber_uk.control.constraints import tracking_error
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.preview import SECOND
-from climber_uk.mechanics.trajectory import Reference
+from climber_uk.mechanics.reference import Reference
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
 

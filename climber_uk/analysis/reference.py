@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from climber_uk.analysis.batches import Batch
 from climber_uk.analysis.taking import heading
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, Stamps
 from climber_uk.mechanics.elementary import wrapped
 
 AT_ONCE = 65536  # times
-Stamps = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

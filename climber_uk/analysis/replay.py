@@ -16,10 +16,9 @@ from climber_uk.analysis.recorded_controller import CLOCK, Modes, RecordedContro
 from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TORQUES
 from climber_uk.control.follower import Answer
 from climber_uk.control.settings import KINDS, new_follower, settings
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.motion import Torques
-from climber_uk.mechanics.preview import SECOND
-from climber_uk.messages import reading
+from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.names import Names
 
 PRESSURE = "suction_pressure"
@@ -118,7 +117,7 @@ class Replay:
     def on_reference(self, message: Any) -> None:
         """Keep a reference, unless it is one that the node refuses."""
         try:
-            preview = reading.preview(message, self.names.odom_frame)
+            preview = reading_reference.preview(message, self.names.odom_frame)
         except ValueError:
             return
         self.keep(self.follower.on_reference(self.clock, preview))

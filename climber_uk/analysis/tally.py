@@ -8,9 +8,9 @@ from climber_uk.control.controller import Command
 from climber_uk.control.tracker import CUT
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY, Climber
-from climber_uk.mechanics.contact import AMPLE, Contact
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.hold import AMPLE
 from climber_uk.mechanics.motion import Motion, Target, Torques, forces
-from climber_uk.mechanics.wall import Plane
 
 NEAR = 0.01  # [m] from the reference within which a loop has settled
 
@@ -73,7 +73,7 @@ class Tally:
     def _hold(self, time: float, climber: Climber) -> None:
         """Tell who falls off, now that the climbers are these."""
         self._climber = climber
-        self._into = Plane().into(climber.inclination, 0.0, 0.0)
+        self._into = climber.gravity_into_wall
         hold = self.contact.hold(climber, self._into)
         along = climber.weight_along_wall / climber.mass
         tip = self.contact.tip_margin(climber, self._into, along)

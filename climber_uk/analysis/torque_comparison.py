@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from climber_uk.analysis.recorded_controller import Modes, RecordedController
 from climber_uk.analysis.replay import Replay
-from climber_uk.mechanics import Array
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND, Array
 
 WHEELS = "right", "left"
 ROUNDING = 1e-9  # [N m] within which a torque is at its limit

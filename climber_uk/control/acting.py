@@ -3,8 +3,8 @@
 from collections import deque
 from collections.abc import Iterator
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.motion import Torques
-from climber_uk.mechanics.preview import SECOND
 
 NONE = Torques(0.0, 0.0)
 

@@ -16,7 +16,7 @@ from climber_uk.mechanics.climber import State, across, along, no_slip
 from climber_uk.mechanics.elementary import cos, select, sin, wrapped
 from climber_uk.mechanics.motion import Demand, Motion, Target
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.trajectory import Reference
+from climber_uk.mechanics.reference import Reference
 
 REST_SPEED = 1e-3  # [m/s] below which a heading cannot be told from the way a climber moves
 

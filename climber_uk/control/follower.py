@@ -5,15 +5,15 @@ while there is none.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from climber_uk.control.controller import Command
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import LONGEST_STEP, Tracker
-from climber_uk.mechanics import Array, pack
+from climber_uk.mechanics import SECOND, Array, pack
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.motion import Motion, Torques
-from climber_uk.mechanics.preview import SECOND, Preview
+from climber_uk.mechanics.preview import Preview
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
 MOVED = 0.05  # [m] after which a twist that is always zero is none
@@ -21,8 +21,7 @@ SAME = 0.05  # [m, rad] within which a new preview goes on with the old one
 LONGEST_LAG = 60.0  # [s] for which the reference may wait
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """Torques for the odometry of `stamp`."""
 
     stamp: int  # [ns]

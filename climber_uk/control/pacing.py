@@ -9,10 +9,11 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.elementary import compose
 from climber_uk.mechanics.motion import Target
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.preview import SECOND, Preview
-from climber_uk.mechanics.time_laws import compose
+from climber_uk.mechanics.preview import Preview
 
 SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
 

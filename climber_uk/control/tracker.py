@@ -13,10 +13,11 @@ from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
 from climber_uk.control.model import Observer, rolled
 from climber_uk.control.pacing import IN_TIME, Pacing
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.preview import SECOND, Preview
+from climber_uk.mechanics.preview import Preview
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
 PERIOD_SMOOTHING = 0.1  # share of a new period in the mean

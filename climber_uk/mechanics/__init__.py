@@ -3,9 +3,11 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating[Any]]
+# NDArray of numpy.typing, written out: numpy does not import that module itself, nor do nodes
+Array = np.ndarray[tuple[Any, ...], np.dtype[np.floating[Any]]]
+Stamps = np.ndarray[tuple[Any, ...], np.dtype[np.int64]]  # [ns]
+SECOND = 1_000_000_000  # [ns]
 
 
 def unpack(array: Array) -> tuple[Any, ...]:

@@ -118,6 +118,12 @@ class Climber:
         weight: float = self.mass * GRAVITY * sin(self.inclination * DEGREE)
         return weight
 
+    @cached_property
+    def gravity_into_wall(self) -> float:
+        """g_n of a flat wall, below 0 where it pulls the climber off [m/s²]."""
+        gravity: float = GRAVITY * cos(self.inclination * DEGREE)
+        return gravity
+
     def applied_force(self, heading: Array, direction: Array | float) -> Array:
         """Q without the motors: seal friction against the motion, and gravity, (..., 3) [N, N m].
 

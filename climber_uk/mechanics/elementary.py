@@ -13,6 +13,7 @@ import numpy as np
 from climber_uk.mechanics import Array
 
 TURN = 2 * math.pi  # [rad]
+Derivatives = tuple[Any, Any, Any, Any]  # (...) of order 0, 1, 2, 3
 
 
 def _either(of_float: Callable[[float], float], of_array: Callable[[Array], Array]) -> Any:
@@ -85,3 +86,15 @@ def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any,
     if small.all():
         return end, c, s
     return end, np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))
+
+
+def compose(f: Derivatives, inner: tuple[Any, Any, Any]) -> Derivatives:
+    """Derivatives by t of f(s(t)), of those of f by s, and ṡ, s̈, s⃛."""
+    s_1, s_2, s_3 = inner
+    _, f_1, f_2, f_3 = f
+    return (
+        f[0],
+        f_1 * s_1,
+        f_2 * s_1**2 + f_1 * s_2,
+        f_3 * s_1**3 + 3 * f_2 * s_1 * s_2 + f_1 * s_3,
+    )

@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, Stamps
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.motion import Target
-from climber_uk.mechanics.trajectory import Reference
-
-SECOND = 1_000_000_000  # [ns]
+from climber_uk.mechanics.reference import Reference
 
 
 @dataclass(frozen=True)
@@ -28,7 +25,7 @@ class Preview:
     Headings may be given modulo 2π.
     """
 
-    times: NDArray[np.int64]  # (n,) [ns]
+    times: Stamps  # (n,) [ns]
     pose: Array  # (n, 3) x [m], y [m], θ [rad]
     velocity: Array  # (n, 3)
     acceleration: Array  # (n, 3)

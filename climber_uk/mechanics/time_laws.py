@@ -5,15 +5,14 @@ A new law is one class with `duration` and `progress`, and one entry in `TIME_LA
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.shapes import Shape
-
-Derivatives = tuple[Any, Any, Any, Any]  # (...) of order 0, 1, 2, 3
 
 
 class TimeLaw(Protocol):
@@ -117,18 +116,6 @@ class Stopping:
 
 
 TIME_LAWS = {"constant_rate": ConstantRate, "rest_to_rest": RestToRest}
-
-
-def compose(f: Derivatives, inner: tuple[Any, Any, Any]) -> Derivatives:
-    """Derivatives by t of f(s(t)), of those of f by s, and ṡ, s̈, s⃛."""
-    s_1, s_2, s_3 = inner
-    _, f_1, f_2, f_3 = f
-    return (
-        f[0],
-        f_1 * s_1,
-        f_2 * s_1**2 + f_1 * s_2,
-        f_3 * s_1**3 + 3 * f_2 * s_1 * s_2 + f_1 * s_3,
-    )
 
 
 def smooth_start(time: Array, ramp_time: float) -> Derivatives:

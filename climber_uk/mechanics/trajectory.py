@@ -4,63 +4,14 @@
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.climber import along
-from climber_uk.mechanics.motion import Target
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.elementary import Derivatives, compose
+from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Shape
-from climber_uk.mechanics.time_laws import ConstantRate, Derivatives, TimeLaw, compose
-
-
-@dataclass(frozen=True)
-class Reference:
-    """Where the climber should be and how it should move at one time (or many), wall's frame."""
-
-    pose: Array  # (..., 3) x [m], y [m], θ [rad]
-    velocity: Array  # (..., 3) ẋ [m/s], ẏ [m/s], θ̇ [rad/s]
-    acceleration: Array  # (..., 3) ẍ [m/s²], ÿ [m/s²], θ̈ [rad/s²]
-    jerk: Array  # (..., 2) of x and y [m/s³]
-
-    @classmethod
-    def of(cls, target: Target) -> "Reference":
-        """Reference of a target."""
-        return cls(pack(*target[:3]), pack(*target[3:6]), pack(*target[6:9]), pack(*target[9:]))
-
-    @cached_property
-    def target(self) -> Target:
-        """The same in components."""
-        vectors = self.pose, self.velocity, self.acceleration, self.jerk
-        return Target(*(part for vector in vectors for part in unpack(vector)))
-
-    @cached_property
-    def heading(self) -> Array:
-        """θ_d (...) [rad]."""
-        return unpack(self.pose)[2]
-
-    @cached_property
-    def yaw_rate(self) -> Array:
-        """ω_d (...) [rad/s]."""
-        return unpack(self.velocity)[2]
-
-    # The speed along the heading, negative in reverse gear, and its rates:
-
-    @cached_property
-    def speed(self) -> Array:
-        """v_d (...) [m/s]."""
-        return along(self.heading, self.velocity)
-
-    @cached_property
-    def speed_rate(self) -> Array:
-        """v̇_d (...) [m/s²]."""
-        return along(self.heading, self.acceleration)
-
-    @cached_property
-    def speed_second_rate(self) -> Array:
-        """v̈_d = p⃛·t + ω² v_d (...) [m/s³]."""
-        return along(self.heading, self.jerk) + self.yaw_rate**2 * self.speed
+from climber_uk.mechanics.time_laws import ConstantRate, TimeLaw
 
 
 @dataclass(frozen=True)

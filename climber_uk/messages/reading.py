@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.preview import SECOND, Preview
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
-    from geometry_msgs.msg import Quaternion, Twist, WrenchStamped
+    from geometry_msgs.msg import Quaternion, WrenchStamped
     from nav_msgs.msg import Odometry
     from rcl_interfaces.msg import ParameterEvent
     from sensor_msgs.msg import FluidPressure, JointState
-    from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 
 LARGEST = 1e6  # in SI units, of whatever a climber or its wall can be said to do
@@ -39,12 +37,12 @@ def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
         if frame != wanted:
             raise ValueError(f"{name}={frame!r} must be {wanted!r}")
     position, twist = message.pose.pose.position, message.twist.twist
-    heading = _heading(message.pose.pose.orientation)
+    heading = heading_of(message.pose.pose.orientation)
     v_x, v_y, omega = twist.linear.x, twist.linear.y, twist.angular.z
     cosine, sine = math.cos(heading), math.sin(heading)
     pose = np.array([position.x, position.y, heading])
     velocity = np.array([v_x * cosine - v_y * sine, v_x * sine + v_y * cosine, omega])
-    _check_size(pose=pose, velocity=velocity)
+    check_size(pose=pose, velocity=velocity)
     return State(pose, velocity)
 
 
@@ -59,30 +57,6 @@ def wheel_torques(message: "JointState", left_joint: str, right_joint: str) -> A
     if not np.isfinite(torques).all():
         raise ValueError(f"efforts {list(message.effort)} must be finite")
     return torques
-
-
-def preview(message: "MultiDOFJointTrajectory", odom_frame: str) -> Preview:
-    """Preview of the one joint of a trajectory."""
-    if message.header.frame_id != odom_frame:
-        raise ValueError(f"frame_id={message.header.frame_id!r} must be {odom_frame!r}")
-    poses, velocities, accelerations = [], [], []
-    for number, point in enumerate(message.points, start=1):
-        if not len(point.transforms) == len(point.velocities) == len(point.accelerations) == 1:
-            raise ValueError(f"point {number} must have one transform, velocity and acceleration")
-        place = point.transforms[0].translation
-        poses.append([place.x, place.y, _heading(point.transforms[0].rotation)])
-        velocities.append(_planar(point.velocities[0]))
-        accelerations.append(_planar(point.accelerations[0]))
-    _check_size(pose=poses, velocity=velocities, acceleration=accelerations)
-    start = nanoseconds(message.header.stamp)
-    return Preview(
-        times=np.array(
-            [start + nanoseconds(point.time_from_start) for point in message.points], np.int64
-        ),
-        pose=np.array(poses),
-        velocity=np.array(velocities),
-        acceleration=np.array(accelerations),
-    )
 
 
 def pressure(message: "FluidPressure") -> float:
@@ -100,7 +74,7 @@ def wrench(message: "WrenchStamped", odom_frame: str, base_frame: str) -> tuple[
         raise ValueError(f"frame_id={frame!r} must be {odom_frame!r} or {base_frame!r}")
     force, torque = message.wrench.force, message.wrench.torque
     planar = np.array([force.x, force.y, torque.z])
-    _check_size(wrench=planar)
+    check_size(wrench=planar)
     return planar, frame == base_frame
 
 
@@ -111,19 +85,16 @@ def parameters(message: "ParameterEvent") -> dict[str, bool | int | float | str]
     return {name: getattr(value, kinds[value.type]) for name, value in told if value.type in kinds}
 
 
-def _check_size(**vectors: "Array | list[list[float]]") -> None:
+def check_size(**vectors: "Array | list[list[float]]") -> None:
+    """Raise `ValueError` naming what is not finite, or above `LARGEST`."""
     for name, vector in vectors.items():
         if not (np.abs(vector) <= LARGEST).all():
             raise ValueError(f"{name} {vector} is not finite, or above {LARGEST:g} in SI units")
 
 
-def _heading(orientation: "Quaternion") -> float:
+def heading_of(orientation: "Quaternion") -> float:
     """Heading, in (-π, π]; climbers turn about z only, so x and y must be (nearly) zero."""
     x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
     if not (abs(math.hypot(z, w) - 1) < 1e-3 and math.hypot(x, y) < 0.1):
         raise ValueError(f"orientation ({x}, {y}, {z}, {w}) must be a unit turn about z")
     return math.atan2(2 * w * z, w * w - z * z)
-
-
-def _planar(twist: "Twist") -> list[float]:
-    return [twist.linear.x, twist.linear.y, twist.angular.z]

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -22,10 +23,11 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.preview import SECOND
-from climber_uk.mechanics.trajectory import Reference
+
+if TYPE_CHECKING:
+    from climber_uk.mechanics.reference import Reference
 
 EXACT = np.diag([1e-12] * 6).ravel()
 EXACT.setflags(write=False)  # messages share it
@@ -69,7 +71,7 @@ def wheel_torques(torques: Array, stamp: int, left_joint: str, right_joint: str)
     return message
 
 
-def reference_point(reference: Reference, time: float) -> MultiDOFJointTrajectoryPoint:
+def reference_point(reference: "Reference", time: float) -> MultiDOFJointTrajectoryPoint:
     """Point of a trajectory: one reference, `time` [s] after its start."""
     x, y, heading = reference.pose.tolist()
     point = MultiDOFJointTrajectoryPoint()

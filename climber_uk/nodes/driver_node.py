@@ -13,9 +13,8 @@ from sensor_msgs.msg import JointState
 
 from climber_uk.analysis.driver.evidence import Arrival, Evidence, Expected
 from climber_uk.analysis.driver.trial import Bounds, Trial
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.driver_graph import graph, others_commanding
 from climber_uk.nodes.running import ClimberNode

@@ -2,7 +2,7 @@
 
 from geometry_msgs.msg import Vector3Stamped
 
-from climber_uk.mechanics.contact import AMPLE, Alarm
+from climber_uk.mechanics.hold import AMPLE, Alarm
 from climber_uk.messages import writing
 from climber_uk.nodes.running import SLOW, ClimberNode, Rhythm
 

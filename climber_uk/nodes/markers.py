@@ -16,10 +16,9 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.preview import SECOND
-from climber_uk.messages import reading
+from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
 from climber_uk.nodes.running import BEST_EFFORT, RELIABLE, SLOW, ClimberNode, Rhythm, run
 
@@ -122,7 +121,9 @@ class Markers(ClimberNode):
         message, odom_frame = self.latest.get(REFERENCE), self.names.odom_frame
         if message is None:
             return
-        preview = self.understood(REFERENCE, message, lambda m: reading.preview(m, odom_frame))
+        preview = self.understood(
+            REFERENCE, message, lambda m: reading_reference.preview(m, odom_frame)
+        )
         desired = preview.at(stamp) if preview is not None else None
         if desired is not None:
             drawing.outline(REFERENCE, desired.pose, self.options.half_track, VIOLET)

@@ -3,7 +3,8 @@
 from typing import Any
 
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import Alarm, Contact, Grip
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.hold import Alarm, Grip
 from climber_uk.nodes.parameters import Parameters
 from climber_uk.simulation.machine import VARIANTS, Parts, Physics
 from climber_uk.simulation.motors import Motors

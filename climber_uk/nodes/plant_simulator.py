@@ -1,6 +1,5 @@
 """A climber on its wall in a robot's place: wheel torques in, odometry out."""
 
-import argparse
 import sys
 from collections.abc import Sequence
 
@@ -10,9 +9,8 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
-from climber_uk.mechanics import Array
-from climber_uk.mechanics.contact import Alarm
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.hold import Alarm
 from climber_uk.messages import reading
 from climber_uk.nodes import plant_parts
 from climber_uk.nodes.margins import Margins
@@ -202,11 +200,21 @@ def in_one_time(namespaces: Sequence[str]) -> list[PlantSimulator]:
     return [leader, *(PlantSimulator(namespace, leader.time) for namespace in others)]
 
 
-def main() -> None:
-    """Run a climber, or one in each of some namespaces."""
+def namespaces(arguments: Sequence[str]) -> list[str]:
+    """Namespaces of the climbers that the command line asks for: one in none if it is empty."""
+    if not arguments:
+        return [""]
+    import argparse  # here, as most starts have nothing to parse and it is slow to import
+
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--climbers", nargs="+", default=[""], metavar="NAMESPACE", help="of each (default: one)"
     )
+    chosen: list[str] = parser.parse_args(arguments).climbers
+    return chosen
+
+
+def main() -> None:
+    """Run a climber, or one in each of some namespaces."""
     # what is wrong with the arguments of ROS is said by `run`
-    run(lambda: in_one_time(parser.parse_args(remove_ros_args(sys.argv)[1:]).climbers))
+    run(lambda: in_one_time(namespaces(remove_ros_args(sys.argv)[1:])))

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.nodes.running import WALL_CLOCK, ClimberNode, Rhythm
 from climber_uk.simulation.options import Options

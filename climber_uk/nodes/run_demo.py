@@ -21,8 +21,8 @@ from rclpy.executors import ExternalShutdownException
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 from climber_uk.nodes.running import ClimberNode
 

@@ -19,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.messages.names import Names
 from climber_uk.nodes.parameters import Parameters

@@ -8,9 +8,9 @@ from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.plan import KINDS, Plan, planned
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run

@@ -20,10 +20,9 @@ from climber_uk.control.follower import Answer
 from climber_uk.control.safety import Mode
 from climber_uk.control.settings import KINDS, Choice, new_follower, settings
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.contact import ADHESION, Alarm, Contact, Grip
+from climber_uk.mechanics.hold import ADHESION, Alarm, Grip, Hold
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.wall import Plane
-from climber_uk.messages import reading, writing
+from climber_uk.messages import reading, reading_reference, writing
 from climber_uk.nodes.managed import ManagedNode
 from climber_uk.nodes.margins import Margins
 from climber_uk.nodes.running import BEST_EFFORT, LATCHED, SLOW, WALL_CLOCK, Rhythm, run
@@ -54,7 +53,7 @@ class UkTorqueController(ManagedNode):
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
-        self.contact = self.contact_now()
+        self.hold = self.hold_now()
         self.pressure: float | None = None  # [Pa] as last measured
         self.follower = new_follower(self.parameters, self.pressure)
         self.answers = self.saturations = 0
@@ -90,15 +89,15 @@ class UkTorqueController(ManagedNode):
 
     # Parameters
 
-    def contact_now(self) -> Contact:
+    def hold_now(self) -> Hold:
         """What the parameters say that holds the climber on its wall."""
         read, name = self.parameters.read, self.options.adhesion
-        return Contact(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
+        return Hold(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
 
     def on_parameters(self) -> None:
         """Take up changed parameters."""
         self.margins.alarm = self.parameters.read(Alarm)
-        self.contact = self.contact_now()
+        self.hold = self.hold_now()
         self.retune()
         self.tell_parameters()
 
@@ -126,7 +125,7 @@ class UkTorqueController(ManagedNode):
     def on_reference(self, message: MultiDOFJointTrajectory) -> None:
         """Keep the reference; answer the odometry that waits for it."""
         try:
-            preview = reading.preview(message, self.names.odom_frame)
+            preview = reading_reference.preview(message, self.names.odom_frame)
         except ValueError as error:
             self.say("reference", "refused", str(error))
             return
@@ -195,18 +194,18 @@ class UkTorqueController(ManagedNode):
 
     def take_margins(self, answer: Answer, state: State) -> None:
         """Tell how near the torques bring the climber to slipping, and how near it is to tip."""
-        climber, contact = self.follower.tracker.controller.climber, self.contact
+        climber, hold = self.follower.tracker.controller.climber, self.hold
         drive, _ = climber.drive_and_turn(answer.torques)
         if answer.command is not None:
             lateral = float(answer.command.constraint_force[1])
         else:
             lateral = climber.weight_along_wall * math.cos(state.heading)
-        into_wall = Plane().into(climber.inclination, 0.0, 0.0)
+        into_wall = climber.gravity_into_wall
         along_wall = climber.weight_along_wall / climber.mass
         self.margins.take(
-            contact.slip_margin(climber, into_wall, drive, lateral),
-            contact.tip_margin(climber, into_wall, along_wall),
-            contact.wheel_load(climber, into_wall),
+            hold.slip_margin(climber, into_wall, drive, lateral),
+            hold.tip_margin(climber, into_wall, along_wall),
+            hold.wheel_load(climber, into_wall),
             answer.stamp,
         )
 

@@ -6,7 +6,7 @@
 found contact by contact until nothing changes (block Gauss-Seidel), each contact exactly.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
 SMALLEST = 1e-90  # [N s] an impulse that might as well be none; its cube is still a number
 
 
-@dataclass(frozen=True)
-class Cone:
+class Cone(NamedTuple):
     """A contact: sliding s = H ν of k components, with H M⁻¹ Hᵀ diagonal, and its limit."""
 
     rows: Array  # H (k, n)

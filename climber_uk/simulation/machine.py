@@ -1,14 +1,15 @@
 """A climber with its pump, motors and sensors, from one odometry to the next."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.contact import ADHESION, LOCOMOTION, Suction
+from climber_uk.mechanics.contact import LOCOMOTION
 from climber_uk.mechanics.friction import FRICTION
+from climber_uk.mechanics.hold import ADHESION, Suction
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.wall import WALLS
 from climber_uk.simulation.inputs import NO_PUSH
@@ -42,8 +43,7 @@ class Physics:
         check(self)
 
 
-@dataclass(frozen=True)
-class Push:
+class Push(NamedTuple):
     """A wrench on the climber's centre of mass."""
 
     wrench: Array  # (3,) force x, y [N], moment about z [N m]
@@ -61,8 +61,7 @@ class Push:
 NONE = Push(NO_PUSH)
 
 
-@dataclass(frozen=True)
-class Parts:
+class Parts(NamedTuple):
     """What a machine is made of; its plant's pressure is the one that the pump is set to."""
 
     plant: Plant

@@ -6,7 +6,6 @@ value up to its stiction holds the climber still; the instant of change is locat
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,11 +22,11 @@ STIFF = 0.5
 MAX_PARTS = 100  # beyond that, what is stiff is left to an implicit method
 
 
-@dataclass(frozen=True)
 class Rolling:
     """One step of a body without side slip."""
 
-    body: Body
+    def __init__(self, body: Body) -> None:
+        self.body = body
 
     @cached_property
     def sticks(self) -> bool:

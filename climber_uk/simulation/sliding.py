@@ -9,7 +9,6 @@ order in the step, against four while nothing changes; so steps are short, and t
 """
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +23,6 @@ PARTS = 8  # of a step
 AT_REST = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds
 
 
-@dataclass(frozen=True)
 class Sliding:
     """Steps of a body whose wheels slip, if `slip`, where their load does not suffice.
 
@@ -32,10 +30,8 @@ class Sliding:
     out again. Raises `ValueError` if it is more than there is.
     """
 
-    body: Body
-    slip: bool
-
-    def __post_init__(self) -> None:
+    def __init__(self, body: Body, slip: bool) -> None:
+        self.body, self.slip = body, slip
         if self.slip and min(self.mass, self.yaw_inertia) <= 0:
             inertia = self.body.contact.grip.wheel_inertia
             raise ValueError(

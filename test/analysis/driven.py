@@ -7,9 +7,9 @@ import numpy as np
 from climber_uk.analysis.driver import listening
 from climber_uk.analysis.driver.evidence import Arrival, Endpoint, Evidence, Expected, Graph
 from climber_uk.analysis.driver.trial import Bounds, Trial
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.simulation.machine import Machine, Parts, Physics
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant

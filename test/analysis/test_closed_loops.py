@@ -13,7 +13,8 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.contact import Contact, Grip
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.hold import Grip
 from climber_uk.mechanics.many import part
 from climber_uk.mechanics.motion import Motion
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate

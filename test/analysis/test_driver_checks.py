@@ -11,7 +11,7 @@ from driven import ALONE, DRIVER, MOTOR, arrived, evidence, odometry
 from climber_uk.analysis.driver import checks, listening, moving, report, timing
 from climber_uk.analysis.driver.evidence import Expected
 from climber_uk.analysis.driver.report import Verdict
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
 
 PASS, WARN, FAIL, SKIP = Verdict
 START = 2000 * SECOND  # [ns] on a computer that started 1000 s before

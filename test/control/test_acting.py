@@ -1,8 +1,8 @@
 import pytest
 
 from climber_uk.control.acting import Acting
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.motion import Torques
-from climber_uk.mechanics.preview import SECOND
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.motion import Wrench
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.shapes import Circle, Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

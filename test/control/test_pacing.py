@@ -5,11 +5,12 @@ from hypothesis import strategies as st
 
 from climber_uk.analysis.closed_loop import sampled
 from climber_uk.control.pacing import Pace, Pacing
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
-from climber_uk.mechanics.trajectory import Reference, Trajectory
+from climber_uk.mechanics.trajectory import Trajectory
 
 PREVIEW = sampled(Trajectory(Ellipse(), ConstantRate()), 20.0)
 PACING = Pacing()

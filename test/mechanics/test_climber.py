@@ -29,6 +29,14 @@ def test_only_the_part_of_the_weight_along_the_wall_pulls(inclination, share):
     assert weight == pytest.approx(49.05 * share, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("inclination", "gravity"), [(0, 9.81), (60, 4.905), (90, 0), (180, -9.81)]
+)
+def test_gravity_presses_onto_a_floor_and_pulls_off_a_ceiling(inclination, gravity):
+    got = Climber(inclination=inclination).gravity_into_wall
+    assert got == pytest.approx(gravity, abs=1e-12)
+
+
 @given(angles, speeds, speeds, torque_pairs, st.sampled_from([-1.0, 0.0, 1.0]))
 def test_rolling_is_the_udwadia_kalaba_motion_under_no_slip(heading, v, omega, torques, direction):
     state = rolling(heading, v, omega)

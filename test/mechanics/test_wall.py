@@ -13,6 +13,7 @@ def test_on_the_default_plane_the_weight_is_the_climbers_to_the_last_bit(inclina
     x, y = Plane().along(inclination, 3.7)
     assert x == 0
     assert climber.mass * GRAVITY * y == -climber.weight_along_wall
+    assert Plane().into(inclination, 3.7, 0.0) == climber.gravity_into_wall
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from climber_uk.analysis import export_tum
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.recorded_run import read_run
 from climber_uk.analysis.trajectory_errors import absolute_errors, relative_errors, way
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 
 pytestmark = pytest.mark.nodes

@@ -10,7 +10,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from test_uk_torque_controller import Loop
 
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 
 pytestmark = pytest.mark.nodes

@@ -21,8 +21,8 @@ from test_uk_torque_controller import CIRCLE, Loop
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from world import TIMEOUT
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading, writing
 
 pytestmark = pytest.mark.nodes

@@ -8,9 +8,9 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.preview import SECOND
-from climber_uk.mechanics.trajectory import Reference
+from climber_uk.mechanics.reference import Reference
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.running import SLOW
 

@@ -14,8 +14,8 @@ from world import World
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.bag_writer import BagWriter
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

@@ -10,7 +10,7 @@ from world import CONFIG, executable
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.campaign.campaign import read
 from climber_uk.analysis.campaign.parts import computed
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 
 pytestmark = [pytest.mark.nodes, pytest.mark.slow]

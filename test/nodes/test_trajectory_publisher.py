@@ -8,12 +8,13 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.preview import SECOND, joined
+from climber_uk.mechanics.preview import joined
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.messages import reading, writing
+from climber_uk.messages import reading, reading_reference, writing
 
 pytestmark = pytest.mark.nodes
 
@@ -34,7 +35,7 @@ def test_the_reference_starts_at_the_stamp_of_the_first_odometry(world):
     world.wait(lambda: len(references) > 5, "previews")
     world.wait(lambda: paths, "path")
     begin = reading.nanoseconds(references[0].header.stamp)
-    whole = joined(reading.preview(message, "odom") for message in references)
+    whole = joined(reading_reference.preview(message, "odom") for message in references)
     trajectory = Trajectory(Circle(), RestToRest(ramp_time=0.5))
     for time in whole.times:
         expected = trajectory.at((time - begin) * 1e-9)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.contact import Contact, Suction
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.hold import Suction
 from climber_uk.simulation.inputs import FellOff
 from climber_uk.simulation.machine import Machine, Parts, Physics, Push
 from climber_uk.simulation.motors import Motors
@@ -85,7 +86,7 @@ def test_changed_parts_are_taken_up():
     one = machine()
     plant = one.parts.plant
     weak = replace(plant, climber=replace(plant.climber, suction_pressure=2000.0))
-    one.take(replace(one.parts, plant=weak))
+    one.take(one.parts._replace(plant=weak))
     run(one, 0.1)
     assert one.pressure == 2000.0
     assert one.state.velocity[1] < 0

@@ -8,16 +8,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from climber_uk.mechanics.climber import Climber, State, no_slip
-from climber_uk.mechanics.contact import (
-    ADHESION,
-    LOCOMOTION,
-    Contact,
-    Grip,
-    Magnetic,
-    Tracked,
-    Wheeled,
-)
+from climber_uk.mechanics.contact import LOCOMOTION, Contact, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION, Coulomb, LuGre, Stribeck, Viscous
+from climber_uk.mechanics.hold import ADHESION, Grip, Magnetic
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -181,7 +174,7 @@ def test_viscous_friction_lets_it_slide_at_its_terminal_speed(slip):
 def test_friction_too_stiff_for_its_step_is_followed_all_the_same(law):
     drive = 2 * PAPER.seal_friction
     torques = PAPER.wheel_torques(drive + 49.05, 0.0)
-    end = Plant(PAPER, 0.0025, Contact(law)).advance(UPRIGHT, torques, steps=40)
+    end = Plant(PAPER, 0.0025, Contact(friction=law)).advance(UPRIGHT, torques, steps=40)
     assert law.level(PAPER.seal_friction, float(end.forward_speed)) == pytest.approx(drive)
 
 
@@ -245,7 +238,7 @@ def test_a_tilted_plane_pulls_along_x():
 )
 def test_it_stays_where_it_is_with_whatever_sticks(friction, options):
     contact = Contact(
-        friction,
+        friction=friction,
         locomotion=Tracked() if options.get("tracks") else Wheeled(),
         grip=Grip(seal_radius=options.get("radius", 0.0)),
     )
@@ -259,7 +252,7 @@ def test_it_stays_where_it_is_with_whatever_sticks(friction, options):
 @pytest.mark.parametrize(("heading", "slip"), [(0.3, False), (0.3, True), (np.pi / 2, False)])
 def test_lugre_gives_way_a_little_and_then_does_not_drift(heading, slip):
     law, start = LuGre(), State(np.array([0.0, 6.0, heading]), np.zeros(3))
-    plant = Plant(PAPER, 0.0025, Contact(law), slip=slip)
+    plant = Plant(PAPER, 0.0025, Contact(friction=law), slip=slip)
     settled = plant.advance(start, np.zeros(2), steps=4000)  # 10 s
     bent = np.hypot(*(settled.pose - start.pose)[:2])
     # the weight is let go at once: it swings to at most twice where the spring holds it, but near
@@ -281,9 +274,9 @@ def driven(state, random, climber, demand):
 FINE = 0.00125  # [s]: where friction turns round, the rule below is of second order only
 BALANCES = {
     "coulomb": Plant(PAPER, FINE),
-    "viscous": Plant(PAPER, FINE, Contact(Viscous())),
-    "stribeck": Plant(PAPER, FINE, Contact(Stribeck(viscous=0.3))),
-    "lugre": Plant(PAPER, 0.0025, Contact(LuGre(viscous=0.3))),
+    "viscous": Plant(PAPER, FINE, Contact(friction=Viscous())),
+    "stribeck": Plant(PAPER, FINE, Contact(friction=Stribeck(viscous=0.3))),
+    "lugre": Plant(PAPER, 0.0025, Contact(friction=LuGre(viscous=0.3))),
     "ring": Plant(PAPER, FINE, Contact(grip=Grip(seal_radius=0.12))),
     "pipe": Plant(replace(PAPER, inclination=30.0), FINE, wall=Cylinder(5.0)),
     "tilted": Plant(PAPER, FINE, wall=Plane(tilt=30.0)),
@@ -375,7 +368,12 @@ def test_whatever_it_is_given_its_numbers_stay_finite_or_it_says_why_not(
     mass, pressure, inclination, law, adhesion, locomotion, wall, grip, slip, torques, speeds
 ):
     climber = Climber(mass=mass, suction_pressure=pressure, inclination=inclination)
-    contact = Contact(FRICTION[law](), ADHESION[adhesion](), LOCOMOTION[locomotion](), grip)
+    contact = Contact(
+        adhesion=ADHESION[adhesion](),
+        grip=grip,
+        friction=FRICTION[law](),
+        locomotion=LOCOMOTION[locomotion](),
+    )
     plant = Plant(climber, 0.005, contact, WALLS[wall](), slip)
     state = State.rolling(np.zeros(3), *speeds)
     with suppress(FellOff, NotFinite):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.contact import Contact, NoAdhesion
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.hold import NoAdhesion
 from climber_uk.simulation.machine import Machine, Parts, Physics
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.contact import Contact, Grip, Magnetic, NoAdhesion, Tracked, Wheeled
+from climber_uk.mechanics.contact import Contact, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION
+from climber_uk.mechanics.hold import Grip, Magnetic, NoAdhesion
 from climber_uk.mechanics.wall import Plane
 from climber_uk.simulation.body import Body
 from climber_uk.simulation.inputs import NO_PUSH, Given, PlantState
@@ -84,7 +85,7 @@ def test_a_climber_without_traction_slides_down_sideways_and_a_dry_one_does_not(
 def test_a_part_of_a_step_takes_no_more_energy_than_the_motors_give(seed, law, radius, locomotion):
     random = np.random.default_rng(seed)
     grip = Grip(random.uniform(0, 1), seal_radius=radius)
-    contact = Contact(FRICTION[law](), locomotion=locomotion, grip=grip)
+    contact = Contact(friction=FRICTION[law](), locomotion=locomotion, grip=grip)
     sliding = Sliding(Body(PAPER, contact, Plane(), 0.0025), slip=True)
     y = np.concatenate([random.normal(size=6), np.zeros(3)])
     slip, torques, h = random.normal(size=2) * 3, random.normal(size=2), 0.0025

@@ -9,7 +9,7 @@ from typing import Any
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.settings import KINDS as CONTROLLER_KINDS
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import ADHESION, Alarm, Grip
+from climber_uk.mechanics.hold import ADHESION, Alarm, Grip
 from climber_uk.mechanics.plan import KINDS as PLAN_KINDS
 from climber_uk.simulation.machine import VARIANTS, Physics
 from climber_uk.simulation.motors import Motors

@@ -19,7 +19,8 @@ from climber_uk.analysis.closed_loops import Change, Course, Loops
 from climber_uk.analysis.parameter_file import Values
 from climber_uk.control.settings import settings
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import Contact, Grip
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.hold import Grip
 from climber_uk.mechanics.motion import Motion
 from climber_uk.mechanics.plan import planned
 from climber_uk.simulation.machine import Physics

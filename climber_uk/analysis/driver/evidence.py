@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 
 if TYPE_CHECKING:

@@ -13,9 +13,8 @@ import numpy as np
 
 from climber_uk.analysis.driver import thresholds
 from climber_uk.analysis.driver.evidence import Evidence, Motion, Trial
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.preview import SECOND
 
 PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])  # wheels (right, left) of drive and turn
 COARSE = 20  # delays that are tried, and again so many around the best

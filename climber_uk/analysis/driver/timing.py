@@ -5,7 +5,7 @@ import numpy as np
 from climber_uk.analysis.driver import thresholds
 from climber_uk.analysis.driver.evidence import Evidence
 from climber_uk.analysis.driver.report import Finding, failed, graded, passed, warned
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND
 
 
 def rate(seen: Evidence) -> Finding:

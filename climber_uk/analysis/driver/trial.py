@@ -9,11 +9,10 @@ from climber_uk.analysis.driver import evidence, thresholds
 from climber_uk.analysis.driver.evidence import Arrival, Command, motion_of
 from climber_uk.analysis.driver.pulses import PUSHED_BY, Pulse, Silence, Stage
 from climber_uk.analysis.driver.response import expected_gain, respond
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State, along
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.preview import SECOND
 from climber_uk.messages import reading
 
 RECENT = 20  # messages that tell whether it stands

@@ -3,8 +3,7 @@
 import numpy as np
 
 from climber_uk.analysis.metrics.metric import NAN, Case, Metric, deviation, largest, percentile
-from climber_uk.mechanics import Array
-from climber_uk.mechanics.preview import SECOND
+from climber_uk.mechanics import SECOND, Array
 
 GAP = 1.5  # periods between two stamps from which on a message is missing
 

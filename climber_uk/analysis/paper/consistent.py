@@ -20,9 +20,10 @@ import numpy as np
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import Climber, State, across, along, no_slip
 from climber_uk.mechanics.paper import PAPER_CLIMBER
+from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
-from climber_uk.mechanics.trajectory import Reference, Trajectory
+from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.udwadia_kalaba import (
     constrained_acceleration,
     constraint_force,
