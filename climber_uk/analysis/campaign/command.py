@@ -7,23 +7,26 @@ import argparse
 import os
 import sys
 from concurrent.futures import BrokenExecutor, CancelledError
+from importlib.util import find_spec
 from pathlib import Path
 
-from climber_uk.analysis.campaign import running
 from climber_uk.analysis.campaign.campaign import Campaign, read
-from climber_uk.analysis.campaign.parts import Store
-from climber_uk.analysis.campaign.rerun import rerun
+
+EXTRA = ["pyarrow", "matplotlib", "tqdm"]  # packages that no node needs
 
 
 def main() -> None:
     """Run what is missing of a campaign and tell what came out, or run one run again."""
     options = _options()
+    _check_installed(EXTRA + ["distributed"] * bool(options.scheduler))
     output = options.output or Path("campaign_output") / options.file.stem
     try:
         campaign = read(options.file, options.runs)
         if options.rerun is None:
             _run(campaign, options, output)
         else:
+            from climber_uk.analysis.campaign.rerun import rerun
+
             sys.exit(rerun(campaign, options.rerun, options.output or Path(f"run_{options.rerun}")))
     except KeyboardInterrupt:
         sys.exit(f"\ncampaign: interrupted; what was finished is kept in {output}")
@@ -57,9 +60,19 @@ def _number(text: str) -> int:
     return int(text)
 
 
+def _check_installed(packages: list[str]) -> None:
+    missing = " ".join(name for name in packages if find_spec(name) is None)
+    if missing:
+        print(f"campaign: not installed: {missing} (pip install {missing})", file=sys.stderr)
+        sys.exit(2)
+
+
 def _run(campaign: Campaign, options: argparse.Namespace, output: Path) -> None:
+    from climber_uk.analysis.campaign import running
+    from climber_uk.analysis.campaign.parts import Store
+
     store = Store(output, campaign)
-    if store.missing:
+    if any(store.missing):
         jobs = options.jobs or len(os.sched_getaffinity(0))
         workers = (
             running.cluster(options.scheduler) if options.scheduler else running.processes(jobs)

@@ -7,6 +7,7 @@ A file is there once it is whole: whoever is killed goes on with the parts that 
 """
 
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,11 +31,6 @@ class Part:
     runs: int
 
 
-def parts(runs: int) -> list[Part]:
-    """All parts of a campaign."""
-    return [Part(first // PART, first, min(PART, runs - first)) for first in range(0, runs, PART)]
-
-
 def computed(campaign: Campaign, first: int, runs: int) -> pa.Table:
     """One row for each run: number, what was drawn for it, metrics, verdict."""
     own = campaign.columns(first, runs)
@@ -55,7 +51,7 @@ class Store:
 
     def __init__(self, directory: Path, campaign: Campaign) -> None:
         self.directory = directory / "runs"
-        self.parts = parts(campaign.size.runs)
+        self.runs = campaign.size.runs
         about, now = directory / "campaign.json", {**campaign.described(), "part": str(PART)}
         if about.exists():
             _check_same(directory, json.loads(about.read_text(encoding="utf-8")), now)
@@ -63,31 +59,37 @@ class Store:
         _write(about, json.dumps(now, indent=1).encode())
 
     @property
-    def missing(self) -> list[Part]:
+    def parts(self) -> Iterator[Part]:
+        """All of them."""
+        for first in range(0, self.runs, PART):
+            yield Part(first // PART, first, min(PART, self.runs - first))
+
+    @property
+    def missing(self) -> Iterator[Part]:
         """Parts that are still to be computed."""
-        return [part for part in self.parts if not self._path(part).exists()]
+        return (part for part in self.parts if not self._path(part.number).exists())
 
     def keep(self, part: Part, table: pa.Table) -> None:
         """Write a part."""
         sink = pa.BufferOutputStream()
         parquet.write_table(table, sink)
-        _write(self._path(part), sink.getvalue())
+        _write(self._path(part.number), sink.getvalue())
 
-    def column(self, name: str) -> Array:
-        """What all runs have of one thing, (runs,): a column at a time is not too much to hold."""
-        tables = (parquet.read_table(self._path(part), columns=[name]) for part in self.parts)
-        return np.concatenate([table[name].to_numpy() for table in tables])
+    def batches(self, names: Sequence[str]) -> Iterator[dict[str, Array]]:
+        """Columns (n,) of these names, a part at a time: all runs may be too much to hold."""
+        for part in self.parts:
+            file = parquet.ParquetFile(self._path(part.number))
+            table = file.read([*dict.fromkeys(names)], use_threads=False)
+            yield {name: table[name].to_numpy() for name in table.column_names}
 
     def row(self, run: int) -> dict[str, object]:
         """All that is known of one run."""
-        part = self.parts[run // PART]
-        row: dict[str, object] = (
-            parquet.read_table(self._path(part)).slice(run - part.first, 1).to_pylist()[0]
-        )
+        table = parquet.ParquetFile(self._path(run // PART)).read()
+        row: dict[str, object] = table.slice(run % PART, 1).to_pylist()[0]
         return row
 
-    def _path(self, part: Part) -> Path:
-        return self.directory / f"part-{part.number:05}.parquet"
+    def _path(self, number: int) -> Path:
+        return self.directory / f"part-{number:05}.parquet"
 
 
 def _check_same(directory: Path, before: dict[str, str], now: dict[str, str]) -> None:

@@ -28,20 +28,20 @@ Workers = tuple[Executor, int]  # and how many parts they may have in hand at a 
 
 def run_missing(campaign: Campaign, store: Store, workers: Workers) -> None:
     """Keep each part as it is finished, and tell the time that is left."""
-    missing, total = store.missing, campaign.size.runs
-    done = total - sum(part.runs for part in missing)
+    total = campaign.size.runs
+    done = total - sum(part.runs for part in store.missing)
     with tqdm(total=total, initial=done, unit=" runs", file=sys.stderr) as progress:
-        for part, table in _finished(campaign, missing, workers):
+        for part, table in _finished(campaign, store.missing, workers):
             store.keep(part, table)
             progress.update(part.runs)
 
 
 def _finished(
-    campaign: Campaign, missing: list[Part], workers: Workers
+    campaign: Campaign, waiting: Iterator[Part], workers: Workers
 ) -> Iterator[tuple[Part, pa.Table]]:
     """Parts in the order in which they are finished; no more are in hand than workers can take."""
     executor, at_once = workers
-    waiting, in_hand = iter(missing), dict[Future[pa.Table], Part]()
+    in_hand = dict[Future[pa.Table], Part]()
     while True:
         for part in islice(waiting, at_once - len(in_hand)):
             in_hand[executor.submit(computed, campaign, part.first, part.runs)] = part
@@ -79,10 +79,8 @@ def _end_with_parent() -> None:
 @contextmanager
 def cluster(address: str) -> Iterator[Workers]:
     """Workers of the Dask scheduler at `address`, which computes again what a lost one had."""
-    try:
-        from distributed import Client, KilledWorker
-    except ImportError:
-        raise ValueError("--scheduler needs Dask: pip install distributed") from None
+    from distributed import Client, KilledWorker
+
     # pure tasks would be recognised by a hash of the campaign, which nobody needs
     with Client(address) as client, client.get_executor(pure=False) as executor:
         try:

@@ -51,7 +51,11 @@ def many(monkeypatch, campaign):
 
 
 def rows(store):
-    return [store.row(run) for run in range(store.parts[-1].first + store.parts[-1].runs)]
+    return [store.row(run) for run in range(store.runs)]
+
+
+def column(store, name):
+    return np.concatenate([batch[name] for batch in store.batches([name])])
 
 
 def whole_of(campaign):
@@ -64,7 +68,7 @@ def test_processes_give_every_run_once_and_the_same(many, tmp_path):
     with running.processes(2) as workers:
         running.run_missing(many, store, workers)
     assert rows(store) == whole_of(many)
-    np.testing.assert_array_equal(store.column("run"), np.arange(100))
+    np.testing.assert_array_equal(column(store, "run"), np.arange(100))
 
 
 class Here:
@@ -82,10 +86,23 @@ class Here:
 
 def test_what_is_there_is_not_computed_again(many, tmp_path):
     store = Store(tmp_path / "out", many)
-    store.keep(store.parts[3], computed(many, 30, 10))
+    store.keep([*store.parts][3], computed(many, 30, 10))
     here = Here()
     running.run_missing(many, Store(tmp_path / "out", many), (here, 2))
     assert here.firsts == [0, 10, 20, 40, 50, 60, 70, 80, 90]
+    assert rows(store) == whole_of(many)
+
+
+def test_no_more_is_in_hand_than_workers_can_take(many, tmp_path):
+    store, in_hand = Store(tmp_path / "out", many), []
+
+    class Counting(Here):
+        def submit(self, *task):
+            in_hand.append(1 + len(self.firsts) - len([*store.directory.glob("*.parquet")]))
+            return super().submit(*task)
+
+    running.run_missing(many, store, (Counting(), 3))
+    assert max(in_hand) == 3
     assert rows(store) == whole_of(many)
 
 
@@ -122,16 +139,16 @@ def test_a_killed_campaign_goes_on_and_leaves_no_process(campaign_file, tmp_path
     wait(lambda: not any(is_running(int(child)) for child in children))
     campaign = read(file)
     store = Store(output, campaign)
-    assert 0 < len(store.missing) < 20
+    assert 0 < len([*store.missing]) < 20
 
     running.run_missing(campaign, store, (Here(), 2))
     for part in (0, 7, 19):
         first = part * parts.PART
         expected = computed(campaign, first, 5).to_pylist()
         assert [store.row(first + k) for k in range(5)] == expected
-    np.testing.assert_array_equal(store.column("run"), np.arange(20 * parts.PART))
+    np.testing.assert_array_equal(column(store, "run"), np.arange(20 * parts.PART))
     masses = campaign.columns(0, campaign.size.runs)[PLANT + "mass"]
-    np.testing.assert_array_equal(store.column(PLANT + "mass"), masses)
+    np.testing.assert_array_equal(column(store, PLANT + "mass"), masses)
 
 
 def is_running(pid):
@@ -184,4 +201,18 @@ def test_what_cannot_be_run_is_said_in_one_line(campaign_file, tmp_path):
     told = subprocess.run([COMMAND, file], capture_output=True, text=True, cwd=tmp_path)
     assert told.returncode == 1
     assert told.stderr == f"campaign: {file}: seed=-1 must be >= 0\n"
+    assert not (tmp_path / "campaign_output").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("package", ["pyarrow", "matplotlib", "tqdm", "distributed"])
+def test_a_package_that_is_not_there_is_named_before_anything_runs(
+    campaign_file, tmp_path, package
+):
+    without = f"import sys; sys.modules[{package!r}] = None"
+    code = f"{without}; from climber_uk.analysis.campaign.command import main; main()"
+    command = [sys.executable, "-c", code, campaign_file(), "--scheduler", "tcp://nowhere"]
+    told = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert told.returncode == 2
+    assert told.stderr == f"campaign: not installed: {package} (pip install {package})\n"
     assert not (tmp_path / "campaign_output").exists()
