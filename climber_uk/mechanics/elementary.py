@@ -25,7 +25,7 @@ arctan = _either(math.atan, np.arctan)
 tanh = _either(math.tanh, np.tanh)
 sqrt = _either(math.sqrt, np.sqrt)
 exp = _either(math.exp, np.exp)
-sign = _either(lambda x: float((x > 0) - (x < 0)), np.sign)
+sign = _either(lambda x: math.copysign(1.0, x) if x else 0.0, np.sign)
 
 
 def with_sign_of(size: Any, of: Any) -> Any:
@@ -36,7 +36,9 @@ def with_sign_of(size: Any, of: Any) -> Any:
 def wrapped(angle: Any) -> Any:
     """The same angle in [-π, π)."""
     if isinstance(angle, float):
-        return (angle + math.pi) % TURN - math.pi
+        return angle if -3.0 < angle < 3.0 else (angle + math.pi) % TURN - math.pi
+    if np.abs(angle).max(initial=0.0) < 3.0:
+        return angle
     return angle - TURN * np.floor(angle / TURN + 0.5)  # numpy's remainder takes ten times as long
 
 
@@ -62,6 +64,13 @@ def everywhere(condition: Any) -> Any:
     return condition if condition is True or condition is False else bool(np.all(condition))
 
 
+def either(condition: Any, these: tuple[Any, Any], those: tuple[Any, Any]) -> tuple[Any, Any]:
+    """`select` of two at once."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, these[0], those[0]), np.where(condition, these[1], those[1])
+    return these if condition else those
+
+
 SMALL = 0.03  # [rad] of an angle whose sine and cosine are a few terms of their series
 
 
@@ -85,3 +94,14 @@ def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any,
     if small.all():
         return end, c, s
     return end, np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))
+
+
+def swept(
+    heading: Any, cosine: Any, sine: Any, halfway: Any, angle: Any
+) -> tuple[Any, Any, Any, Any, Any]:
+    """Cosine and sine after a turn by `halfway`; heading, cosine and sine after one by `angle`."""
+    end = heading + angle
+    if isinstance(end, float):
+        middle = heading + halfway
+        return math.cos(middle), math.sin(middle), end, math.cos(end), math.sin(end)
+    return *rotated(heading, cosine, sine, halfway)[1:], *rotated(heading, cosine, sine, angle)
