@@ -61,7 +61,7 @@ def select(condition: Any, this: Any, that: Any) -> Any:
 
 def everywhere(condition: Any) -> Any:
     """Whether `condition` holds for the one, or for all of many."""
-    return condition if condition is True or condition is False else bool(np.all(condition))
+    return condition if condition is True or condition is False else bool(condition.all())
 
 
 def either(condition: Any, these: tuple[Any, Any], those: tuple[Any, Any]) -> tuple[Any, Any]:
@@ -75,25 +75,11 @@ SMALL = 0.03  # [rad] of an angle whose sine and cosine are a few terms of their
 
 
 def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
-    """Heading, cosine and sine after a turn by `angle` [rad].
-
-    Of many small angles the series takes half as long as numpy's cosine and sine; what it leaves
-    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
-    Each gets the same whatever the others are.
-    """
+    """Heading, cosine and sine after a turn by `angle` [rad]."""
     end = heading + angle
     if isinstance(end, float):
         return end, math.cos(end), math.sin(end)
-    square = angle * angle
-    small = np.less(square, SMALL * SMALL)
-    if not small.any():
-        return end, np.cos(end), np.sin(end)
-    c = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720)))
-    s = angle * (1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040))))
-    c, s = c * cosine - s * sine, s * cosine + c * sine
-    if small.all():
-        return end, c, s
-    return end, np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))
+    return end, *_turned(heading, cosine, sine, angle)
 
 
 def swept(
@@ -104,4 +90,29 @@ def swept(
     if isinstance(end, float):
         middle = heading + halfway
         return math.cos(middle), math.sin(middle), end, math.cos(end), math.sin(end)
-    return *rotated(heading, cosine, sine, halfway)[1:], *rotated(heading, cosine, sine, angle)
+    turned = _turned(heading, cosine, sine, angle)
+    return *_turned(heading, cosine, sine, halfway), end, *turned
+
+
+def _turned(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[Array, Array]:
+    """Cosine and sine of many after a turn.
+
+    Of small angles the series takes half as long as numpy's cosine and sine; what it leaves
+    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
+    Each gets the same whatever the others are.
+    """
+    square = angle * angle
+    largest = square.max(initial=0.0)
+    if largest < SMALL * SMALL:
+        return _by_series(cosine, sine, angle, square)
+    end, small = heading + angle, square < SMALL * SMALL
+    if not small.any():
+        return np.cos(end), np.sin(end)
+    c, s = _by_series(cosine, sine, angle, square)
+    return np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))
+
+
+def _by_series(cosine: Array, sine: Array, angle: Array, square: Array) -> tuple[Array, Array]:
+    c = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720)))
+    s = angle * (1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040))))
+    return c * cosine - s * sine, s * cosine + c * sine
