@@ -29,8 +29,10 @@ sign = _either(lambda x: math.copysign(1.0, x) if x else 0.0, np.sign)
 
 
 def with_sign_of(size: Any, of: Any) -> Any:
-    """`size` (>= 0) with the sign of `of`."""
-    return math.copysign(size, of) if isinstance(of, float) else np.copysign(size, of)
+    """`size` (>= 0) with the sign of `of`; of many that are all positive, as it is."""
+    if isinstance(of, float):
+        return math.copysign(size, of)
+    return size if of.min(initial=np.inf) > 0 else np.copysign(size, of)
 
 
 def wrapped(angle: Any) -> Any:
@@ -113,6 +115,18 @@ def _turned(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[A
 
 
 def _by_series(cosine: Array, sine: Array, angle: Array, square: Array) -> tuple[Array, Array]:
-    c = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720)))
-    s = angle * (1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040))))
+    c = _polynomial(square, 1.0, -1 / 2, 1 / 24, -1 / 720)
+    s = _polynomial(square, 1.0, -1 / 6, 1 / 120, -1 / 5040)
+    s *= angle
     return c * cosine - s * sine, s * cosine + c * sine
+
+
+def _polynomial(x: Array, *coefficients: float) -> Array:
+    """c₀ + c₁ x + … + cₙ xⁿ, in place: numpy would ask for memory at every sum."""
+    *others, last = coefficients
+    value = last * x
+    for coefficient in others[:0:-1]:
+        value += coefficient
+        value *= x
+    value += others[0]
+    return value
