@@ -20,7 +20,7 @@ from climber_uk.mechanics.elementary import (
     swept,
     with_sign_of,
 )
-from climber_uk.mechanics.many import amended
+from climber_uk.mechanics.many import amended, keep_what_is_freed
 from climber_uk.mechanics.motion import Motion, Wrench
 
 ITERATIONS = 5  # of Newton's method to an instant within a step; each squares what is left
@@ -62,6 +62,7 @@ def advanced(body: Plain, motion: Motion, wrench: Wrench, time: float) -> Motion
 
 def advanced_often(body: Plain, motion: Motion, wrench: Wrench, time: float, steps: int) -> Motion:
     """Motion after `steps` such steps."""
+    keep_what_is_freed()
     pushed = body.under(wrench)
     for _ in range(steps):
         motion = stepped(pushed, motion, time)
