@@ -33,7 +33,7 @@ from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.plain import Plain, advanced_often
 from climber_uk.simulation.sensors import Sensors
 
-BLOCK = 8192  # loops that are gone through together; by measurement
+BLOCK = 16384  # loops that are gone through together; by measurement
 CHUNK = 64  # periods for which noise and targets are made together
 
 
