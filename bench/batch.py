@@ -16,13 +16,13 @@ import numpy as np
 from limit import Limit, climber_numbers, controller_numbers
 from side_by_side import in_turns, rate, table, timed
 
-from climber_uk.analysis import closed_loops
 from climber_uk.analysis.closed_loop import sampled
 from climber_uk.analysis.closed_loops import Course, Loops
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.many import keep_what_is_freed
 from climber_uk.mechanics.motion import Motion, Wrench
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
@@ -95,7 +95,7 @@ def many_loops(number: int) -> Loops:
 def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, Way]:
     """Ways to run closed loops; start-up is not counted."""
     loops, preview = many_loops(CLOSED), sampled(ELLIPSE, 1.0)
-    closed_loops.keep_what_is_freed()
+    keep_what_is_freed()
 
     def ours(compiled: bool) -> Callable[[], float]:
         def by_tick() -> float:

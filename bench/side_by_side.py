@@ -30,9 +30,13 @@ def timed(
     return run
 
 
-def in_turns(ways: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Array]:
-    """Times (rounds,) that each way gives, after one round that does not count."""
-    times = [[run() for run in ways.values()] for _ in range(rounds + 1)]
+def in_turns(
+    ways: Mapping[str, Callable[[], float]], rounds: int, warm: int = 0
+) -> dict[str, Array]:
+    """Times (rounds,) that each way gives, after one round, and `warm` runs, that do not count."""
+    times = [
+        [[run() for _ in range(warm + 1)][-1] for run in ways.values()] for _ in range(rounds + 1)
+    ]
     return dict(zip(ways, np.array(times[1:]).T, strict=True))
 
 

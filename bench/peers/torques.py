@@ -11,7 +11,7 @@ from limit import Limit
 from peers.mujoco_climber import WithMuJoCo
 from peers.pinocchio_climber import WithPinocchio, WithPinocchioMatrices
 from side_by_side import in_turns, table, timed
-from tick import PERIOD, TICKS, WithMatrices, bare, ticks, ways
+from tick import PERIOD, TICKS, WARM, WithMatrices, bare, ticks, ways
 
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.controller import Controller, Law, Situation
@@ -86,7 +86,7 @@ def compare(rounds: int) -> None:
         alone = {
             name: timed(bare(law)) for name, law in laws(constraints, Law(predict=False)).items()
         }
-        table(f"one torque, {constraints}", in_turns(alone, rounds), "µs", per_tick)
+        table(f"one torque, {constraints}", in_turns(alone, rounds, WARM), "µs", per_tick)
         trackers = {
             name: Tracker(law, Observer(), Timing(), Pacing())
             for name, law in laws(constraints, Law()).items()
@@ -95,4 +95,4 @@ def compare(rounds: int) -> None:
         if constraints == "guidance":
             ours = next(iter(trackers.values()))
             whole["C through cffi, preview not counted"] = timed(in_c(limit, ours))
-        table(f"a controller's tick, {constraints}", in_turns(whole, rounds), "µs", per_tick)
+        table(f"a controller's tick, {constraints}", in_turns(whole, rounds, WARM), "µs", per_tick)

@@ -26,14 +26,14 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Wheeled
 from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
-from climber_uk.mechanics.many import chosen, part
+from climber_uk.mechanics.many import chosen, keep_what_is_freed, part
 from climber_uk.mechanics.motion import Motion, Target, Torques, Wrench, forces, torque_bounds
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.plain import Plain, advanced_often
 from climber_uk.simulation.sensors import Sensors
 
-BLOCK = 8192  # loops that are gone through together; by measurement
+BLOCK = 16384  # loops that are gone through together; by measurement
 CHUNK = 64  # periods for which noise and targets are made together
 
 
@@ -156,15 +156,6 @@ class Loops:
                 if np.any(now):
                     climber = chosen(now, change.climber, climber)
             yield climber
-
-
-def keep_what_is_freed() -> None:
-    """Let glibc keep memory that a step frees for the next one, which halves its time.
-
-    It gives back to the system whatever is freed at the end of its heap, but for twice as much as
-    the largest block that was freed so far: one of 16 MB will do.
-    """
-    np.empty(2 << 20)
 
 
 def _targets(course: Course, ticks: int) -> Iterator[Target]:

@@ -40,7 +40,7 @@ class Tally:
         self.slip, self.tip = np.full(number, AMPLE), np.full(number, AMPLE)
         self.fell = np.full(number, np.inf)
         self._climber: Climber | None = None
-        self._on_wall: Any = 1.0  # 0 for those that fell
+        self._on_wall: Any = True  # or, once one fell, whether each did not
 
     def add(
         self,
@@ -55,20 +55,20 @@ class Tally:
         if climber is not self._climber:
             self._hold(time, climber)
         x, y = motion.x - target.x, motion.y - target.y
-        square = (x * x + y * y) * self._on_wall
-        self.times += self._on_wall
-        self.squares += square
-        np.maximum(self.worst, square, out=self.worst)
-        self.last = np.where(self._on_wall, square, self.last)
-        self.late[square > NEAR * NEAR] = time
+        square, on = x * x + y * y, self._on_wall
+        np.add(self.times, 1, out=self.times, where=on)
+        np.add(self.squares, square, out=self.squares, where=on)
+        np.maximum(self.worst, square, out=self.worst, where=on)
+        np.copyto(self.last, square, where=on)
+        np.copyto(self.late, time, where=(square > NEAR * NEAR) & on)
         cut = (np.abs(command.lost.drive) > CUT) | (np.abs(command.lost.turn) > CUT)
-        self.cuts += cut * self._on_wall
+        np.add(self.cuts, cut, out=self.cuts, where=on)
         for torque in wheels:
-            np.maximum(self.peak, np.abs(torque) * self._on_wall, out=self.peak)
+            np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
         lateral = climber.mass * motion.speed * motion.yaw_rate
         lateral = lateral + climber.weight_along_wall * motion.cosine
         margin = self.contact.slip_margin(climber, self._into, forces(climber, *wheels)[0], lateral)
-        self.slip = np.where(self._on_wall, np.minimum(self.slip, margin), self.slip)
+        np.minimum(self.slip, margin, out=self.slip, where=on)
 
     def _hold(self, time: float, climber: Climber) -> None:
         """Tell who falls off, now that the climbers are these."""
@@ -81,7 +81,7 @@ class Tally:
         self.tip = np.minimum(self.tip, tip)
         self.fell = np.minimum(self.fell, np.where(falls, time, np.inf))
         if np.isfinite(self.fell).any():
-            self._on_wall = np.where(np.isfinite(self.fell), 0.0, 1.0)
+            self._on_wall = np.isinf(self.fell)
 
     def outcome(self) -> Outcome:
         """All of it."""

@@ -1,7 +1,6 @@
 """Which torques act when: those that were sent, from when each reaches the wheels."""
 
 from collections import deque
-from collections.abc import Iterator
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.motion import Torques
@@ -14,11 +13,7 @@ class Acting:
 
     def __init__(self) -> None:
         self._begun: deque[tuple[int, Torques]] = deque()  # [ns] from when, torques
-
-    @property
-    def last(self) -> Torques:
-        """The torques that will act in the end."""
-        return self._begun[-1][1] if self._begun else NONE
+        self.last = NONE  # the torques that will act in the end
 
     def begin(self, wanted: int) -> int:
         """When torques would begin to act [ns]: as wanted, but none overtakes the last ones."""
@@ -27,6 +22,7 @@ class Acting:
     def add(self, begins: int, torques: Torques) -> None:
         """Torques that act from `begins` [ns] on."""
         self._begun.append((begins, torques))
+        self.last = torques
 
     def correct(self, torques: Torques) -> None:
         """Have other torques acting in the place of the last ones."""
@@ -47,15 +43,16 @@ class Acting:
         """Whether it is known what acts from `time` [ns] on."""
         return bool(self._begun) and self._begun[0][0] <= time
 
-    def between(self, start: int, end: int) -> Iterator[tuple[Torques, float]]:
+    def between(self, start: int, end: int) -> list[tuple[Torques, float]]:
         """Torques that act from `start` to `end` [ns], each with how long it does [s]."""
-        torques = NONE
+        torques, spans = NONE, []
         for begins, following in self._begun:
             if begins >= end:
                 break
             if begins > start:
-                yield torques, (begins - start) / SECOND
+                spans.append((torques, (begins - start) / SECOND))
                 start = begins
             torques = following
         if end > start:
-            yield torques, (end - start) / SECOND
+            spans.append((torques, (end - start) / SECOND))
+        return spans

@@ -53,7 +53,7 @@ def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Arr
     return along(heading, offset), across(heading, offset), wrapped(unpack(offset)[2])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Guidance:
     """Speed and heading that lead back to the reference; never singular, and so good at rest.
 
@@ -86,7 +86,7 @@ class Guidance:
     demand = guided
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Exact:
     """The path itself: p̈ = u = p̈_d + K_d (ṗ_d - ṗ) + K_p (p_d - p), and what it hides.
 

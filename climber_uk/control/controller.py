@@ -6,7 +6,10 @@ torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.model import rolled
@@ -22,12 +25,15 @@ from climber_uk.mechanics.motion import (
     Wrench,
     forces,
     limited,
+    named,
     torque_bounds,
 )
 from climber_uk.mechanics.parameter import check, parameter
 
+NOTHING = Wrench(0.0, 0.0)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Law:
     """How the torques are computed; see `Controller`."""
 
@@ -46,7 +52,7 @@ class Law:
 
     def lookahead(self, period: float) -> float:
         """From the begin of a torque's action of `period` [s] to the time it is computed for."""
-        return period / 2 if self.predict else 0.0
+        return 0.5 * period if self.predict else 0.0
 
 
 class Situation(NamedTuple):
@@ -64,7 +70,7 @@ class Command(NamedTuple):
     wheels: Torques  # within the limits
     demanded: Wrench
     lateral: Any  # [N] reaction of the wheels
-    lost: Wrench  # what the limits took away
+    lost: Wrench  # what the limits took away; of many, `NOTHING` if nothing from any of them
 
     @property
     def torques(self) -> Array:
@@ -79,7 +85,7 @@ class Command(NamedTuple):
     @property
     def missing(self) -> Array:
         """Drive [N] and turn [N m] that the limits took away, (..., 2)."""
-        return pack(*self.lost)
+        return np.broadcast_to(pack(*self.lost), self.torques.shape)
 
 
 @dataclass(frozen=True)
@@ -98,24 +104,27 @@ class Controller:
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.law.lookahead(period)
-        track, (right, left) = self.constraints.track(target), self._bounds(situation)
+        track, (right, left) = (
+            self.constraints.track(target),
+            self._fixed_bounds or self._bounds(situation),
+        )
         drive, turn = forces(climber, held.right, held.left)
         for _ in range(2 if ahead else 1):
             aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)
             wanted, turned, lateral = self.force(self.constraints.demand(track, aim), aim)
             wanted, turned = wanted - r_drive, turned - r_turn
             drive, turn, one, other = limited(climber, wanted, turned, right, left)
-        lost = Wrench(wanted - drive, turned - turn)
-        return Command(Torques(one, other), Wrench(wanted, turned), lateral, lost)
+        wheels, demanded = named(Torques, (one, other)), named(Wrench, (wanted, turned))
+        fits = drive is wanted and turn is turned
+        lost = NOTHING if fits else named(Wrench, (wanted - drive, turned - turn))
+        return named(Command, (wheels, demanded, lateral, lost))
 
     def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
         """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
-        climber, (v_1, turning, speed) = self.climber, demand
-        weight = climber.weight_along_wall
-        rubbing = climber.seal_friction * tanh(speed / self.law.friction_speed)
-        drive = climber.mass * v_1 + rubbing + weight * motion.sine
-        lateral = climber.mass * motion.speed * motion.yaw_rate + weight * motion.cosine
-        return drive, climber.yaw_inertia * turning, lateral
+        (v_1, turning, speed), (_, _, _, cosine, sine, v, omega) = demand, motion
+        mass, inertia, friction, weight = self.climber.inertial
+        drive = mass * v_1 + friction * tanh(speed / self.law.friction_speed) + weight * sine
+        return drive, inertia * turning, mass * v * omega + weight * cosine
 
     def holding(self, situation: Situation, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
@@ -124,6 +133,15 @@ class Controller:
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
         return Torques(*limited(climber, drive, turn, *self._bounds(situation))[2:])
+
+    @cached_property
+    def _fixed_bounds(self) -> tuple[Bounds, Bounds] | None:
+        """Those of `_bounds`, unless they depend on the situation."""
+        climber = self.climber
+        if not everywhere((climber.no_load_wheel_rate == 0) & (self.law.max_torque_rate == 0)):
+            return None
+        bounds = -climber.max_wheel_torque, climber.max_wheel_torque
+        return bounds, bounds
 
     def _bounds(self, situation: Situation) -> tuple[Bounds, Bounds]:
         right, left = torque_bounds(self.climber, situation.motion)

@@ -5,8 +5,8 @@ v = v_d - L tanh(k_x e_x / L),   ψ = θ - θ_d + atan(g e_y),   g = k_y v_d / �
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from climber_uk.mechanics.elementary import arctan, cos, select, sign, sin, sqrt, tanh, wrapped
-from climber_uk.mechanics.motion import Demand, Motion, Target
+from climber_uk.mechanics.elementary import arctan, cos, either, sign, sin, sqrt, tanh, wrapped
+from climber_uk.mechanics.motion import Demand, Motion, Target, named
 
 if TYPE_CHECKING:
     from climber_uk.control.constraints import Guidance
@@ -36,26 +36,19 @@ def on_track(gains: "Guidance", target: Target) -> Track:
     v, v_1 = v_x * cosine + v_y * sine, a_x * cosine + a_y * sine
     v_2 = j_x * cosine + j_y * sine + omega * omega * v
 
-    v_s, square = gains.fade_speed, v * v
-    root = sqrt(square + v_s * v_s)
-    slope = v_s * v_s / (root * root * root)  # of v/root, by v
-    curvature = -3 * v * slope / (root * root)
-    k_y, v_c = gains.cross_track_gain, gains.catch_up_speed
-    waiting = sqrt(square + v_s * v_s / 4)
-    return Track(
-        x,
-        y,
-        heading,
-        cosine,
-        sine,
-        v,
-        v_1,
-        omega,
-        omega_1,
-        (waiting, v * v_1 / waiting),
-        (v_s / 2 + v_c * abs(v) / root, v_c * sign(v) * slope * v_1),
-        (k_y * v / root, k_y * slope * v_1, k_y * (curvature * v_1 * v_1 + slope * v_2)),
-    )
+    v_s, k_y, v_c = gains.fade_speed, gains.cross_track_gain, gains.catch_up_speed
+    v_s2, v2 = v_s * v_s, v * v
+    root2 = v2 + v_s2
+    root = sqrt(root2)
+    share, slope = v / root, v_s2 / (root * root2)  # v/root, and its slope by v
+    share_1 = slope * v_1
+    share_2 = slope * v_2 - 3.0 * share_1 * v * v_1 / root2
+    wait = sqrt(v2 + 0.25 * v_s2)
+    waiting = wait, v * v_1 / wait
+    hurrying = 0.5 * v_s + v_c * abs(share), v_c * sign(v) * share_1
+    gain = k_y * share, k_y * share_1, k_y * share_2
+    numbers = x, y, heading, cosine, sine, v, v_1, omega, omega_1, waiting, hurrying, gain
+    return named(Track, numbers)
 
 
 def guided(gains: "Guidance", track: Track, motion: Motion) -> Demand:
@@ -72,28 +65,28 @@ def guided(gains: "Guidance", track: Track, motion: Motion) -> Demand:
     turning = omega - omega_d
     e_x1, e_y1 = v_x - v_d + omega_d * e_y, v_y - omega_d * e_x
 
-    is_ahead = e_x * v_d > 0
-    (wait, wait_1), (hurry, hurry_1) = waiting, hurrying
-    most, most_1 = select(is_ahead, wait, hurry), select(is_ahead, wait_1, hurry_1)
-    u = gains.along_track_gain * e_x / most
+    is_ahead = e_x * v_d > 0.0
+    most, most_1 = either(is_ahead, waiting, hurrying)
+    k_x = gains.along_track_gain
+    u = k_x * e_x / most
     part = tanh(u)
-    inside = 1 - part * part
+    inside = 1.0 - part * part
     wanted = v_d - most * part
-    back_1 = gains.along_track_gain * inside * e_x1 + (part - u * inside) * most_1
+    back_1 = k_x * inside * e_x1 + (part - u * inside) * most_1
     v_1 = v_d1 - back_1 - gains.speed_rate * (v - wanted)
 
     e_y2 = v_1 * sine_e + v_x * turning - omega_d1 * e_x - omega_d * e_x1
     g, g_1, g_2 = gain
     w, w_1 = g * e_y, g_1 * e_y + g * e_y1
-    w_2 = g_2 * e_y + 2 * g_1 * e_y1 + g * e_y2
-    slope = 1 / (1 + w * w)
+    w_2 = g_2 * e_y + 2.0 * g_1 * e_y1 + g * e_y2
+    slope = 1.0 / (1.0 + w * w)
     steered_1 = slope * w_1
     led = turned + arctan(w)  # ψ, heading minus the one that leads back
     led_1 = turning + steered_1
-    led_2 = slope * w_2 - 2 * w * steered_1 * steered_1
+    led_2 = slope * w_2 - 2.0 * w * steered_1 * steered_1
 
     omega_n, fastest = gains.heading_frequency, gains.turn_rate
     part = tanh(omega_n * led / fastest)
     turning_back = led_1 + fastest * part  # 0 when it turns back as fast as it should
-    theta_2 = omega_d1 - led_2 - omega_n * ((1 - part * part) * led_1 + turning_back)
+    theta_2 = omega_d1 - led_2 - omega_n * ((1.0 - part * part) * led_1 + turning_back)
     return v_1, theta_2, wanted

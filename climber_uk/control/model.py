@@ -16,13 +16,14 @@ from climber_uk.mechanics.elementary import (
     exp,
     rotated,
     select,
+    swept,
+    with_sign_of,
     wrapped,
 )
-from climber_uk.mechanics.motion import Motion, Wrench
+from climber_uk.mechanics.motion import Motion, Wrench, named
 from climber_uk.mechanics.parameter import check, parameter
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
-AMPLE = 1e9  # [N s/m] by a speed of that: more than any friction
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 
 
@@ -31,21 +32,23 @@ def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float)
 
     Both include the disturbance. At rest friction takes whatever value holds the climber, up to f.
     """
+    mass, inertia, friction, weight = climber.inertial
     x, y, heading, cosine, sine, v, omega = motion
-    half, friction = time / 2, climber.seal_friction
-    omega_1 = turn / climber.yaw_inertia
-    _, c, s = rotated(heading, cosine, sine, half * (omega + half / 2 * omega_1))
-    push = drive - climber.weight_along_wall * s
+    half, omega_1 = 0.5 * time, turn / inertia
+    halfway, angle = half * (omega + 0.5 * half * omega_1), time * (omega + half * omega_1)
+    c, s, heading, cosine, sine = swept(heading, cosine, sine, halfway, angle)
+    push = drive - weight * s
     # sliding, friction is all of f, against the motion; at rest, as much as is pushed against it
-    rubbing = clipped(select(abs(v) > SLOW, v * AMPLE, push), -friction, friction)
-    v_1 = (push - rubbing) / climber.mass
+    rubbing, slides = with_sign_of(friction, v), abs(v) > SLOW
+    if not (slides is True or everywhere(slides)):
+        rubbing = select(slides, rubbing, clipped(push, -friction, friction))
+    v_1 = (push - rubbing) / mass
     way = time * (v + half * v_1)
-    heading, cosine, sine = rotated(heading, cosine, sine, time * (omega + half * omega_1))
     v, omega = v + time * v_1, omega + time * omega_1
-    return Motion(x + way * c, y + way * s, heading, cosine, sine, v, omega)
+    return named(Motion, (x + way * c, y + way * s, heading, cosine, sine, v, omega))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Observer:
     """Learns the disturbance, and the speeds if need be, from what comes out other than expected.
 
@@ -78,7 +81,7 @@ class Observer:
             return self._from_pose(climber, disturbance, expected, found, time)
         if everywhere(self.bandwidth == 0):
             return found, _faded(disturbance, time)
-        share = (1 - exp(-self.bandwidth * time)) / time
+        share = (1.0 - exp(-self.bandwidth * time)) / time
         faster, turning = found.speed - expected.speed, found.yaw_rate - expected.yaw_rate
         return found, _more(climber, disturbance, share * faster, share * turning)
 
@@ -105,7 +108,8 @@ class Observer:
 
 def _more(climber: Climber, disturbance: Wrench, v_1: Any, omega_1: Any) -> Wrench:
     r_drive, r_turn = disturbance
-    return Wrench(r_drive + climber.mass * v_1, r_turn + climber.yaw_inertia * omega_1)
+    mass, inertia, _, _ = climber.inertial
+    return named(Wrench, (r_drive + mass * v_1, r_turn + inertia * omega_1))
 
 
 def _faded(disturbance: Wrench, time: float) -> Wrench:

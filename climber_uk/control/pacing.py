@@ -18,7 +18,7 @@ from climber_uk.mechanics.preview import Preview
 SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Pacing:
     """How time that was lost is made up for; 0 for `catch_up` switches the time scaling off."""
 

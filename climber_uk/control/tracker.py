@@ -15,17 +15,18 @@ from climber_uk.control.model import Observer, rolled
 from climber_uk.control.pacing import IN_TIME, Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, named
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.preview import Preview
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
+LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
 PERIOD_SMOOTHING = 0.1  # share of a new period in the mean
 RETUNING_TIME = 0.5  # [s] in which changed gains come to act
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Timing:
     """When a torque acts: from its arrival at the wheels to that of the next.
 
@@ -104,7 +105,10 @@ class Tracker:
                 self.controller.climber, self.disturbance, expected, motion, time
             )
             if self._acting.are_known_since(self.stamp):
-                self.disturbance = chosen(self._learning, learnt, self.disturbance)
+                is_learnt = self._learning
+                self.disturbance = (
+                    learnt if is_learnt is True else chosen(is_learnt, learnt, self.disturbance)
+                )
         elif self.observer.velocity_source == "pose":
             motion = motion._replace(speed=0.0, yaw_rate=0.0)
         self.stamp, self.motion = stamp, motion
@@ -119,7 +123,7 @@ class Tracker:
         if self._retuned is not None:
             controller = replace(controller, constraints=self._constraints())
         aim = begins + round(controller.law.lookahead(self.period) * SECOND)
-        if self.pacing.catch_up > 0:
+        if pace is not IN_TIME and self.pacing.catch_up > 0:
             since = begins if self._paced_at is None else self._paced_at
             pace = pace.after((begins - since) / SECOND, self.pacing)
         target = preview.target(aim) if pace is IN_TIME else pace.target(preview, aim)
@@ -131,11 +135,11 @@ class Tracker:
                 command.lost.drive / controller.climber.mass, preview, aim, self.period
             )
             command = controller.command(situation, pace.target(preview, aim) or target)
-        _check(command.wheels)
+        wheels, _, _, (drive, turn) = command
+        _check(wheels)
         self.pace, self._paced_at = pace, begins
-        drive, turn = command.lost
         self._learning = (abs(drive) <= CUT) & (abs(turn) <= CUT)
-        self._send(begins, command.wheels)
+        self._send(begins, wheels)
         return command
 
     def hold(self, age: float, braking_rate: float) -> Torques:
@@ -191,21 +195,24 @@ class Tracker:
 
     def _begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
-        delay = self.timing.transport_delay + age * self.timing.measure_delay
+        timing = self.timing
+        delay = timing.transport_delay + (age if timing.measure_delay else 0.0)
         return self._acting.begin(self.stamp + round(delay * SECOND))
 
     def _situation(self, age: float) -> tuple[int, Situation]:
         begins = self._begin(age)
         motion = self.expected_at(begins)
-        return begins, Situation(motion, self._acting.last, self.disturbance, self.period)
+        situation = motion, self._acting.last, self.disturbance, self.period
+        return begins, named(Situation, situation)
 
     def _send(self, begins: int, torques: Torques) -> None:
         self._acting.add(begins, torques)
         # without odometry, too, that of long ago is not needed
-        self._acting.forget_before(max(self.stamp, begins - round(2 * LONGEST_STEP * SECOND)))
+        self._acting.forget_before(max(self.stamp, begins - LONG_AGO))
 
 
 def _check(torques: Torques) -> None:
     """Raise `ValueError` if a climber's torques are not finite; of many, each has its own."""
-    if isinstance(torques.right, float) and not math.isfinite(torques.right + torques.left):
+    right, left = torques
+    if isinstance(right, float) and not math.isfinite(right + left):
         raise ValueError(f"torques {torques} are not finite")

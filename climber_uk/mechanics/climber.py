@@ -124,6 +124,16 @@ class Climber:
         gravity: float = GRAVITY * cos(self.inclination * DEGREE)
         return gravity
 
+    @cached_property
+    def inertial(self) -> tuple[float, float, float, float]:
+        """m [kg], J [kg m²], f [N] and m g_t [N]: all that a motion asks for, in one."""
+        return self.mass, self.yaw_inertia, self.seal_friction, self.weight_along_wall
+
+    @cached_property
+    def leverage(self) -> tuple[float, float]:
+        """Mean of the wheels' torques by drive r/2 [m], and half their difference by turn r/2d."""
+        return self.wheel_radius / 2, self.wheel_radius / 2 / self.half_track
+
     def applied_force(self, heading: Array, direction: Array | float) -> Array:
         """Q without the motors: seal friction against the motion, and gravity, (..., 3) [N, N m].
 

@@ -26,18 +26,22 @@ arctan = _either(math.atan, np.arctan)
 tanh = _either(math.tanh, np.tanh)
 sqrt = _either(math.sqrt, np.sqrt)
 exp = _either(math.exp, np.exp)
-sign = _either(lambda x: float((x > 0) - (x < 0)), np.sign)
+sign = _either(lambda x: math.copysign(1.0, x) if x else 0.0, np.sign)
 
 
 def with_sign_of(size: Any, of: Any) -> Any:
-    """`size` (>= 0) with the sign of `of`."""
-    return math.copysign(size, of) if isinstance(of, float) else np.copysign(size, of)
+    """`size` (>= 0) with the sign of `of`; of many that are all positive, as it is."""
+    if isinstance(of, float):
+        return math.copysign(size, of)
+    return size if of.min(initial=np.inf) > 0 else np.copysign(size, of)
 
 
 def wrapped(angle: Any) -> Any:
     """The same angle in [-π, π)."""
     if isinstance(angle, float):
-        return (angle + math.pi) % TURN - math.pi
+        return angle if -3.0 < angle < 3.0 else (angle + math.pi) % TURN - math.pi
+    if np.abs(angle).max(initial=0.0) < 3.0:
+        return angle
     return angle - TURN * np.floor(angle / TURN + 0.5)  # numpy's remainder takes ten times as long
 
 
@@ -60,32 +64,73 @@ def select(condition: Any, this: Any, that: Any) -> Any:
 
 def everywhere(condition: Any) -> Any:
     """Whether `condition` holds for the one, or for all of many."""
-    return condition if condition is True or condition is False else bool(np.all(condition))
+    return condition if condition is True or condition is False else bool(condition.all())
+
+
+def either(condition: Any, these: tuple[Any, Any], those: tuple[Any, Any]) -> tuple[Any, Any]:
+    """`select` of two at once."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, these[0], those[0]), np.where(condition, these[1], those[1])
+    return these if condition else those
 
 
 SMALL = 0.03  # [rad] of an angle whose sine and cosine are a few terms of their series
 
 
 def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
-    """Heading, cosine and sine after a turn by `angle` [rad].
-
-    Of many small angles the series takes half as long as numpy's cosine and sine; what it leaves
-    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
-    Each gets the same whatever the others are.
-    """
+    """Heading, cosine and sine after a turn by `angle` [rad]."""
     end = heading + angle
     if isinstance(end, float):
         return end, math.cos(end), math.sin(end)
+    return end, *_turned(heading, cosine, sine, angle)
+
+
+def swept(
+    heading: Any, cosine: Any, sine: Any, halfway: Any, angle: Any
+) -> tuple[Any, Any, Any, Any, Any]:
+    """Cosine and sine after a turn by `halfway`; heading, cosine and sine after one by `angle`."""
+    end = heading + angle
+    if isinstance(end, float):
+        middle = heading + halfway
+        return math.cos(middle), math.sin(middle), end, math.cos(end), math.sin(end)
+    turned = _turned(heading, cosine, sine, angle)
+    return *_turned(heading, cosine, sine, halfway), end, *turned
+
+
+def _turned(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[Array, Array]:
+    """Cosine and sine of many after a turn.
+
+    Of small angles the series takes half as long as numpy's cosine and sine; what it leaves
+    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
+    Each gets the same whatever the others are.
+    """
     square = angle * angle
-    small = np.less(square, SMALL * SMALL)
+    largest = square.max(initial=0.0)
+    if largest < SMALL * SMALL:
+        return _by_series(cosine, sine, angle, square)
+    end, small = heading + angle, square < SMALL * SMALL
     if not small.any():
-        return end, np.cos(end), np.sin(end)
-    c = 1 - square * (1 / 2 - square * (1 / 24 - square * (1 / 720)))
-    s = angle * (1 - square * (1 / 6 - square * (1 / 120 - square * (1 / 5040))))
-    c, s = c * cosine - s * sine, s * cosine + c * sine
-    if small.all():
-        return end, c, s
-    return end, np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))
+        return np.cos(end), np.sin(end)
+    c, s = _by_series(cosine, sine, angle, square)
+    return np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))
+
+
+def _by_series(cosine: Array, sine: Array, angle: Array, square: Array) -> tuple[Array, Array]:
+    c = _polynomial(square, 1.0, -1 / 2, 1 / 24, -1 / 720)
+    s = _polynomial(square, 1.0, -1 / 6, 1 / 120, -1 / 5040)
+    s *= angle
+    return c * cosine - s * sine, s * cosine + c * sine
+
+
+def _polynomial(x: Array, *coefficients: float) -> Array:
+    """c₀ + c₁ x + … + cₙ xⁿ, in place: numpy would ask for memory at every sum."""
+    *others, last = coefficients
+    value = last * x
+    for coefficient in others[:0:-1]:
+        value += coefficient
+        value *= x
+    value += others[0]
+    return value
 
 
 def compose(f: Derivatives, inner: tuple[Any, Any, Any]) -> Derivatives:

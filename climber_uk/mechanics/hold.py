@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import clipped, exp, select, sqrt
+from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sqrt
 from climber_uk.mechanics.parameter import check, parameter
 
 AMPLE = 100.0  # a margin of that or more is told as that: without a demand there would be no end
@@ -180,5 +180,8 @@ class Alarm:
 
 
 def _margin(held: Any, demanded: Any) -> Any:
-    ample = held >= AMPLE * demanded
+    most = AMPLE * demanded
+    if everywhere(most > held):
+        return held / demanded
+    ample = held >= most
     return select(ample, AMPLE, held / select(ample, 1.0, demanded))

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -55,3 +56,13 @@ def chosen(condition: Any, this: Any, that: Any) -> Any:
     differ = {name: pair for name, pair in pairs.items() if not np.array_equal(*pair)}
     changed = {name: np.where(condition, *pair) for name, pair in differ.items()}
     return dataclasses.replace(that, **changed)
+
+
+@cache
+def keep_what_is_freed() -> None:
+    """Let glibc keep memory that a step frees for the next one, which halves its time.
+
+    It gives back to the system whatever is freed at the end of its heap, but for twice as much as
+    the largest block that was freed so far: one of 16 MB will do.
+    """
+    np.empty(2 << 20)

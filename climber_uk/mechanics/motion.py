@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from climber_uk.mechanics.elementary import clipped, everywhere, select
 
+named = tuple.__new__  # a named tuple without the detour that calling its class takes
+
 if TYPE_CHECKING:
     from climber_uk.mechanics.climber import Climber
 
@@ -101,15 +103,15 @@ def limited(
 ) -> tuple[Any, Any, Any, Any]:
     """What wheels within their bounds can do of drive and turn, the turn served first.
 
-    Drive and turn, and the torques of the right wheel and of the left one that do it.
+    Drive and turn, the very same ones if they fit, and the torques of the right wheel and of the
+    left one that do it.
     """
     (right_low, right_high), (left_low, left_high) = right, left
-    to_mean = climber.wheel_radius / 2
-    to_twist = to_mean / climber.half_track
+    to_mean, to_twist = climber.leverage
     mean, twist = to_mean * drive, to_twist * turn  # τR,L = mean ± twist
     one, other = mean + twist, mean - twist
     fits = (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
-    if everywhere(fits):
+    if fits is True or everywhere(fits):
         return drive, turn, one, other
     twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
     lowest, highest = right_low - twist, right_high - twist

@@ -14,7 +14,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array, Stamps
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Target
+from climber_uk.mechanics.motion import Target, named
 from climber_uk.mechanics.reference import Reference
 
 
@@ -63,13 +63,13 @@ class Preview:
         times, coefficients = self._pieces
         if not times[0] <= time <= times[-1]:
             return None
-        i = min(bisect_right(times, time), len(times) - 1) - 1
+        i = bisect_right(times, time, 1, len(times) - 1) - 1
         t = float(time - times[i]) * 1e-9
         along_x, along_y, turning = coefficients[i]
         x, v_x, a_x, j_x = _derivatives(along_x, t)
         y, v_y, a_y, j_y = _derivatives(along_y, t)
         heading, omega, omega_1, _ = _derivatives(turning, t)
-        return Target(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
+        return named(Target, (x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y))
 
     def goes_on_with(self, newer: "Preview", tolerance: float) -> bool:
         """Whether `newer` begins within `tolerance` [m, rad] of where this one is by then."""
@@ -92,13 +92,23 @@ class Preview:
 
 
 def _derivatives(coefficients: list[float], t: float) -> tuple[float, float, float, float]:
-    """Polynomial c₀ + c₁ t + … + c₅ t⁵ and its first three derivatives."""
+    """Polynomial c₀ + c₁ t + … + c₅ t⁵ and its first three derivatives, by Horner's scheme."""
     c_0, c_1, c_2, c_3, c_4, c_5 = coefficients
+    last = t * c_5
+    p_4 = c_4 + last
+    p_3 = c_3 + t * p_4
+    p_2 = c_2 + t * p_3
+    p_1 = c_1 + t * p_2
+    v_4 = p_4 + last
+    v_3 = p_3 + t * v_4
+    v_2 = p_2 + t * v_3
+    a_4 = v_4 + last
+    a_3 = v_3 + t * a_4
     return (
-        c_0 + t * (c_1 + t * (c_2 + t * (c_3 + t * (c_4 + t * c_5)))),
-        c_1 + t * (2 * c_2 + t * (3 * c_3 + t * (4 * c_4 + t * 5 * c_5))),
-        2 * c_2 + t * (6 * c_3 + t * (12 * c_4 + t * 20 * c_5)),
-        6 * c_3 + t * (24 * c_4 + t * 60 * c_5),
+        c_0 + t * p_1,
+        p_1 + t * v_2,
+        2.0 * (v_2 + t * a_3),
+        6.0 * (a_3 + t * (a_4 + last)),
     )
 
 

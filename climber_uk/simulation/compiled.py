@@ -14,7 +14,7 @@ from numba.extending import overload, register_jitable
 from climber_uk.mechanics import Array, elementary, many
 from climber_uk.mechanics.motion import Motion, Wrench
 from climber_uk.simulation import plain
-from climber_uk.simulation.plain import Plain
+from climber_uk.simulation.plain import Plain, Pushed
 
 BLOCK = 256  # climbers that are gone through together, so that their numbers stay in the cache
 SMALL = 0.1  # [rad] that no climber may turn by in a step: the series is good to 1e-16 up to that
@@ -23,13 +23,21 @@ EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 INLINE = EXACT | {"forceinline": True}
 
 
-def _turned(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
+def _rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
     """`elementary.rotated` without a branch, which would keep LLVM from doing eight at once."""
     q = angle * angle
     c = 1 - q * (1 / 2) * (1 - q * (1 / 12) * (1 - q * (1 / 30) * (1 - q * (1 / 56))))
     s = 1 - q * (1 / 6) * (1 - q * (1 / 20) * (1 - q * (1 / 42) * (1 - q * (1 / 72))))
     s = angle * s
     return heading + angle, c * cosine - s * sine, s * cosine + c * sine
+
+
+def _swept(
+    heading: Any, cosine: Any, sine: Any, halfway: Any, angle: Any
+) -> tuple[Any, Any, Any, Any, Any]:
+    _, c, s = elementary.rotated(heading, cosine, sine, halfway)
+    heading, cosine, sine = elementary.rotated(heading, cosine, sine, angle)
+    return c, s, heading, cosine, sine
 
 
 def _amended(condition: Any, regular: Any, exceptional: Any, *arguments: Any) -> Any:
@@ -41,14 +49,16 @@ ANEW = {
     elementary.with_sign_of: lambda size, of: size if of >= 0 else -size,
     elementary.clipped: lambda value, lowest, highest: min(max(value, lowest), highest),
     elementary.select: lambda condition, this, that: this if condition else that,
-    elementary.rotated: _turned,
+    elementary.everywhere: lambda condition: condition,
+    elementary.rotated: _rotated,
+    elementary.swept: _swept,
     many.amended: _amended,
 }
 for function, anew in ANEW.items():
     overload(function, strict=False, jit_options=INLINE)(lambda *_, found=anew: found)
 for function in (plain.slid, plain._held, plain._push):
     register_jitable(**INLINE)(function)
-for function in (plain._from_rest, plain._stopped, plain._given_way, plain.advanced):
+for function in (plain._from_rest, plain._stopped, plain._given_way, plain.stepped):
     register_jitable(**EXACT)(function)
 
 
@@ -57,8 +67,8 @@ def advanced(body: Plain, motion: Motion, wrench: Wrench, time: float, steps: in
     fastest = abs(motion.yaw_rate) + steps * time * abs(wrench.turn / body.yaw_inertia)
     if not np.max(fastest, initial=0.0) * time <= SMALL:
         return plain.advanced_often(body, motion, wrench, time, steps)
-    rows = np.empty((13, len(motion.x)))
-    for row, numbers in zip(rows, (*motion, *wrench, *body), strict=True):
+    rows = np.empty((11, len(motion.x)))
+    for row, numbers in zip(rows, (*motion, *body.under(wrench)), strict=True):
         row[:] = numbers
     _advance(rows, time, steps)
     return Motion(*rows[:7])
@@ -66,7 +76,7 @@ def advanced(body: Plain, motion: Motion, wrench: Wrench, time: float, steps: in
 
 @njit(nogil=True, **EXACT)
 def _advance(rows: Array, time: float, steps: int) -> None:
-    now, end = np.empty((13, BLOCK)), np.empty((7, BLOCK))
+    now, end = np.empty((11, BLOCK)), np.empty((7, BLOCK))
     for first in range(0, rows.shape[1], BLOCK):
         number = min(BLOCK, rows.shape[1] - first)
         now[:, :number] = rows[:, first : first + number]
@@ -74,8 +84,8 @@ def _advance(rows: Array, time: float, steps: int) -> None:
             _slide(now, end, time, number)
             for i in range(number):
                 if not now[5, i] * end[5, i] > 0:  # it rests, or stops
-                    motion, wrench, body = _given(now, i)
-                    _put(end, i, plain.advanced(body, motion, wrench, time))
+                    pushed, motion = _given(now, i)
+                    _put(end, i, plain.stepped(pushed, motion, time))
             now[:7, :number] = end[:, :number]
         rows[:7, first : first + number] = now[:7, :number]
 
@@ -83,15 +93,15 @@ def _advance(rows: Array, time: float, steps: int) -> None:
 @njit(**EXACT)
 def _slide(now: Array, end: Array, time: float, number: int) -> None:
     for i in range(number):
-        motion, wrench, body = _given(now, i)
-        direction = elementary.with_sign_of(1.0, motion.speed)
-        _put(end, i, plain.slid(body, motion, wrench, direction, time))
+        pushed, motion = _given(now, i)
+        rubbing = elementary.with_sign_of(pushed.friction, motion.speed)
+        _put(end, i, plain.slid(pushed, motion, rubbing, time))
 
 
 @njit(**INLINE)
-def _given(a: Array, i: int) -> tuple[Motion, Wrench, Plain]:
+def _given(a: Array, i: int) -> tuple[Pushed, Motion]:
     motion = Motion(a[0, i], a[1, i], a[2, i], a[3, i], a[4, i], a[5, i], a[6, i])
-    return motion, Wrench(a[7, i], a[8, i]), Plain(a[9, i], a[10, i], a[11, i], a[12, i])
+    return Pushed(a[7, i], a[8, i], a[9, i], a[10, i]), motion
 
 
 @njit(**INLINE)

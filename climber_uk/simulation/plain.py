@@ -10,8 +10,17 @@ to its own error. Within a step, friction stops a climber or gives way once, at 
 from typing import Any, NamedTuple
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY, Climber
-from climber_uk.mechanics.elementary import clipped, rotated, select, sign, sin, with_sign_of
-from climber_uk.mechanics.many import amended
+from climber_uk.mechanics.elementary import (
+    clipped,
+    everywhere,
+    rotated,
+    select,
+    sign,
+    sin,
+    swept,
+    with_sign_of,
+)
+from climber_uk.mechanics.many import amended, keep_what_is_freed
 from climber_uk.mechanics.motion import Motion, Wrench
 
 ITERATIONS = 5  # of Newton's method to an instant within a step; each squares what is left
@@ -31,87 +40,109 @@ class Plain(NamedTuple):
         gravity = GRAVITY * sin(climber.inclination * DEGREE)
         return cls(climber.mass, climber.yaw_inertia, climber.seal_friction, gravity)
 
+    def under(self, wrench: Wrench) -> "Pushed":
+        """It, with what a wrench does to it."""
+        mass, yaw_inertia, friction, gravity = self
+        return Pushed(wrench.drive / mass, wrench.turn / yaw_inertia, friction / mass, gravity)
+
+
+class Pushed(NamedTuple):
+    """What accelerates a climber."""
+
+    drive: Any  # F/m [m/s²]
+    turning: Any  # ω̇ = N/J [rad/s²]
+    friction: Any  # f/m [m/s²]
+    gravity: Any  # g_t [m/s²]
+
 
 def advanced(body: Plain, motion: Motion, wrench: Wrench, time: float) -> Motion:
     """Motion after a step of `time` [s] under a wrench, in which the seal may stick and slide."""
-    direction, rests = with_sign_of(1.0, motion.speed), motion.speed == 0
-    end = slid(body, motion, wrench, direction, time)
-    end = amended(direction * end.speed < 0, end, _stopped, body, motion, wrench, direction, time)
-    return amended(rests, end, _from_rest, body, motion, wrench, time)
+    return stepped(body.under(wrench), motion, time)
 
 
 def advanced_often(body: Plain, motion: Motion, wrench: Wrench, time: float, steps: int) -> Motion:
     """Motion after `steps` such steps."""
+    keep_what_is_freed()
+    pushed = body.under(wrench)
     for _ in range(steps):
-        motion = advanced(body, motion, wrench, time)
+        motion = stepped(pushed, motion, time)
     return motion
 
 
-def slid(body: Plain, motion: Motion, wrench: Wrench, direction: Any, time: Any) -> Motion:
-    """Motion `time` [s] later of a climber whose seal slides in `direction`, 1 or -1."""
+def stepped(pushed: Pushed, motion: Motion, time: float) -> Motion:
+    """Motion after a step of `time` [s]."""
+    end = slid(pushed, motion, with_sign_of(pushed.friction, motion.speed), time)
+    if everywhere(motion.speed * end.speed > 0):
+        return end
+    direction, rests = with_sign_of(1.0, motion.speed), motion.speed == 0
+    end = amended(direction * end.speed < 0, end, _stopped, pushed, motion, direction, time)
+    return amended(rests, end, _from_rest, pushed, motion, time)
+
+
+def slid(pushed: Pushed, motion: Motion, rubbing: Any, time: Any) -> Motion:
+    """Motion `time` [s] later of a climber whose seal slides: friction decelerates by `rubbing`."""
     x, y, heading, c_0, s_0, v_0, omega = motion
-    half, turning = time / 2, wrench.turn / body.yaw_inertia
-    _, c_1, s_1 = rotated(heading, c_0, s_0, half * (omega + half / 2 * turning))
-    heading, c_2, s_2 = rotated(heading, c_0, s_0, time * (omega + half * turning))
-    free = (wrench.drive - direction * body.friction) / body.mass
-    part, s_14 = time / 6, 4 * s_1
-    fall = part * body.gravity
-    v_1 = v_0 + half * free - fall * (1.25 * s_0 + 0.5 * s_14 - 0.25 * s_2)
-    v_2 = v_0 + time * free - fall * (s_0 + s_14 + s_2)
-    first, middle, last = part * v_0, 4 * part * v_1, part * v_2
+    faster = 0.5 * time * pushed.turning  # in half of the time
+    omega_1 = omega + faster
+    halfway, angle = 0.5 * time * (omega + 0.5 * faster), time * omega_1
+    c_1, s_1, heading, c_2, s_2 = swept(heading, c_0, s_0, halfway, angle)
+    part = time / 6
+    fall = part * pushed.gravity
+    v_2 = v_0 + (time * (pushed.drive - rubbing) - fall * (s_0 + 4 * s_1 + s_2))
+    v_14 = 2 * (v_0 + v_2) - 3 * fall * (s_0 - s_2)  # four times the speed halfway
     return Motion(
-        x + (first * c_0 + middle * c_1 + last * c_2),
-        y + (first * s_0 + middle * s_1 + last * s_2),
+        x + part * (v_0 * c_0 + v_14 * c_1 + v_2 * c_2),
+        y + part * (v_0 * s_0 + v_14 * s_1 + v_2 * s_2),
         heading,
         c_2,
         s_2,
         v_2,
-        omega + time * turning,
+        omega_1 + faster,
     )
 
 
-def _held(body: Plain, motion: Motion, wrench: Wrench, time: Any) -> Motion:
+def _held(pushed: Pushed, motion: Motion, time: Any) -> Motion:
     """Motion `time` [s] later of a climber that friction holds: it may turn on the spot."""
     x, y, heading, cosine, sine, v, omega = motion
-    turning = wrench.turn / body.yaw_inertia
-    angle = time * (omega + time / 2 * turning)
+    angle = time * (omega + time / 2 * pushed.turning)
     heading, cosine, sine = rotated(heading, cosine, sine, angle)
-    return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * turning)
+    return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * pushed.turning)
 
 
-def _push(body: Plain, motion: Motion, wrench: Wrench) -> Any:
-    """What friction at rest is up against [N]."""
-    return wrench.drive - body.mass * body.gravity * motion.sine
+def _push(pushed: Pushed, motion: Motion) -> Any:
+    """What friction at rest is up against [m/s²]."""
+    return pushed.drive - pushed.gravity * motion.sine
 
 
-def _from_rest(body: Plain, motion: Motion, wrench: Wrench, time: Any) -> Motion:
+def _from_rest(pushed: Pushed, motion: Motion, time: Any) -> Motion:
     """Motion after a step, or what is left of one, that begins at rest."""
-    push = _push(body, motion, wrench)
-    end = _held(body, motion, wrench, time)
-    later = abs(_push(body, end, wrench)) > body.friction
-    end = amended(later, end, _given_way, body, motion, end, wrench, time)
-    starts = abs(push) > body.friction
-    return amended(starts, end, slid, body, motion, wrench, sign(push), time)
+    push = _push(pushed, motion)
+    end = _held(pushed, motion, time)
+    later = abs(_push(pushed, end)) > pushed.friction
+    end = amended(later, end, _given_way, pushed, motion, end, time)
+    starts = abs(push) > pushed.friction
+    return amended(starts, end, slid, pushed, motion, sign(push) * pushed.friction, time)
 
 
-def _stopped(body: Plain, motion: Motion, wrench: Wrench, direction: Any, time: Any) -> Motion:
+def _stopped(pushed: Pushed, motion: Motion, direction: Any, time: Any) -> Motion:
     """Motion after a step within which the climber comes to rest."""
-    until, there = 0.0 * motion.speed, motion
+    until, there, rubbing = 0.0 * motion.speed, motion, direction * pushed.friction
     for _ in range(ITERATIONS):
-        slope = (_push(body, there, wrench) - direction * body.friction) / body.mass
+        slope = _push(pushed, there) - rubbing
         until = clipped(until - there.speed / slope, 0.0, time)
-        there = slid(body, motion, wrench, direction, until)
+        there = slid(pushed, motion, rubbing, until)
     x, y, heading, cosine, sine, v, omega = there
     there = Motion(x, y, heading, cosine, sine, 0.0 * v, omega)
-    return _from_rest(body, there, wrench, time - until)
+    return _from_rest(pushed, there, time - until)
 
 
-def _given_way(body: Plain, motion: Motion, end: Motion, wrench: Wrench, time: Any) -> Motion:
+def _given_way(pushed: Pushed, motion: Motion, end: Motion, time: Any) -> Motion:
     """Motion after a step within which what friction holds, turning, becomes too much for it."""
-    way, until, there = sign(_push(body, end, wrench)), time + 0.0 * end.x, end
+    way, until, there = sign(_push(pushed, end)), time + 0.0 * end.x, end
+    rubbing = way * pushed.friction
     for _ in range(ITERATIONS):
-        slope = -body.mass * body.gravity * there.cosine * there.yaw_rate
-        over = _push(body, there, wrench) - way * body.friction
+        slope = -pushed.gravity * there.cosine * there.yaw_rate
+        over = _push(pushed, there) - rubbing
         until = clipped(until - over / select(slope == 0, float("inf"), slope), 0.0, time)
-        there = _held(body, motion, wrench, until)
-    return slid(body, there, wrench, way, time - until)
+        there = _held(pushed, motion, until)
+    return slid(pushed, there, rubbing, time - until)

@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -83,7 +83,7 @@ def alone(case, i, duration):
 
 def as_floats(of, i):
     one = part(of, i)
-    changed = {k: float(v) for k, v in vars(one).items() if isinstance(v, np.floating)}
+    changed = {k: float(v) for k, v in asdict(one).items() if isinstance(v, np.floating)}
     return replace(one, **changed)
 
 

@@ -59,3 +59,29 @@ def test_an_angle_is_turned_by_the_same_bits_in_any_company():
         alone = elementary.rotated(*(numbers[few] for numbers in given))
         for part, whole in zip(alone, together, strict=True):
             np.testing.assert_array_equal(part, whole[few])
+
+
+@pytest.mark.parametrize("largest", [0.02, 0.06, 3.0])
+def test_halfway_and_at_the_end_of_a_turn_it_is_turned_like_that(largest):
+    random = np.random.default_rng(4)
+    heading, halfway, angle = random.uniform(-largest, largest, (3, 50))
+    many = heading, np.cos(heading), np.sin(heading)
+    one = tuple(float(numbers[0]) for numbers in many)
+    for start, half, whole in ((many, halfway, angle), (one, float(halfway[0]), float(angle[0]))):
+        expected = *elementary.rotated(*start, half)[1:], *elementary.rotated(*start, whole)
+        for got, wanted in zip(elementary.swept(*start, half, whole), expected, strict=True):
+            np.testing.assert_array_equal(got, wanted)
+
+
+@pytest.mark.parametrize("values", [[1.0, 2.0], [1.0, -2.0], [-0.0, 3.0], [0.0], [np.nan, 1.0], []])
+def test_a_sign_is_the_same_for_many_that_share_it(values):
+    got = np.broadcast_to(elementary.with_sign_of(2.0, np.array(values)), len(values))
+    np.testing.assert_array_equal(got, [math.copysign(2.0, value) for value in values])
+
+
+def test_one_of_two_pairs_is_chosen_for_each():
+    these, those = (1.0, 2.0), (3.0, 4.0)
+    assert elementary.either(True, these, those) == these
+    assert elementary.either(False, these, those) == those
+    chosen = elementary.either(np.array([True, False]), these, those)
+    np.testing.assert_array_equal(chosen, [[1.0, 3.0], [2.0, 4.0]])
