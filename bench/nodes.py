@@ -5,7 +5,8 @@
 
 The processes are those of run_demo on climber.yaml: three nodes and a recorder. Latency is from an
 odometry's arrival at the recorder to that of its torque; a tick is missed if the torque arrives
-after the next odometry is due, or never.
+after the next odometry is due, or never. Beside it is how punctual the machine is by itself: how
+often a process that does nothing but wake up once a period, alone, woke more than a period late.
 """
 
 import argparse
@@ -92,6 +93,16 @@ def loop(rate: int, duration: float) -> str:
     return " ".join([f"{rate:5d}", *figures, f"{missed:6d} of {len(run.time)}"])
 
 
+def late_alone(rate: int, duration: float) -> str:
+    """How often a process that only wakes up at a rate [Hz] was more than a period late."""
+    begin, late, ticks = time.monotonic(), 0, round(duration * rate)
+    for tick in range(1, ticks + 1):
+        due = begin + tick / rate
+        time.sleep(max(0.0, due - time.monotonic()))
+        late += time.monotonic() - due > 1 / rate
+    return f"{late:6d} of {ticks}"
+
+
 def start() -> None:
     """Print how long each node takes to start, and what importing this package is of that."""
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
@@ -112,10 +123,11 @@ def start() -> None:
 def loops(rates: Sequence[int], duration: float) -> None:
     """Print a row for each rate."""
     print(
-        "   Hz  CPU [%]: planner, controller, plant; latency [ms]: 50, 90, 99, 99.9, 100 %; missed"
+        "   Hz  CPU [%]: planner, controller, plant; latency [ms]: 50, 90, 99, 99.9, 100 %; "
+        "missed; late alone"
     )
     for rate in rates:
-        print(loop(rate, duration), flush=True)
+        print(loop(rate, duration), late_alone(rate, duration), flush=True)
 
 
 def compare(rounds: int) -> None:
