@@ -6,7 +6,7 @@ without messages. All ways are measured in turns in one process; the least time 
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,12 +22,14 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Demand, Motion, Torques, Wrench
+from climber_uk.mechanics.motion import Demand, Motion, Target, Torques, Wrench
+from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.udwadia_kalaba import constraint_force
 
+OURS = "closed form, floats"
 PAPER = Trajectory(Ellipse(), ConstantRate())
 PERIOD, TICKS = 0.005, 20  # [s], and in a measurement
 # Runs before one that counts. Not only caches are full of what ran before: CPython binds what it
@@ -64,9 +66,26 @@ def motions_on_the_way(number: int) -> list[Motion]:
     return [State(pose, velocity).motion for pose, velocity in states]
 
 
-def ticks(tracker: Tracker) -> Callable[[], None]:
-    """Ticks of a tracker on its way along the paper's ellipse."""
-    preview = sampled(PAPER, 60.0)
+class Known:
+    """A preview whose targets were computed before, as those of the C are."""
+
+    def __init__(self, preview: Preview, times: Iterable[int]) -> None:
+        self.targets = {time: preview.target(time) for time in times}
+
+    def target(self, time: int) -> Target | None:
+        """See `Preview`."""
+        return self.targets[time]
+
+
+def ticks(tracker: Tracker, known: bool = False) -> Callable[[], None]:
+    """Ticks of a tracker on its way along the paper's ellipse, with targets that are known or not.
+
+    A tick aims at the middle of the period that follows it.
+    """
+    preview: Any = sampled(PAPER, 60.0)
+    if known:
+        aims = (SECOND + round((number + 0.5) * PERIOD * SECOND) for number in range(10_000))
+        preview = Known(preview, aims)
     stamps = (SECOND + round(number * PERIOD * SECOND) for number in range(10_000))
     all_of_them = list(zip(stamps, motions_on_the_way(10_000), strict=True))
     number = 0
@@ -104,6 +123,15 @@ def ticks_in_c(limit: Limit, tracker: Tracker) -> tuple[Callable[[], None], Arra
     return some, torques
 
 
+def with_known_targets(tracker: Tracker, in_c: Callable[[], None]) -> dict[str, Callable[[], None]]:
+    """The same work as the C does, which is given the targets."""
+    another = Tracker(tracker.controller, tracker.observer, tracker.timing, tracker.pacing)
+    return {
+        f"{OURS}, targets known": ticks(another, known=True),
+        "C through cffi, targets known": in_c,
+    }
+
+
 def bare(controller: Controller) -> Callable[[], None]:
     """The law alone: a torque from state and reference."""
     reference = PAPER.at(1.0)
@@ -134,7 +162,7 @@ def ways(constraints: str, law: Law) -> dict[str, Controller]:
     """Controllers that give the same torques."""
     gains = CONSTRAINTS[constraints]()
     return {
-        "closed form, floats": Controller(Climber(), gains, law),
+        OURS: Controller(Climber(), gains, law),
         "generic UK, numpy": WithMatrices(Climber(), gains, law),
         "the paper's formula": WithMatrices(Climber(), gains, law, as_the_paper),
     }
@@ -177,7 +205,7 @@ def main() -> None:
             ours = next(iter(trackers.values()))
             run, torques = ticks_in_c(limit, ours)
             check(ours, run, torques)
-            whole["C through cffi, preview not counted"] = run
+            whole |= with_known_targets(ours, run)
         table(f"tick, {constraints}", least(whole, options.rounds))
         alone = {
             name: bare(controller)
