@@ -17,7 +17,7 @@ from limit import Limit, climber_numbers, controller_numbers
 from side_by_side import in_turns, rate, table, timed
 
 from climber_uk.analysis.closed_loop import sampled
-from climber_uk.analysis.closed_loops import Course, Loops
+from climber_uk.analysis.closed_loops import BLOCK, Course, Loops
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.mechanics import SECOND, Array
@@ -153,13 +153,13 @@ def half(number: int) -> None:
 
 
 def two_processes() -> float:
-    """How many times as fast two processes are as one, for the same loops."""
+    """How many times as fast two processes are as one, for the same loops in the same blocks."""
     with ProcessPoolExecutor(2) as pool:
-        list(pool.map(half, [CLOSED // 8] * 2))  # they have started
+        list(pool.map(half, [BLOCK // 8] * 2))  # they have started
         ratios = []
         for _ in range(3):
-            one = timed(lambda: pool.submit(half, 2 * CLOSED).result(), time.perf_counter)()
-            two = timed(lambda: list(pool.map(half, [CLOSED] * 2)), time.perf_counter)()
+            one = timed(lambda: pool.submit(half, 2 * BLOCK).result(), time.perf_counter)()
+            two = timed(lambda: list(pool.map(half, [BLOCK] * 2)), time.perf_counter)()
             ratios.append(one / two)
     return float(np.median(ratios))
 
