@@ -144,7 +144,8 @@ def test_memory_does_not_grow_with_the_number_of_runs(campaign, tmp_path):
         counting.rank_correlations(store, names, names, figures.first(store, names))
         peaks.append(tracemalloc.get_traced_memory()[1] + pa.default_memory_pool().max_memory())
         tracemalloc.stop()
-    assert peaks[2] - peaks[1] < 36 * parts.PART  # bytes: one for each further run would be more
+    # half of what a column of numbers would take; a part more or less may have been read ahead
+    assert peaks[2] - peaks[1] < 4 * 36 * parts.PART
 
 
 def test_metrics_come_from_what_they_are_named_after():
