@@ -41,6 +41,7 @@ DISCOVERY_PERIOD = 0.2  # [s]
 TAKE_PERIOD = 0.01  # [s]
 GRACE = 0.1  # [s] for what was on its way when the stop came
 REPAIR = 3.5  # [s] in which a publisher repeats what was lost: Fast DDS asks every 3 s for it
+A_FEW = 5  # messages of a topic that is not published all the time
 QUEUE_DEPTH = 5000  # messages of one topic that may wait: seconds, even at 1 kHz
 
 
@@ -161,13 +162,15 @@ class BagRecorder(Node):
 
         Reliable ones come in order: while one is sent again, those after it wait. So a topic that
         was published shortly before the stop is complete once it brings what is later than that.
+        What is latched, or was published a few times only, may not be published again.
         """
         if time.time_ns() > self.stop_time + REPAIR * 1e9:
             return False
         return any(
             self.stop_time - REPAIR * 1e9 < heard <= self.stop_time
             and self.recorded[name].qos_profile.reliability == ReliabilityPolicy.RELIABLE
-            and self.bag.count(name) > 1
+            and self.recorded[name].qos_profile.durability == DurabilityPolicy.VOLATILE
+            and self.bag.count(name) > A_FEW
             and self.count_publishers(name)
             for name, heard in self.heard.items()
         )
