@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sqrt
+from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sqrt, with_sign_of
 from climber_uk.mechanics.parameter import check, parameter
 
-AMPLE = 100.0  # a margin of that or more is told as that: without a demand there would be no end
+AMPLE = 100.0  # margins are told within ± that: without a demand there would be no end
 
 
 class Adhesion(Protocol):
@@ -180,8 +180,7 @@ class Alarm:
 
 
 def _margin(held: Any, demanded: Any) -> Any:
-    most = AMPLE * demanded
-    if everywhere(most > held):
+    within = abs(held) < AMPLE * demanded
+    if everywhere(within):
         return held / demanded
-    ample = held >= most
-    return select(ample, AMPLE, held / select(ample, 1.0, demanded))
+    return select(within, held / select(within, demanded, 1.0), with_sign_of(AMPLE, held))

@@ -79,6 +79,9 @@ def test_a_margin_of_nothing_held_is_below_one():
     loose = replace(PAPER, suction_pressure=0.0)
     assert HELD.slip_margin(loose, 0.0, 1.0, 0.0) == 0
     assert HELD.tip_margin(loose, -GRAVITY, 1.0) < 0
+    assert HELD.tip_margin(loose, -GRAVITY, 0.0) == -AMPLE  # it falls, and need not tip for that
+    none = np.zeros(2)
+    assert HELD.tip_margin(loose, np.array([-GRAVITY, GRAVITY]), none).tolist() == [-AMPLE, AMPLE]
 
 
 def test_margins_of_many_are_those_of_each():
