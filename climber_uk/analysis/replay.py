@@ -65,21 +65,18 @@ class Replay:
         """Answer all of a bag; raises as `read_controller` does."""
         odometry, reference = f"{namespace}/{ODOMETRY}", f"{namespace}/{REFERENCE}"
         missing = {odometry, reference}
-        torques = f"{namespace}/{TORQUES}"
         takers = {
             CLOCK: self.on_clock,
             odometry: self.on_odometry,
             reference: self.on_reference,
             f"{namespace}/{PRESSURE}": self.on_pressure,
+            f"{namespace}/{TORQUES}": self.on_torques,
         }
-        for topic, at, message in read_published(bag, [*takers, torques]):
+        for topic, at, message in read_published(bag, takers):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
-            if topic == torques:
-                self.on_torques(at, message)
-            else:
-                takers[topic](message)
+            takers[topic](at, message)
         if missing:
             raise ValueError(f"{bag} has no message on {' and '.join(sorted(missing))}")
 
@@ -96,11 +93,11 @@ class Replay:
             self.pass_time(self.looked)
             self.keep(self.follower.look(self.clock))
 
-    def on_clock(self, message: Any) -> None:
+    def on_clock(self, _: int, message: Any) -> None:
         """Keep the simulated time."""
         self.clock = reading.nanoseconds(message.clock)
 
-    def on_odometry(self, message: Any) -> None:
+    def on_odometry(self, _: int, message: Any) -> None:
         """Answer an odometry."""
         stamp = reading.nanoseconds(message.header.stamp)
         answered = self.recorded.published.get(stamp)
@@ -114,7 +111,7 @@ class Replay:
             return
         self.keep(self.follower.on_odometry(self.clock, stamp, state))
 
-    def on_reference(self, message: Any) -> None:
+    def on_reference(self, _: int, message: Any) -> None:
         """Keep a reference, unless it is one that the node refuses."""
         try:
             preview = reading_reference.preview(message, self.names.odom_frame)
@@ -122,7 +119,7 @@ class Replay:
             return
         self.keep(self.follower.on_reference(self.clock, preview))
 
-    def on_pressure(self, message: Any) -> None:
+    def on_pressure(self, _: int, message: Any) -> None:
         """Take the measured pressure into the model, unless it is one that the node refuses."""
         try:
             pressure = reading.pressure(message)

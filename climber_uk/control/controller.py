@@ -104,10 +104,8 @@ class Controller:
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.law.lookahead(period)
-        track, (right, left) = (
-            self.constraints.track(target),
-            self._fixed_bounds or self._bounds(situation),
-        )
+        track = self.constraints.track(target)
+        right, left = self._fixed_bounds or self._bounds(situation)
         drive, turn = forces(climber, held.right, held.left)
         for _ in range(2 if ahead else 1):
             aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)

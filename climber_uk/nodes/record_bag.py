@@ -40,7 +40,7 @@ FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received withi
 DISCOVERY_PERIOD = 0.2  # [s]
 TAKE_PERIOD = 0.01  # [s]
 GRACE = 0.1  # [s] for what was on its way when the stop came
-REPAIR = 3.5  # [s] in which a publisher repeats what was lost: Fast DDS asks every 3 s for it
+REPAIR = 3.5  # [s] in which what was lost is sent again: Fast DDS offers it every 3 s
 A_FEW = 5  # messages of a topic that is not published all the time
 QUEUE_DEPTH = 5000  # messages of one topic that may wait: seconds, even at 1 kHz
 
@@ -176,7 +176,7 @@ class BagRecorder(Node):
         )
 
     def stop(self, *_: object) -> None:
-        """Finish when all that had arrived by the first call is recorded."""
+        """Finish when all that had been sent by the first call is recorded."""
         self.stop_time = self.stop_time or time.time_ns()
 
 
