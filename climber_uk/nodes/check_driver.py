@@ -27,6 +27,7 @@ from climber_uk.analysis.driver.evidence import Expected
 from climber_uk.analysis.driver.trial import Bounds
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.names import Names
+from climber_uk.nodes.driver_graph import is_known, others_commanding
 from climber_uk.nodes.driver_node import DriverNode
 
 PATIENCE = 10.0  # [s] for a publisher to be found
@@ -116,6 +117,8 @@ def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None
 
 def move(node: DriverNode, spin: Spinner) -> None:
     """Try the driver."""
+    if node.torques is None and node.simulated_for > 0:  # whoever answers may not be found yet
+        spin.until(lambda: any(is_known(n) for n in others_commanding(node)), PATIENCE / 2)
     node.speak()
     spin.until(lambda: node.is_heard, PATIENCE / 2)
     spin.until(lambda: False, CATCH_UP)

@@ -42,6 +42,11 @@ def others_commanding(node: Node) -> list[str]:
     return [name for name in names if name != node.get_fully_qualified_name()]
 
 
+def is_known(name: str) -> bool:
+    """Whether it is a node's name, not what stands for one that is not yet known."""
+    return "_NODE_NAME_UNKNOWN_" not in name
+
+
 def _name(info: TopicEndpointInfo) -> str:
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
