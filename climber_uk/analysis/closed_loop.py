@@ -80,11 +80,13 @@ def simulate(
     link: Link = Link(),
     motors: Callable[[State, Array], Array] = as_commanded,
     seed: int = 0,
+    plant_of: Callable[[Climber, float], Plant] = Plant,
 ) -> Run:
     """Run of `duration` [s] from `start`; `climber` may change with time.
 
-    `motors` turn the state and what was answered last into torques, at every step. A climber that
-    starts in motion starts with the first answer.
+    `plant_of` makes the plant of a climber and a step. `motors` turn the state and what was
+    answered last into torques, at every step. A climber that starts in motion starts with the first
+    answer.
     """
     random = np.random.default_rng(seed)
     climber_at = climber if callable(climber) else lambda _: climber
@@ -93,7 +95,7 @@ def simulate(
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
     state, torques, rows = start, np.zeros(2), []
-    plant = Plant(climber_at(0.0), link.step)
+    plant = plant_of(climber_at(0.0), link.step)
     every, late = round(link.period / link.step), round(link.delay / link.step)
     for step in range(round(duration / link.step) + 1):
         now = SECOND + round(step * link.step * SECOND)
@@ -113,7 +115,7 @@ def simulate(
         while commanded and commanded[0][0] <= step:
             _, acting = commanded.popleft()
         now_it_is = climber_at(step * link.step)
-        plant = plant if now_it_is is plant.climber else Plant(now_it_is, link.step)
+        plant = plant if now_it_is is plant.climber else plant_of(now_it_is, link.step)
         limit = plant.climber.max_wheel_torque
         if acting is not None:
             torques = np.clip(motors(state, acting), -limit, limit)

@@ -12,14 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from climber_uk.analysis.identification import (
-    CUT,
-    LEAST_WINDOWS,
-    OF_WHEELS,
-    RESISTANCES,
-    Identified,
-    predicted,
-)
+from climber_uk.analysis.identification import CUT, LEAST_WINDOWS, predicted
+from climber_uk.analysis.identified import NAMES, Identified
 from climber_uk.analysis.recorded_motion import RecordedMotion
 from climber_uk.mechanics import Array, unpack
 from climber_uk.mechanics.climber import Climber
@@ -31,7 +25,7 @@ from climber_uk.mechanics.trajectory import Trajectory
 
 PERIOD = 0.02  # [s]
 RAMPS = (0.5, 1.0, 2.0, 4.0)  # [s]
-SOUGHT = ~(RESISTANCES | OF_WHEELS)  # mass, inertia, friction
+SOUGHT = np.isin(NAMES, ("mass", "seal_friction_coefficient", "yaw_inertia"))
 
 
 @dataclass(frozen=True)

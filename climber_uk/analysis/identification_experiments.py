@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from climber_uk.analysis.closed_loop import Controlling, Link, Run, simulate
-from climber_uk.analysis.identification import CUT, NAMES, Identified, identify
+from climber_uk.analysis.identification import CUT, identify
+from climber_uk.analysis.identified import NAMES, Identified
 from climber_uk.analysis.integral_equations import Cut
 from climber_uk.analysis.recorded_motion import RecordedMotion, impulse
 from climber_uk.control.constraints import Guidance

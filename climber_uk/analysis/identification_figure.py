@@ -8,8 +8,8 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib import pyplot as plt
 
-from climber_uk.analysis.identification import NAMES, Identified
-from climber_uk.analysis.integral_equations import seal_load
+from climber_uk.analysis.identified import DRIVE, NAMES, TURN, Identified
+from climber_uk.analysis.integral_equations import Site, friction_load, gravity_ahead
 from climber_uk.analysis.recorded_motion import Indices, RecordedMotion
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
@@ -18,29 +18,27 @@ from climber_uk.mechanics.climber import Climber
 def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Path) -> Path:
     """Write the figure as PNG; return its path."""
     figure, axes = plt.subplots(2, 2, figsize=(10, 6), sharex=True, layout="constrained")
-    windows, time = found.windows, motion.time - motion.time[0]
+    time = motion.time - motion.time[0]
     now = np.array([getattr(believed, name, 0.0) for name in NAMES])
-    for values, style, label in (
-        (now, "0.6", "nodes now"),
-        (found.values, "tab:blue", "identified"),
-    ):
-        asked = np.array([asked_of(motion, believed, values, window) for window in windows])
-        for axis, column in zip(axes[0], asked.T, strict=True):
-            axis.plot([time[window].mean() for window in windows], column, color=style, label=label)
-    gave = np.array([given_in(motion, found, window) for window in windows])
-    for axis, column, label in zip(axes[0], gave.T, ("drive [N]", "moment [N m]"), strict=True):
-        axis.plot([time[window].mean() for window in windows], column, "k.", label="motors")
-        axis.set(ylabel=label)
+    values = np.where(np.isfinite(found.values), found.values, now)
+    columns = (DRIVE, "drive [N]", "way [mm]"), (TURN, "moment [N m]", "heading [mrad]")
+    for column, (kind, driven, measured) in enumerate(columns):
+        windows, (above, below) = found.windows[kind], axes[:, column]
+        middles = [time[window].mean() for window in windows]
+        for wanted, style, label in ((now, "0.6", "nodes now"), (values, "tab:blue", "identified")):
+            asked = [asked_of(motion, believed, found.site, wanted, window) for window in windows]
+            above.plot(middles, [each[column] for each in asked], color=style, label=label)
+        gave = [given_in(motion, values, window) for window in windows]
+        above.plot(middles, [each[column] for each in gave], "k.", label="motors")
+        above.set(ylabel=driven)
+        if kind in found.fits:
+            fit = found.fits[kind]
+            last = len(fit.noise) - 1  # of way and heading; speeds are before them
+            left = 1e3 * fit.noise[last] * fit.residuals[fit.quantity == last]
+            below.plot(time[np.concatenate(windows)], left, ",", color="tab:blue")
+        below.set(xlabel="time [s]", ylabel=f"left of {measured}")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
-    every = np.concatenate(windows)
-    of_way = 0 if motion.rates is None else 1  # speed and yaw rate are before way and heading
-    for axis, quantity, label in zip(
-        axes[1], (of_way, 2 * of_way + 1), ("way [mm]", "heading [mrad]"), strict=True
-    ):
-        left = 1e3 * found.noise[quantity] * found.residuals[quantity]
-        axis.plot(time[every], left, ",", color="tab:blue")
-        axis.set(xlabel="time [s]", ylabel=f"left of {label}")
     for axis in axes.flat:
         axis.grid(alpha=0.3)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -49,25 +47,27 @@ def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Pat
     return path
 
 
-def given_in(motion: RecordedMotion, found: Identified, window: Indices) -> Array:
+def given_in(motion: RecordedMotion, values: Array, window: Indices) -> Array:
     """Drive [N] and moment [N m] (2,) of the motors in a window."""
-    torques = (
-        weak_mean(motion.time[window], motion.impulse[window], order=1) / found["wheel_radius"]
-    )
-    return np.array([torques.sum(), found["half_track"] * (torques[0] - torques[1])])
+    radius, half_track = values[-2:]
+    torques = weak_mean(motion.time[window], motion.impulse[window], order=1) / radius
+    return np.array([torques.sum(), half_track * (torques[0] - torques[1])])
 
 
-def asked_of(motion: RecordedMotion, climber: Climber, values: Array, window: Indices) -> Array:
-    """Drive [N] and moment [N m] (2,) that parameters (7,) ask for in a window."""
-    mass, coefficient, viscous, inertia, turning, _, _ = values
+def asked_of(
+    motion: RecordedMotion, climber: Climber, site: Site, values: Array, window: Indices
+) -> Array:
+    """Drive [N] and moment [N m] (2,) that parameters (8,) ask for in a window."""
+    mass, coefficient, viscous, inertia, turning, resistance, _, _ = values
     time, heading = motion.time[window], motion.pose[window, 2]
     gone = np.column_stack([motion.way[window], heading])
     gone = gone - gone.mean(axis=0)
     (speed, yaw_rate), (faster, turning_faster) = (weak_mean(time, gone, order) for order in (1, 2))
-    pulled = climber.weight_along_wall / climber.mass * weak_mean(time, np.sin(heading), 0)
-    load = weak_mean(time, seal_load(motion, climber)[window], 0)
-    drive = mass * (faster + pulled) + coefficient * load * np.sign(speed) + viscous * speed
-    return np.array([drive, inertia * turning_faster + turning * yaw_rate])
+    pulled = weak_mean(time, gravity_ahead(motion, climber, site)[window], 0)
+    load = weak_mean(time, friction_load(motion, climber, site)[window], 0)
+    drive = mass * (faster - pulled) + coefficient * load * np.sign(speed) + viscous * speed
+    moment = inertia * turning_faster + turning * np.sign(yaw_rate) + resistance * yaw_rate
+    return np.array([drive, moment])
 
 
 def weak_mean(time: Array, values: Array, order: int) -> Array:

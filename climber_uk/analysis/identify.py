@@ -13,7 +13,7 @@ from typing import Any
 
 from climber_uk.analysis import excitation, identification_figure
 from climber_uk.analysis.changed_parameters import write_changed
-from climber_uk.analysis.identification import NAMES, identify
+from climber_uk.analysis.identification import identify
 from climber_uk.analysis.identification_report import (
     CONTROLLER,
     PLANT,
@@ -23,9 +23,17 @@ from climber_uk.analysis.identification_report import (
     rows,
     table,
 )
+from climber_uk.analysis.identified import NAMES
 from climber_uk.analysis.integral_equations import Cut
 from climber_uk.analysis.parameter_file import Values, read_file
 from climber_uk.analysis.recorded_motion import Source, read_motion
+from climber_uk.analysis.recorded_site import (
+    assumed_away,
+    differences,
+    recorded_parameters,
+    site_of,
+)
+from climber_uk.analysis.topics import PARAMETERS
 from climber_uk.mechanics.climber import Climber
 
 PUBLISHER = "trajectory_publisher"
@@ -36,12 +44,17 @@ AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 def tell(options: argparse.Namespace) -> None:
     """Print and write what a bag tells; raises `ValueError` of what it does not."""
     cut = Values(vars(options)).read(Cut)
-    parameters = parameters_of(CONTROLLER, options)
-    believed = Values(parameters).read(Climber)
-    motion, unfit = read_motion(options.bag, source(options, parameters))
-    found = identify(motion, believed, cut)
+    file, plant = parameters_of(CONTROLLER, options), plant_of(options)
+    topic = Source(namespace=options.namespace).topic(PARAMETERS)
+    recorded = recorded_parameters(options.bag, topic)
+    parameters = {**recorded, **file}
+    believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
+    motion, unfit = read_motion(options.bag, source(options, {**file, **recorded}, believed))
+    found = identify(motion, believed, cut, site)
     print(table(found, believed), end="")
     print(*remarks(found), sep="\n")
+    for warning in (*differences(file, recorded), *assumed_away(parameters, plant)):
+        print(warning)
     if unfit:
         print(f"{unfit} unfit messages were left out")
     if options.json:
@@ -55,9 +68,8 @@ def tell(options: argparse.Namespace) -> None:
         raise ValueError("\n".join(said))
 
 
-def source(options: argparse.Namespace, parameters: dict[str, Any]) -> Source:
-    """Where the bag tells of the climber whose controller has `parameters`."""
-    believed = Values(parameters).read(Climber)
+def source(options: argparse.Namespace, parameters: dict[str, Any], believed: Climber) -> Source:
+    """Where the bag tells of the climber whose controller had `parameters`."""
     joints = [parameters.get(f"{side}_wheel_joint", f"{side}_wheel_joint") for side in SIDES]
     delay = parameters.get("transport_delay", 0.0) if options.delay is None else options.delay
     return Source(
@@ -95,6 +107,14 @@ def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
     """Those of a node in the parameter file; none without one."""
     name = Source(namespace=options.namespace).topic(node)
     return read_file(options.params, name) if options.params else {}
+
+
+def plant_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Parameters of the simulator in the parameter file; none if that has none for it."""
+    try:
+        return parameters_of(PLANT, options)
+    except ValueError:
+        return {}
 
 
 def main() -> None:

@@ -1,13 +1,14 @@
 """How a climber moved and what drove it, as arrays, from the messages of a bag."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter, savgol_filter
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.mechanics import SECOND, Array
@@ -15,7 +16,11 @@ from climber_uk.messages import reading
 
 Indices = NDArray[np.intp]
 PATIENCE = 5.0  # typical times from one torque to the next, after which some are missing
-SMOOTHING = 0.1  # [s] to either side, over which rates are taken
+GAP = 0.1  # [s] without odometry, over which nothing is integrated
+SMOOTHING = 0.2  # [s] to either side, over which rates are taken
+SLIP_SMOOTHING = 0.5  # [s] the same for side slip, which is small
+LEAST_LAG = 1e-5  # [s]
+CLEAR = 3.0  # standard deviations of noise
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,7 @@ class RecordedMotion:
     pressure: Array  # (n,) of the suction [Pa]
     stretch: Indices  # (n,) a number that changes where torques are missing
     wheel_angles: Array | None = None  # (n, 2) right, left [rad]
+    torque_ratio: float = 1.0  # of the torques at the wheels to those commanded, if both are told
 
     @cached_property
     def way(self) -> Array:
@@ -40,16 +46,72 @@ class RecordedMotion:
     @cached_property
     def smooth_rates(self) -> Array:
         """Forward speed [m/s] and yaw rate [rad/s] (n, 2), from way and heading, smoothed."""
-        first = np.maximum(self.time - SMOOTHING, self.time[0])
-        last = np.minimum(self.time + SMOOTHING, self.time[-1])
         both = self.way, self.pose[:, 2]
-        gone = [np.interp(last, self.time, one) - np.interp(first, self.time, one) for one in both]
-        return np.column_stack(gone) / (last - first)[:, None]
+        return np.column_stack([self._rate(gone, SMOOTHING) for gone in both])
 
     @property
     def speed(self) -> Array:
         """Forward speed (n,) [m/s], smoothed."""
         return self.smooth_rates[:, 0]
+
+    @cached_property
+    def side_slip(self) -> Array:
+        """Speed to the left (n,) [m/s], smoothed; 0 where it cannot be told from noise."""
+        x, y, turned = np.diff(self.pose, axis=0).T
+        middle = self.pose[:-1, 2] + turned / 2
+        steps = y * np.cos(middle) - x * np.sin(middle)
+        aside = np.concatenate([[0.0], np.cumsum(steps)])
+        slip = self._rate(aside, SLIP_SMOOTHING)
+        noise = np.std(np.diff(steps)) / np.sqrt(6) / SLIP_SMOOTHING  # less, with cubics
+        return slip if np.sqrt(np.mean(slip**2)) > CLEAR * noise else 0 * slip
+
+    @cached_property
+    def torques(self) -> Array:
+        """Of the right and left wheel (n, 2) [N m], just before each time.
+
+        Those after it answer the odometry of that time, and its noise.
+        """
+        torques = np.diff(self.impulse, axis=0) / np.diff(self.time)[:, None]
+        return np.concatenate([torques[:1], torques])
+
+    def acting(self, delay: float, lag: float) -> "RecordedMotion":
+        """The same, if torques act `delay` [s] later, and with a lag of first order [s].
+
+        Of torques that are held, impulses are lines in between, for which this is exact.
+        """
+
+        def lagging(impulse: Array, step: float) -> Array:
+            decay, ratio = np.exp(-step / lag), lag / step
+            line = [1 - ratio * (1 - decay), ratio * (1 - decay) - decay]
+            filtered: Array = lfilter(line, [1, -decay], impulse - impulse[0])
+            return impulse[0] + filtered
+
+        acting = [np.interp(self.time - delay, self.time, wheel) for wheel in self.impulse.T]
+        if lag > LEAST_LAG:
+            acting = [self._evenly(wheel, lagging) for wheel in acting]
+        return replace(self, impulse=np.stack(acting, axis=1))
+
+    def _rate(self, gone: Array, smoothing: float) -> Array:
+        """Rate (n,) of what has `gone` (n,), by cubics over `smoothing` [s] to either side."""
+
+        def slope(values: Array, step: float) -> Array:
+            half = min(max(2, round(smoothing / step)), (len(values) - 1) // 2)
+            if half < 2:
+                return np.gradient(values, step) if len(values) > 1 else 0 * values
+            smooth: Array = savgol_filter(values, 2 * half + 1, 3, deriv=1, delta=step)
+            return smooth
+
+        return self._evenly(gone, slope)
+
+    def _evenly(self, values: Array, function: Callable[[Array, float], Array]) -> Array:
+        """What a function of values and step [s] makes of `values` (n,), between gaps in time."""
+        made, gaps = np.zeros_like(values), np.flatnonzero(np.diff(self.time) > GAP)
+        for part in np.split(np.arange(len(values)), gaps + 1):
+            time = self.time[part]
+            step = float(np.median(np.diff(time))) if len(part) > 1 else 1.0
+            even = time[0] + step * np.arange(round(np.ptp(time) / step) + 1)
+            made[part] = np.interp(time, even, function(np.interp(even, time, values[part]), step))
+        return made
 
 
 def impulse(time: Array, begins: Array, torques: Array) -> Array:
