@@ -28,6 +28,7 @@ from climber_uk.mechanics.climber import Climber
 FIRST = {DRIVE: 0, TURN: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
 VISCOUS, LATE = 2, 3  # columns of (11) and (15)
 QUANTILE = 0.975  # of intervals of 95 %
+KNOWN = 0.1  # of a value, or of all that drives: the widest interval that is of use
 SURE = 2.0  # half widths of its interval, of a friction that is not left to chance
 Columns = Mapping[str, tuple[int, ...]]
 
@@ -59,19 +60,21 @@ def parameters(
 
 
 def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identified:
-    """The same of wheels that scrub: they overstate the track; moments need that of the contacts.
+    """The same where wheels scrub, or may: they overstate the track; moments need the contacts'.
 
     That is the climber's; by how much it is off if it is the other one goes into the intervals.
     """
-    sure = found["turning_friction"] > SURE * found.half_width("turning_friction")
-    if HEADING not in found.fits or not sure:
+    number = NAMES.index("turning_friction")
+    scrubs = found.values[number] > SURE * found.half_widths[number]
+    is_told = TURN in found.fits and found.uncertainty[number] <= KNOWN
+    if HEADING not in found.fits or (is_told and not scrubs):
         return found
     track, effective = climber.half_track, found["half_track"]
-    values, widths, sought = parameters(found.fits, columns, climber, track)
+    values, widths, _ = parameters(found.fits, columns, climber, track)
     between = abs(effective / track - 1) * np.abs(values) * np.isin(NAMES, OF_TURNING)
-    values[-1], sought[-1] = track, False
+    values[-1] = effective
     wider = widths._replace(bias=widths.bias + between)
-    return replace(found, values=values, widths=wider, sought=sought, effective_track=effective)
+    return replace(found, values=values, widths=wider, has_effective_track=True)
 
 
 def _parameters(coefficients: Array, track: float | None) -> Array:

@@ -72,7 +72,7 @@ def remarks(found: Identified) -> Iterator[str]:
     if found.is_clear("turning_friction") or found.is_clear("turning_resistance"):
         moment = f"{found.turning_moment:.3g} N m at {extent.yaw_rate:.3g} rad/s"
         yield f"turning is resisted, by {moment}: it is left to the controller's observer"
-    if found.effective_track:
+    if found.has_effective_track:
         yield "inertia and what resists turning are those of the nodes' half track"
     if "wheel_radius" in found.reasons:
         yield f"radius and track are taken as they are: {found.reasons['wheel_radius'].words}"

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from climber_uk.analysis.coefficients import FIRST
+from climber_uk.analysis.coefficients import FIRST, KNOWN
 from climber_uk.analysis.identified import (
     DRIVE,
     HEADING,
@@ -26,7 +26,6 @@ from climber_uk.analysis.integral_equations import Cut
 from climber_uk.analysis.recorded_motion import RecordedMotion
 from climber_uk.mechanics.climber import Climber
 
-KNOWN = 0.1  # of a value, or of all that drives: the widest interval that is of use
 TOGETHER = 0.95  # correlation of two that cannot be told apart
 SURE = 2.0  # half widths of an interval, of what is not left to chance
 NOISY = 3.0  # times the noise that is usual: 10 mm/s, 1 mm, 10 mrad/s, 1 mrad
@@ -122,8 +121,9 @@ def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
     if WAY not in found.fits:
         words = "joint_states has no wheel angles"
         yield from ((name, Reason("absent", words)) for name in OF_WHEELS)
-    elif found.effective_track:
-        words = f"wheels scrub: their angles show an effective one of {found.effective_track:.4g} m"
+    elif found.has_effective_track and found.uncertainty[-1] <= KNOWN:
+        scrub = "wheels scrub" if found.is_clear("turning_friction") else "wheels may scrub"
+        words = f"{scrub}: their angles show an effective one of {found['half_track']:.4g} m"
         yield "half_track", Reason("absent", words)
 
 

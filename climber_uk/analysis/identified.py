@@ -116,7 +116,7 @@ class Identified:
     site: Site
     left_out: int = 0  # windows that fit much worse than the others
     late: tuple[float, float] = IN_TIME  # [s] delay and lag of the torques beyond what is assumed
-    effective_track: float = 0.0  # [m] that wheels which scrub show in the half track's place
+    has_effective_track: bool = False  # of wheels that scrub, or may
     lacks: Sequence[Lack] = ()  # the test of fit, by kind of equation
     reasons: Mapping[str, Reason] = field(default_factory=dict)  # by name, of what is not told
 
