@@ -71,9 +71,11 @@ def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identif
         return found
     track, effective = climber.half_track, found["half_track"]
     values, widths, _ = parameters(found.fits, columns, climber, track)
-    between = abs(effective / track - 1) * np.abs(values) * np.isin(NAMES, OF_TURNING)
+    known = np.isin(NAMES, OF_TURNING) & np.isfinite(values) & np.isfinite(effective)
+    bias = widths.bias.copy()
+    bias[known] += abs(effective / track - 1) * np.abs(values[known])
     values[-1] = effective
-    wider = widths._replace(bias=widths.bias + between)
+    wider = widths._replace(bias=bias)
     return replace(found, values=values, widths=wider, has_effective_track=True)
 
 

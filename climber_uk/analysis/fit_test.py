@@ -55,16 +55,16 @@ def _explained(found: Identified, kind: str, motion: RecordedMotion) -> str:
     quantities = {
         WEIGHT[0]: np.cos(heading),
         WEIGHT[1]: (y - y.mean()) * np.sin(heading),
-        "the weight's part along the heading": np.sin(heading),
         "the place": x,
         "the yaw rate": np.abs(yaw_rate),
         "the speed": np.abs(speed),
-        "the side it turns to": np.sign(yaw_rate),
+        "the side it turns to": np.sign(yaw_rate) if kind == DRIVE else np.ones_like(yaw_rate),
         "the time": motion.time,
     }
     means = {name: np.array([q[w].mean() for w in windows]) for name, q in quantities.items()}
-    own = (speed, np.sin(heading)) if kind == DRIVE else (yaw_rate,)
-    known = np.array([[np.sign(own[0][w].mean()), *(q[w].mean() for q in own)] for w in windows])
+    side = 1.0 if kind == DRIVE else -1.0
+    own, torques = (speed if kind == DRIVE else yaw_rate), motion.torques @ [1.0, side]
+    known = np.array([[own[w].mean(), np.sign(own[w].mean()), torques[w].mean()] for w in windows])
     misfits = found.fits[kind].misfit.found[:, 0]
     shares = {name: _explained_share(misfits, mean, known) for name, mean in means.items()}
     best = max(shares, key=shares.__getitem__)

@@ -41,7 +41,7 @@ class Scenario:
     duration: float  # [s]
     contact: Contact = field(default_factory=Contact)
     slip: bool = False
-    step: float = 0.0025  # [s] of the plant
+    period: float = 0.005  # [s] from one odometry to the next; of the plant half as much
 
     def plant(self, true: Climber, step: float) -> Plant:
         """What is driven."""
@@ -50,8 +50,10 @@ class Scenario:
     def run(self, believed: Climber, true: Climber, link: Link, seed: int = 0) -> tuple[Run, "Ear"]:
         """Run of a controller that believes in a climber, and what it was told."""
         controller = Controller(believed, self.guidance, Law())
-        ear = Ear(Follower(Tracker(controller, Observer(), Timing(), Pacing()), Safety()))
-        loop = self.trajectory, self.start, self.duration, ear, true, replace(link, step=self.step)
+        timing = Timing(control_period=self.period)
+        ear = Ear(Follower(Tracker(controller, Observer(), timing, Pacing()), Safety()))
+        link = replace(link, step=self.period / 2, period=self.period)
+        loop = self.trajectory, self.start, self.duration, ear, true, link
         return simulate(*loop, seed=seed, plant_of=self.plant), ear
 
     def tracks(self, believed: Climber, true: Climber) -> float:
@@ -91,7 +93,7 @@ SCENARIOS = {
         16.0,
         Contact(locomotion=Tracked(scrub_friction_coefficient=0.8, length=0.44)),
         slip=True,
-        step=0.005,
+        period=0.01,
     ),
 }
 

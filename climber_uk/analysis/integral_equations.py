@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from climber_uk.analysis.recorded_motion import GAP, SMOOTHING, Indices, RecordedMotion
+from climber_uk.analysis.even_time import gaps
+from climber_uk.analysis.recorded_motion import SMOOTHING, Indices, RecordedMotion
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.parameter import check, parameter
@@ -71,7 +72,7 @@ class Cut:
     def _cut(self, motion: RecordedMotion, rate: Array, least: float) -> list[Indices]:
         moving = np.abs(rate) > least
         breaks = (np.diff(np.sign(rate) * moving) != 0) | (np.diff(motion.stretch) != 0)
-        breaks |= np.diff(motion.time) > GAP
+        breaks |= gaps(motion.time)
         windows: list[Indices] = []
         for run in np.split(np.arange(len(motion.time)), np.flatnonzero(breaks) + 1):
             time = motion.time[run]

@@ -8,18 +8,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter, savgol_filter
 
 from climber_uk.analysis.bag import read_messages
+from climber_uk.analysis.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading
 
 Indices = NDArray[np.intp]
+Wheels = tuple[Array, Array]  # torques (2,), angles (2,)
+Torques = tuple[Array, Array]  # when they begin (m,) [s], and they (m, 2) [N m]
+HALF_SECOND = 0.5  # [s]
 PATIENCE = 5.0  # typical times from one torque to the next, after which some are missing
-GAP = 0.1  # [s] without odometry, over which nothing is integrated
 SMOOTHING = 0.2  # [s] to either side, over which rates are taken
 SLIP_SMOOTHING = 0.5  # [s] the same for side slip, which is small
-LEAST_LAG = 1e-5  # [s]
 CLEAR = 3.0  # standard deviations of noise
 
 
@@ -47,7 +48,7 @@ class RecordedMotion:
     def smooth_rates(self) -> Array:
         """Forward speed [m/s] and yaw rate [rad/s] (n, 2), from way and heading, smoothed."""
         both = self.way, self.pose[:, 2]
-        return np.column_stack([self._rate(gone, SMOOTHING) for gone in both])
+        return np.column_stack([rate(self.time, gone, SMOOTHING) for gone in both])
 
     @property
     def speed(self) -> Array:
@@ -61,7 +62,7 @@ class RecordedMotion:
         middle = self.pose[:-1, 2] + turned / 2
         steps = y * np.cos(middle) - x * np.sin(middle)
         aside = np.concatenate([[0.0], np.cumsum(steps)])
-        slip = self._rate(aside, SLIP_SMOOTHING)
+        slip = rate(self.time, aside, SLIP_SMOOTHING)
         noise = np.std(np.diff(steps)) / np.sqrt(6) / SLIP_SMOOTHING  # less, with cubics
         return slip if np.sqrt(np.mean(slip**2)) > CLEAR * noise else 0 * slip
 
@@ -75,43 +76,10 @@ class RecordedMotion:
         return np.concatenate([torques[:1], torques])
 
     def acting(self, delay: float, lag: float) -> "RecordedMotion":
-        """The same, if torques act `delay` [s] later, and with a lag of first order [s].
-
-        Of torques that are held, impulses are lines in between, for which this is exact.
-        """
-
-        def lagging(impulse: Array, step: float) -> Array:
-            decay, ratio = np.exp(-step / lag), lag / step
-            line = [1 - ratio * (1 - decay), ratio * (1 - decay) - decay]
-            filtered: Array = lfilter(line, [1, -decay], impulse - impulse[0])
-            return impulse[0] + filtered
-
-        acting = [np.interp(self.time - delay, self.time, wheel) for wheel in self.impulse.T]
-        if lag > LEAST_LAG:
-            acting = [self._evenly(wheel, lagging) for wheel in acting]
-        return replace(self, impulse=np.stack(acting, axis=1))
-
-    def _rate(self, gone: Array, smoothing: float) -> Array:
-        """Rate (n,) of what has `gone` (n,), by cubics over `smoothing` [s] to either side."""
-
-        def slope(values: Array, step: float) -> Array:
-            half = min(max(2, round(smoothing / step)), (len(values) - 1) // 2)
-            if half < 2:
-                return np.gradient(values, step) if len(values) > 1 else 0 * values
-            smooth: Array = savgol_filter(values, 2 * half + 1, 3, deriv=1, delta=step)
-            return smooth
-
-        return self._evenly(gone, slope)
-
-    def _evenly(self, values: Array, function: Callable[[Array, float], Array]) -> Array:
-        """What a function of values and step [s] makes of `values` (n,), between gaps in time."""
-        made, gaps = np.zeros_like(values), np.flatnonzero(np.diff(self.time) > GAP)
-        for part in np.split(np.arange(len(values)), gaps + 1):
-            time = self.time[part]
-            step = float(np.median(np.diff(time))) if len(part) > 1 else 1.0
-            even = time[0] + step * np.arange(round(np.ptp(time) / step) + 1)
-            made[part] = np.interp(time, even, function(np.interp(even, time, values[part]), step))
-        return made
+        """The same, if torques act `delay` [s] later, and with a lag of first order [s]."""
+        told = [np.interp(self.time - delay, self.time, wheel) for wheel in self.impulse.T]
+        acting = np.stack([lagging(self.time, wheel, lag) for wheel in told], axis=1)
+        return replace(self, impulse=acting)
 
 
 def impulse(time: Array, begins: Array, torques: Array) -> Array:
@@ -149,11 +117,15 @@ def read_motion(bag: str | Path, source: Source) -> tuple[RecordedMotion, int]:
     """
     found, unfit = _collected(bag, source)
     states, commands, wheels, pressures = found
-    begins, torques = _torques(commands, wheels, source.delay)
+    commanded, at_wheels = _commanded(commands, source.delay), _at_wheels(wheels)
+    begins, torques = at_wheels or commanded
     time = np.array([t for t in states if len(begins) > 1 and begins[0] <= t <= begins[-1]])
     if len(time) < 2:
         topic = source.topic(source.odometry)
-        raise ValueError(f"{bag} has no odometry on {topic} at times that torques are known")
+        because = f" ({len(unfit)} messages are unfit: {unfit[-1]})" if unfit else ""
+        raise ValueError(
+            f"{bag} has no odometry on {topic} at times that torques are known{because}"
+        )
     kept = [states[t] for t in time.tolist()]
     pose = np.array([state.pose for state in kept])
     rates = np.array([[state.forward_speed, state.yaw_rate] for state in kept])
@@ -166,12 +138,13 @@ def read_motion(bag: str | Path, source: Source) -> tuple[RecordedMotion, int]:
         pressure=np.interp(time, list(told), list(told.values())),
         stretch=stretches(time, begins),
         wheel_angles=_angles(time, wheels),
+        torque_ratio=_ratio(at_wheels, commanded) if at_wheels else 1.0,
     )
-    return motion, unfit
+    return motion, len(unfit)
 
 
-def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]], int]:
-    """Contents by stamp [s] of odometry, commands, wheels and pressure; how many were unfit."""
+def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]], list[str]]:
+    """Contents by stamp [s] of odometry, commands, wheels and pressure; why others are unfit."""
     right, left = source.joints
     readers: dict[str, Callable[[Any], Any]] = {
         source.odometry: lambda m: reading.state(m, m.header.frame_id, m.child_frame_id),
@@ -181,20 +154,23 @@ def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]],
     }
     topics = {source.topic(name): name for name in readers}
     found: dict[str, dict[float, Any]] = {name: {} for name in readers}
-    unfit = 0
+    unfit: list[str] = []
     for topic, _, message in read_messages(bag, topics):
         name = topics[topic]
         try:
             content = readers[name](message)
-        except ValueError:
-            unfit += 1
+        except ValueError as error:
+            unfit.append(str(error))
         else:
-            found[name][reading.nanoseconds(message.header.stamp) / SECOND] = content
+            if content is not None:
+                found[name][reading.nanoseconds(message.header.stamp) / SECOND] = content
     return [dict(sorted(contents.items())) for contents in found.values()], unfit
 
 
-def _wheels(message: Any, joints: Sequence[str]) -> tuple[Array, Array]:
-    """Torques (2,) and angles (2,) of two joints, nan where they are not told."""
+def _wheels(message: Any, joints: Sequence[str]) -> Wheels | None:
+    """Torques (2,) and angles (2,) of two joints, nan where not told; None: of others alone."""
+    if not set(joints) <= set(message.name):
+        return None
     both = []
     for values in (message.effort, message.position):
         told = dict(zip(message.name, values, strict=False))
@@ -202,18 +178,33 @@ def _wheels(message: Any, joints: Sequence[str]) -> tuple[Array, Array]:
     return both[0], both[1]
 
 
-def _torques(
-    commanded: dict[float, Array], wheels: dict[float, tuple[Array, Array]], delay: float
-) -> tuple[Array, Array]:
-    """When torques begin (m,) [s], and they (m, 2): those at the wheels if these are told."""
+def _at_wheels(wheels: dict[float, Wheels]) -> Torques | None:
+    """When torques at the wheels begin (m,) [s], and they (m, 2); None if these are not told."""
     efforts = np.array([torques for torques, _ in wheels.values()]).reshape(-1, 2)
-    if len(efforts) > 1 and np.isfinite(efforts).all() and efforts.any():
-        ends = np.array(list(wheels))
-        return ends, np.concatenate([efforts[1:], efforts[-1:]])  # each tells of the time before it
-    return np.array(list(commanded)) + delay, np.array(list(commanded.values())).reshape(-1, 2)
+    if len(efforts) < 2 or not np.isfinite(efforts).all() or not efforts.any():
+        return None
+    # each tells of the time before it
+    return np.array(list(wheels)), np.concatenate([efforts[1:], efforts[-1:]])
 
 
-def _angles(time: Array, wheels: dict[float, tuple[Array, Array]]) -> Array | None:
+def _commanded(commands: dict[float, Array], delay: float) -> Torques:
+    """The same of commanded torques."""
+    return np.array(list(commands)) + delay, np.array(list(commands.values())).reshape(-1, 2)
+
+
+def _ratio(at_wheels: Torques, commanded: Torques) -> float:
+    """Of the torques at the wheels to those commanded, by least squares over half seconds."""
+    if not len(commanded[0]):
+        return 1.0
+    first = max(at_wheels[0][0], commanded[0][0])
+    times = np.arange(first, min(at_wheels[0][-1], commanded[0][-1]), HALF_SECOND)
+    if len(times) < 2:
+        return 1.0
+    are, were = (np.diff(impulse(times, *told), axis=0).ravel() for told in (at_wheels, commanded))
+    return float(are @ were / (were @ were)) if were.any() else 1.0
+
+
+def _angles(time: Array, wheels: dict[float, Wheels]) -> Array | None:
     angles = np.array([angles for _, angles in wheels.values()]).reshape(-1, 2)
     if len(angles) < 2 or not np.isfinite(angles).all() or not angles.any():
         return None

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from made_bag import JOINTS, ODOMETRY, SECOND, blank, message, turn, write
 
 from climber_uk.analysis import excitation, identify
 from climber_uk.analysis.changed_parameters import write_changed
@@ -16,6 +17,7 @@ from climber_uk.mechanics.shapes import SHAPES
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
+SIDES = "right", "left"
 CONFIG = Path(__file__).parents[2] / "config" / "climber.yaml"
 LIMITS = excitation.Limits(size=1.0, speed=0.2, duration=20.0)
 
@@ -116,3 +118,133 @@ def test_the_table_is_written_as_json_and_drawn(monkeypatch, tmp_path, capsys):
     said = capsys.readouterr().out
     assert "3 unfit messages were left out" in said
     assert "| mass " in said
+
+
+EVERY = 4  # of the times of a made motion
+WHEELS = ("a_right", "a_left")
+
+
+def bag_of(path, motion, torques, parameters=None, others=(), name=WHEELS):
+    """A bag of a made motion, its torques (n, 2) commanded, and recorded parameters."""
+    messages = []
+    right_left = [*name]
+    for i in range(0, len(motion.time), EVERY):
+        stamp = SECOND + round(motion.time[i] * SECOND)
+        x, y, heading = motion.pose[i]
+        odometry = message(
+            ODOMETRY,
+            stamp,
+            child_frame_id="base_link",
+            pose__pose__position__x=float(x),
+            pose__pose__position__y=float(y),
+            pose__pose__orientation=turn(heading),
+            twist__twist__linear__x=float(motion.rates[i, 0]),
+            twist__twist__angular__z=float(motion.rates[i, 1]),
+        )
+        mean = torques[i : i + EVERY].mean(axis=0)
+        commanded = message(JOINTS, stamp, name=right_left, effort=mean)
+        told = message(JOINTS, stamp, name=right_left, position=motion.wheel_angles[i])
+        messages += [("/odom", ODOMETRY, stamp, odometry)]
+        messages += [("/wheel_torques", JOINTS, stamp, commanded)]
+        messages += [("/joint_states", JOINTS, stamp, told)]
+        messages += [("/joint_states", JOINTS, stamp, message(JOINTS, stamp, **o)) for o in others]
+    if parameters:
+        event = blank("rcl_interfaces/msg/ParameterEvent")
+        event.new_parameters = [parameter(*item) for item in parameters.items()]
+        topic = "/uk_torque_controller/parameters"
+        messages.append((topic, "rcl_interfaces/msg/ParameterEvent", SECOND, event))
+    return write(path, messages)
+
+
+def parameter(name, value):
+    made = blank("rcl_interfaces/msg/Parameter")
+    made.name = name
+    made.value.type = 4 if isinstance(value, str) else 3
+    setattr(made.value, "string_value" if isinstance(value, str) else "double_value", value)
+    return made
+
+
+def made_bag(path, recorded, believed=None, **others):
+    """A bag of the motion of `test_identification`, and its torques."""
+    from test_identification import TRUE, moved
+
+    motion = moved(noise=1.0, wheels=True, true=believed or TRUE)
+    torques = np.gradient(motion.impulse, motion.time, axis=0)
+    names = {f"{side}_wheel_joint": name for side, name in zip(SIDES, WHEELS, strict=True)}
+    return bag_of(path, motion, torques, {**names, **recorded}, **others)
+
+
+def told_of(monkeypatch, tmp_path, capsys, bag, *arguments):
+    """Rows by parameter, the file that was written, what was printed, and the status."""
+    files = "--json", tmp_path / "told.json", "--output", tmp_path / "told.yaml"
+    status = 0
+    try:
+        run(monkeypatch, bag, *files, *arguments)
+    except SystemExit as end:
+        status = end.code
+    rows = {row["parameter"]: row for row in json.loads((tmp_path / "told.json").read_text())}
+    return rows, (tmp_path / "told.yaml").read_text(), capsys.readouterr().out, status
+
+
+def test_names_and_geometry_are_those_that_the_bag_recorded(monkeypatch, tmp_path, capsys):
+    brush = {"name": ["brush", "lift"], "effort": np.array([9.0, 9.0])}
+    bag = made_bag(tmp_path / "bag", {"wheel_radius": 0.027}, others=[brush])
+    rows, written, _, status = told_of(monkeypatch, tmp_path, capsys, bag)
+    assert status == 0
+    assert rows["mass"]["estimate"] == pytest.approx(6.5, rel=0.01)
+    assert rows["wheel_radius"]["estimate"] == pytest.approx(0.03, rel=0.01)
+    assert rows["mass"]["model_fits"]
+    assert yaml.safe_load(written)["/**/plant_simulator"]["ros__parameters"]["mass"] > 6
+
+
+def test_a_file_that_differs_from_what_was_recorded_is_used_and_said(monkeypatch, tmp_path, capsys):
+    bag = made_bag(tmp_path / "bag", {"inclination": 80.0})
+    file = tmp_path / "now.yaml"
+    file.write_text("/**/uk_torque_controller:\n  ros__parameters: {inclination: 90.0}\n")
+    rows, _, said, _ = told_of(monkeypatch, tmp_path, capsys, bag, "--params", file)
+    assert rows["mass"]["estimate"] == pytest.approx(6.5, rel=0.01)
+    assert "inclination was 80 when this was recorded; 90 of the file is used" in said
+
+
+def test_a_magnetic_climber_has_no_seal_and_no_pressure(monkeypatch, tmp_path, capsys):
+    bag = made_bag(tmp_path / "bag", {"adhesion": "magnetic"})
+    rows, written, said, _ = told_of(monkeypatch, tmp_path, capsys, bag)
+    assert rows["rolling_friction"]["unit"] == "N"
+    for word in ("seal", "pressure"):
+        assert word not in said + written + " ".join(rows)
+
+
+def test_settings_that_the_model_does_not_know_are_said(monkeypatch, tmp_path, capsys):
+    bag, file = made_bag(tmp_path / "bag", {}), tmp_path / "now.yaml"
+    file.write_text(
+        "/**/uk_torque_controller:\n  ros__parameters: {seal_radius: 0.1}\n"
+        "/**/plant_simulator:\n  ros__parameters: {wall: cylinder, cylinder.radius: -500.0, "
+        "friction: lugre, odometry_source: wheels, heading_bias: 0.1}\n"
+    )
+    _, _, said, _ = told_of(monkeypatch, tmp_path, capsys, bag, "--params", file)
+    for setting in ("seal_radius is 0.1", "the wall is a cylinder", "friction is lugre"):
+        assert setting in said
+    for setting in ("odometry_source is wheels", "heading_bias is 0.1"):
+        assert setting in said
+
+
+def test_what_cannot_be_told_is_in_status_file_and_table(monkeypatch, tmp_path, capsys):
+    from test_identification import STRAIGHT, moved
+
+    motion = moved(heading=STRAIGHT, noise=1.0, wheels=True)
+    torques = np.gradient(motion.impulse, motion.time, axis=0)
+    names = {f"{side}_wheel_joint": name for side, name in zip(SIDES, WHEELS, strict=True)}
+    bag = bag_of(tmp_path / "bag", motion, torques, names)
+    rows, written, said, status = told_of(monkeypatch, tmp_path, capsys, bag)
+    assert "identify: " in status
+    assert "yaw inertia cannot be told" in status
+    assert rows["yaw_inertia"]["estimate"] is None
+    assert "yaw_inertia" not in written
+    assert "it turns one way at more than 0.05 rad/s in only 0 windows" in said
+
+
+def test_wrong_joint_names_are_said_with_the_right_ones(monkeypatch, tmp_path):
+    bag = made_bag(tmp_path / "bag", {}, name=("left", "right"))
+    with pytest.raises(SystemExit) as end:
+        run(monkeypatch, bag)
+    assert "names ['left', 'right'] must be 'a_left' and 'a_right'" in str(end.value)

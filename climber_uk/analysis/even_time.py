@@ -1,0 +1,57 @@
+"""Filters of what was sampled at (nearly) even times, with gaps: rates, and lags of first order."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter, savgol_filter
+
+from climber_uk.mechanics import Array
+
+GAP, MISSING = 0.1, 2.5  # [s], and typical times from one sample to the next: a gap is more
+LEAST_LAG = 1e-5  # [s]
+
+
+def gaps(time: Array) -> NDArray[np.bool_]:
+    """Whether too much is missing between a time (n - 1,) and the next."""
+    steps = np.diff(time)
+    missing: NDArray[np.bool_] = steps > max(GAP, MISSING * float(np.median(steps)))
+    return missing
+
+
+def rate(time: Array, gone: Array, smoothing: float) -> Array:
+    """Rate (n,) of what has `gone` (n,), by cubics over `smoothing` [s] to either side."""
+
+    def slope(values: Array, step: float) -> Array:
+        half = min(max(2, round(smoothing / step)), (len(values) - 1) // 2)
+        if half < 2:
+            return np.gradient(values, step) if len(values) > 1 else 0 * values
+        smooth: Array = savgol_filter(values, 2 * half + 1, 3, deriv=1, delta=step)
+        return smooth
+
+    return _evenly(time, gone, slope)
+
+
+def lagging(time: Array, values: Array, lag: float) -> Array:
+    """What follows `values` (n,) with a lag of first order [s]; exact if they are lines between."""
+    if lag < LEAST_LAG:
+        return values
+
+    def filtered(even: Array, step: float) -> Array:
+        decay, ratio = np.exp(-step / lag), lag / step
+        line = [1 - ratio * (1 - decay), ratio * (1 - decay) - decay]
+        late: Array = even[0] + lfilter(line, [1, -decay], even - even[0])
+        return late
+
+    return _evenly(time, values, filtered)
+
+
+def _evenly(time: Array, values: Array, function: Callable[[Array, float], Array]) -> Array:
+    """What a function of values and step [s] makes of `values` (n,), between gaps in time."""
+    made = np.zeros_like(values)
+    for part in np.split(np.arange(len(values)), np.flatnonzero(gaps(time)) + 1):
+        own = time[part]
+        step = float(np.median(np.diff(own))) if len(part) > 1 else 1.0
+        even = own[0] + step * np.arange(round(np.ptp(own) / step) + 1)
+        made[part] = np.interp(own, even, function(np.interp(even, own, values[part]), step))
+    return made
