@@ -1,7 +1,8 @@
 """`python bench/identify.py`: how near identification comes to a truth that is known.
 
 Mass, inertia and friction each 30 % more or less than the controller believes, odometry with noise
-of 1 mm, 1 mrad, 10 mm/s and 10 mrad/s; another noise and another truth with each seed.
+of 1 mm, 1 mrad, 10 mm/s and 10 mrad/s; another noise and another truth with each seed. What is not
+told counts as neither right nor wrong.
 """
 
 import argparse
@@ -17,12 +18,19 @@ from climber_uk.analysis.identification_experiments import (
     as_identified,
     errors,
     identified,
+    scrub_error,
 )
 
 
 def trial(name: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Relative errors (3,) of a seed, and whether the truth is in the intervals (3,)."""
-    return errors(*identified(SCENARIOS[name], seed))
+    """Relative errors (4,) of a seed, nan if not told, and whether they are in the intervals (4,).
+
+    The last is what resists turning, in N m.
+    """
+    true, found = identified(SCENARIOS[name], seed)
+    off, inside = errors(true, found)
+    scrub, is_inside = scrub_error(SCENARIOS[name], true, found)
+    return np.append(off, scrub), np.append(inside, is_inside)
 
 
 def tracking(name: str, seed: int) -> float:
@@ -32,6 +40,16 @@ def tracking(name: str, seed: int) -> float:
     return scenario.tracks(as_identified(scenario.believed, found), true) / scenario.tracks(
         true, true
     )
+
+
+def said(off: np.ndarray, inside: np.ndarray, form: str) -> str:
+    """In how many seeds it was told, how well, and in how many of these the interval was right."""
+    told = np.isfinite(off)
+    if not told.any():
+        return "never told"
+    rms, largest = np.sqrt(np.mean(off[told] ** 2)), np.abs(off[told]).max()
+    right = f"in the interval {inside[told].sum()} of {told.sum()}"
+    return f"error rms {rms:{form}}, largest {largest:{form}}, {right}, not told {(~told).sum()}"
 
 
 def main() -> None:
@@ -45,13 +63,9 @@ def main() -> None:
         for name in [options.only] if options.only else SCENARIOS:
             results = list(pool.map(partial(trial, name), range(options.seeds)))
             off, inside = (np.array(column) for column in zip(*results, strict=True))
-            for number, parameter in enumerate(OFF):
-                rms = np.sqrt(np.mean(off[:, number] ** 2))
+            for number, parameter in enumerate((*OFF, "turning_friction")):
                 print(
-                    f"{name:14}{parameter:28}error rms {rms:.3%}, largest "
-                    f"{np.abs(off[:, number]).max():.3%}, in the interval "
-                    f"{inside[:, number].sum()} of {options.seeds}",
-                    flush=True,
+                    f"{name:14}{parameter:28}{said(off[:, number], inside[:, number])}", flush=True
                 )
             ratios = list(pool.map(partial(tracking, name), range(min(5, options.seeds))))
             print(f"{name:14}tracking at worst {max(ratios):.3f} of that with the true parameters")

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from climber_uk.analysis.identification import CUT, LEAST_WINDOWS, predicted
-from climber_uk.analysis.identified import NAMES, Identified
+from climber_uk.analysis.identification import CUT, LEAST_WINDOWS, SITE, predicted
+from climber_uk.analysis.identified import DRIVE, NAMES, TURN, Identified
+from climber_uk.analysis.integral_equations import Site
 from climber_uk.analysis.recorded_motion import RecordedMotion
 from climber_uk.mechanics import Array, unpack
 from climber_uk.mechanics.climber import Climber
@@ -24,7 +25,9 @@ from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
 PERIOD = 0.02  # [s]
+AMPLE = 1.6  # times as many windows as there must be
 RAMPS = (0.5, 1.0, 2.0, 4.0)  # [s]
+SHOWN = ~np.isin(NAMES, ("wheel_radius", "half_track"))  # need wheel angles, and no plan
 SOUGHT = np.isin(NAMES, ("mass", "seal_friction_coefficient", "yaw_inertia"))
 
 
@@ -50,6 +53,17 @@ class Plan:
     tells: Identified
 
     @property
+    def is_short(self) -> bool:
+        """Whether it has hardly windows enough, should a few be lost to noise."""
+        return min(len(self.tells.windows[kind]) for kind in (DRIVE, TURN)) < AMPLE * LEAST_WINDOWS
+
+    @property
+    def worst(self) -> float:
+        """Of the uncertainties; without end if it does not show all there may be."""
+        shown = np.where(self.tells.sought, self.tells.uncertainty, np.inf)
+        return float(shown[SHOWN].max())
+
+    @property
     def parameters(self) -> dict[str, Any]:
         """Those of `trajectory_publisher`."""
         shape, law = asdict(self.trajectory.shape), asdict(self.trajectory.law)  # type: ignore[call-overload]
@@ -58,15 +72,19 @@ class Plan:
         return {"shape": self.name, "time_law": "rest_to_rest", "reverse_gear": False, **values}
 
 
-def plan(climber: Climber, limits: Limits, origin: tuple[float, float] = (0.0, 0.0)) -> Plan:
+def plan(
+    climber: Climber, limits: Limits, origin: tuple[float, float] = (0.0, 0.0), site: Site = SITE
+) -> Plan:
     """The best of the candidates within the limits; `ValueError` if there is none."""
-    found = list(_plans(climber, limits, origin))
+    found = list(_plans(climber, limits, origin, site))
     if not found:
         raise ValueError(f"no trajectory keeps within {limits}")
-    return min(found, key=lambda one: one.tells.uncertainty[SOUGHT].max())
+    return min(found, key=lambda one: (one.is_short, one.worst))
 
 
-def _plans(climber: Climber, limits: Limits, origin: tuple[float, float]) -> Iterator[Plan]:
+def _plans(
+    climber: Climber, limits: Limits, origin: tuple[float, float], site: Site
+) -> Iterator[Plan]:
     for name, shape in _shapes(limits.size):
         for ramp_time in RAMPS:
             trajectory = Trajectory(shape, _law(shape, ramp_time, limits), origin=origin)
@@ -75,7 +93,7 @@ def _plans(climber: Climber, limits: Limits, origin: tuple[float, float]) -> Ite
             motion, torques = driven(trajectory, climber)
             is_long = len(CUT.windows(motion)) >= LEAST_WINDOWS
             if is_long and np.abs(torques).max() <= limits.torque:
-                yield Plan(name, trajectory, predicted(motion, climber))
+                yield Plan(name, trajectory, predicted(motion, climber, site=site))
 
 
 def _shapes(size: float) -> Iterator[tuple[str, Shape]]:

@@ -73,9 +73,11 @@ def identify(
     return replace(found, reasons=reasons(found, motion, climber, cut))
 
 
-def predicted(motion: RecordedMotion, climber: Climber, cut: Cut = CUT) -> Identified:
+def predicted(
+    motion: RecordedMotion, climber: Climber, cut: Cut = CUT, site: Site = SITE
+) -> Identified:
     """What would be found of `climber` if it moved like this, with the noise to begin with."""
-    task = Task(motion, climber, SITE, _windows(motion, cut))
+    task = Task(motion, climber, site, _windows(motion, cut))
     columns = _columns(task.extent)
     fits = {
         kind: WindowFit.standardised(each, columns[kind], task.noise(kind))
@@ -84,7 +86,7 @@ def predicted(motion: RecordedMotion, climber: Climber, cut: Cut = CUT) -> Ident
     values, widths, sought = parameters(fits, columns, climber)
     none = np.zeros_like(widths.white)
     white = Widths(none, widths.white, none)
-    return Identified(values, white, sought, fits, task.extent, task.windows, SITE)
+    return Identified(values, white, sought, fits, task.extent, task.windows, site)
 
 
 @dataclass(frozen=True)

@@ -151,8 +151,8 @@ def identified(scenario: Scenario, seed: int, cut: Cut = CUT) -> tuple[Climber, 
 
 
 def as_identified(believed: Climber, found: Identified) -> Climber:
-    """Climber with what was found."""
-    return replace(believed, **{name: found[name] for name in OFF})
+    """Climber with what was told."""
+    return replace(believed, **{name: found[name] for name in OFF if name not in found.reasons})
 
 
 def errors(true: Climber, found: Identified) -> tuple[Array, Choice]:

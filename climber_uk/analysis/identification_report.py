@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from climber_uk.analysis.identified import IN_TIME, NAMES, UNITS, Identified
+from climber_uk.analysis.integral_equations import Site
 from climber_uk.analysis.paper.table import markdown
 from climber_uk.mechanics.climber import Climber
 
 CONTROLLER, PLANT = "uk_torque_controller", "plant_simulator"
-COLUMNS = ("parameter", "estimate", "± 95 %", "unit", "nodes now", "cannot be told, because")
+COLUMNS = ("parameter", "estimate", "± 95 %", "unit", "nodes now", "")
 COULOMB = "seal_friction_coefficient"
 WITHOUT_SEAL = {COULOMB: ("rolling_friction", "N")}  # what that coefficient is then
 ADVICE = {
@@ -19,12 +20,15 @@ ADVICE = {
 DIGITS = 6  # of a parameter that is written
 
 
+def label_of(name: str, site: Site) -> tuple[str, str]:
+    """What a parameter is called where it was found, and its unit."""
+    return (name, UNITS[name]) if site.has_seal else WITHOUT_SEAL.get(name, (name, UNITS[name]))
+
+
 def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
     """What is told of each parameter; of what is not, why, and no number."""
     for name, value, half_width in zip(NAMES, found.values, found.half_widths, strict=True):
-        label, unit = name, UNITS[name]
-        if not found.site.has_seal:
-            label, unit = WITHOUT_SEAL.get(name, (name, unit))
+        label, unit = label_of(name, found.site)
         reason = found.reasons.get(name)
         yield {
             "parameter": label,
@@ -45,7 +49,8 @@ def table(found: Identified, believed: Climber) -> str:
     for row in rows(found, believed):
         digits = {"estimate": 5, "half_width": 2, "nodes_now": 5}
         numbers = [("" if row[key] is None else f"{row[key]:.{n}g}") for key, n in digits.items()]
-        cells.append((row["parameter"], *numbers[:2], row["unit"], numbers[2], row["reason"] or ""))
+        why = f"cannot be told: {row['reason']}" if row["reason"] else ""
+        cells.append((row["parameter"], *numbers[:2], row["unit"], numbers[2], why))
     return markdown(COLUMNS, cells)
 
 
@@ -66,8 +71,9 @@ def remarks(found: Identified) -> Iterator[str]:
         delay, lag = (1e3 * late for late in found.late)
         yield f"torques act {delay:.2g} ms later than assumed, and with a lag of {lag:.2g} ms"
     if "viscous_friction" in found.reasons:
-        yield "viscous friction cannot be told apart from the seal's: drive at different speeds"
-    elif found.is_clear("viscous_friction"):
+        other = "the seal's" if found.site.has_seal else "rolling friction"
+        yield f"viscous friction cannot be told apart from {other}: drive at different speeds"
+    elif found.is_clear("viscous_friction") and found.site.has_seal:
         yield "the controller knows no viscous friction: it gets that of this speed as the seal's"
     if found.is_clear("turning_friction") or found.is_clear("turning_resistance"):
         moment = f"{found.turning_moment:.3g} N m at {extent.yaw_rate:.3g} rad/s"
@@ -89,7 +95,7 @@ def missing(found: Identified) -> Iterator[str]:
         }
         if not causes:
             continue
-        labels = [_label(name, found).replace("_", " ") for name in causes]
+        labels = [label_of(name, found.site)[0].replace("_", " ") for name in causes]
         apart = " apart" if len(labels) > 1 and "collinear" in causes.values() else ""
         said = f"{' and '.join(labels)} cannot be told{apart} from this bag: "
         if set(causes.values()) <= {"misfit", "torques"}:
@@ -124,10 +130,6 @@ def _law(found: Identified, whole: float) -> dict[str, Any]:
         law = {"ratio": 1.0, "viscous": viscous / coulomb}
         return {"friction": "stribeck", **{f"stribeck.{name}": v for name, v in law.items()}}
     return {"friction": "coulomb", COULOMB: whole}
-
-
-def _label(name: str, found: Identified) -> str:
-    return name if found.site.has_seal else WITHOUT_SEAL.get(name, (name, ""))[0]
 
 
 def _rounded(values: dict[str, Any]) -> dict[str, Any]:

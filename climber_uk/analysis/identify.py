@@ -7,7 +7,7 @@
 import argparse
 import json
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from climber_uk.analysis.identification_report import (
     CONTROLLER,
     PLANT,
     changes,
+    label_of,
     missing,
     remarks,
     rows,
@@ -53,7 +54,7 @@ def tell(options: argparse.Namespace) -> None:
     found = identify(motion, believed, cut, site)
     print(table(found, believed), end="")
     print(*remarks(found), sep="\n")
-    for warning in (*differences(file, recorded), *assumed_away(parameters, plant)):
+    for warning in (*differences(file, recorded, site), *assumed_away(parameters, plant)):
         print(warning)
     if unfit:
         print(f"{unfit} unfit messages were left out")
@@ -85,9 +86,12 @@ def plan(options: argparse.Namespace) -> None:
     """Write a trajectory, with all that is in the parameter file; raises `ValueError`."""
     parameters = parameters_of(PUBLISHER, options)
     origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
-    believed = Values(parameters_of(CONTROLLER, options)).read(Climber)
+    controller = parameters_of(CONTROLLER, options)
+    site, believed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
+    if not site.has_seal:
+        believed = replace(believed, seal_friction_coefficient=0.0)
     limits = Values(vars(options)).read(excitation.Limits)
-    best = excitation.plan(believed, limits, origin)
+    best = excitation.plan(believed, limits, origin, site)
     x, y, heading = best.trajectory.at(0.0).pose.tolist()
     changed = {
         PUBLISHER: best.parameters,
@@ -100,7 +104,7 @@ def plan(options: argparse.Namespace) -> None:
     )
     for name, share, sought in zip(NAMES, best.tells.uncertainty, excitation.SOUGHT, strict=True):
         if sought:
-            print(f"{name} ± {share:.2%}")
+            print(f"{label_of(name, site)[0]} ± {share:.2%}")
 
 
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:

@@ -35,6 +35,12 @@ ASSUMED_AWAY: dict[str, tuple[Callable[[Any], bool], str]] = {
     ),
     "heading_bias": (lambda bias: bias != 0, "the weight is taken to pull another way"),
 }
+OF_SUCTION = (
+    "seal_friction_coefficient",
+    "wheel_load_share",
+    "suction_pressure",
+    "suction_area",
+)
 
 
 def recorded_parameters(bag: Path, topic: str) -> dict[str, Any]:
@@ -54,9 +60,11 @@ def site_of(controller: Parameters, plant: Parameters) -> Site:
     return Site(Values(plant).read(WALLS[wall], f"{wall}."), adhesion == "suction")
 
 
-def differences(file: Parameters, recorded: Parameters) -> Iterator[str]:
+def differences(file: Parameters, recorded: Parameters, site: Site) -> Iterator[str]:
     """Sentences on what a parameter file and a bag say differently of the climber."""
     for field in fields(Climber):
+        if field.name in OF_SUCTION and not site.has_seal:
+            continue
         told, other = recorded.get(field.name), file.get(field.name, field.default)
         if told is not None and file and told != other:
             yield f"{field.name} was {told:g} when this was recorded; {other:g} of the file is used"

@@ -25,6 +25,7 @@ CLEAR = 3.0  # standard deviations beyond which a residual counts less and less
 ROUNDING = 1e-13
 MEDIAN = 1.4826  # standard deviation of what is normal, by the median of its absolute value
 STRANGE, FEW = 6.0, 0.1  # times the usual, of a window; most of the windows that may be
+SLIGHT = 1e-4  # [m/s²] or the like, of a misfit that is none
 CHANCE = 1e-3  # of noise alone to fail the test of fit
 
 
@@ -54,7 +55,7 @@ class Misfit:
     @property
     def strange(self) -> NDArray[np.bool_]:
         """Windows (n,) that fit much worse than most, a few at most: a push, a bump, a stop."""
-        usual = np.maximum(MEDIAN * np.median(np.abs(self.found), axis=0), self.noise)
+        usual = np.maximum(MEDIAN * np.median(np.abs(self.found), axis=0), self.noise + SLIGHT)
         worst = np.max(np.abs(self.found) / usual, axis=1)
         limit = np.quantile(worst, 1 - FEW)
         strange: NDArray[np.bool_] = worst > max(STRANGE, limit)

@@ -214,6 +214,17 @@ def test_a_magnetic_climber_has_no_seal_and_no_pressure(monkeypatch, tmp_path, c
         assert word not in said + written + " ".join(rows)
 
 
+def test_a_plan_for_a_magnetic_climber_has_no_seal(monkeypatch, tmp_path, capsys):
+    file = tmp_path / "now.yaml"
+    file.write_text("/**/uk_torque_controller:\n  ros__parameters: {adhesion: magnetic}\n")
+    with open(file, "a") as more:
+        more.write("/**/trajectory_publisher:\n  ros__parameters: {origin_y: 1.0}\n")
+    run(monkeypatch, "--plan", tmp_path / "p.yaml", "--params", file, "--duration", 12)
+    said = capsys.readouterr().out
+    assert "rolling_friction ±" in said
+    assert "seal" not in said
+
+
 def test_settings_that_the_model_does_not_know_are_said(monkeypatch, tmp_path, capsys):
     bag, file = made_bag(tmp_path / "bag", {}), tmp_path / "now.yaml"
     file.write_text(
