@@ -46,15 +46,17 @@ def parameters(
         sought[chosen[kind]] = True
     values, slopes = _parameters(coefficients, track), _slopes(coefficients, track)
     squares, white, bias = [], np.zeros(len(NAMES)), np.zeros(len(NAMES))
+    freedom = np.full(len(NAMES), np.inf)  # windows more than coefficients
     for kind, fit in fits.items():
         own = np.zeros((len(NAMES), fit.design.shape[1]))
         own[:, : len(chosen[kind])] = slopes[:, chosen[kind]]
-        count = len(fit.ends)
+        count, spare = len(fit.ends), max(1, len(fit.ends) - fit.design.shape[1])
+        freedom = np.where(own.any(axis=1), np.minimum(freedom, spare), freedom)
         squares.append((count - 1) / count * (fit.changes @ own.T) ** 2)
         white += np.einsum("pi,ij,pj->p", own, fit.covariance, own)
         bias += fit.bias(own)
-    quantile = student.ppf(QUANTILE, len(fits[DRIVE].ends) - 1)
-    widths = _interval(np.concatenate(squares)), quantile * np.sqrt(white), bias
+    spread = _interval(np.concatenate(squares), freedom)
+    widths = spread, student.ppf(QUANTILE, freedom) * np.sqrt(white), bias
     known = np.isfinite(values)
     return values, Widths(*(np.where(known, width, np.inf) for width in widths)), sought
 
@@ -96,14 +98,14 @@ def _slopes(coefficients: Array, track: float | None) -> Array:
     return np.where(np.isfinite(slopes), slopes, 0.0)
 
 
-def _interval(squares: Array) -> Array:
+def _interval(squares: Array, most: Array) -> Array:
     """Half widths (p,) of intervals, from squares (n, p) that sum up to variances.
 
     With as many degrees of freedom as they have if they are those of normal numbers, each with a
-    variance of its own: E x⁴ = 3 (E x²)².
+    variance of its own: E x⁴ = 3 (E x²)²; `most` (p,) are possible.
     """
     variance = squares.sum(axis=0)
     ratio = variance**2 / np.maximum((squares**2).sum(axis=0), NOTHING)
-    freedom = np.clip(3 * ratio - 2, 1, max(1, len(squares) - 1))
+    freedom = np.clip(3 * ratio - 2, 1, most)
     half: Array = student.ppf(QUANTILE, freedom) * np.sqrt(variance)
     return half
