@@ -64,9 +64,9 @@ def main() -> None:
             results = list(pool.map(partial(trial, name), range(options.seeds)))
             off, inside = (np.array(column) for column in zip(*results, strict=True))
             for number, parameter in enumerate((*OFF, "turning_friction")):
-                print(
-                    f"{name:14}{parameter:28}{said(off[:, number], inside[:, number])}", flush=True
-                )
+                form = ".3%" if parameter in OFF else ".2g"  # N m
+                words = said(off[:, number], inside[:, number], form)
+                print(f"{name:14}{parameter:28}{words}", flush=True)
             ratios = list(pool.map(partial(tracking, name), range(min(5, options.seeds))))
             print(f"{name:14}tracking at worst {max(ratios):.3f} of that with the true parameters")
 
