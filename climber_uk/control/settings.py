@@ -3,9 +3,11 @@
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
-from climber_uk.control.constraints import CONSTRAINTS
+from climber_uk.control.approach import Approach
+from climber_uk.control.constraints import CONSTRAINTS, Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
+from climber_uk.control.guard import GuardOptions
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
@@ -34,10 +36,11 @@ class Choice:
 
 
 KINDS: list[tuple[type, str]] = [
-    *((kind, "") for kind in (Choice, Climber, Law, Timing, Safety)),
+    *((kind, "") for kind in (Choice, Climber, Law, Timing, Safety, Approach)),
     *((kind, f"{name}.") for name, kind in CONSTRAINTS.items()),
     (Observer, "observer."),
     (Pacing, "pacing."),
+    (GuardOptions, "guard."),
 ]
 """All that is read, with the prefix of its parameters."""
 
@@ -56,4 +59,7 @@ def settings(
 
 def new_follower(parameters: Parameters, pressure: float | None) -> Follower:
     """Follower as the parameters say, that has seen nothing yet."""
-    return Follower(Tracker(*settings(parameters, pressure)), parameters.read(Safety))
+    read, tracker = parameters.read, Tracker(*settings(parameters, pressure))
+    follower = Follower(tracker, read(Safety), read(Approach), read(GuardOptions, "guard."))
+    follower.course.approach_constraints = read(Guidance, "guidance.")
+    return follower

@@ -12,7 +12,7 @@ from climber_uk.control.acting import NONE, Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
 from climber_uk.control.model import Observer, rolled
-from climber_uk.control.pacing import IN_TIME, Pacing
+from climber_uk.control.pacing import Pacing, Progress
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, named
@@ -44,6 +44,13 @@ class Timing:
         at_most=LONGEST_STEP,
         runtime=True,
     )
+    max_latency: float = parameter(
+        0.02,
+        "s",
+        "age of an odometry that is believed: what is always older is the clocks' offset",
+        at_least=0,
+        at_most=LONGEST_STEP,
+    )
     measure_delay: bool = parameter(
         True, "", "add the odometry's age to the transport delay", runtime=True
     )
@@ -64,25 +71,26 @@ class Tracker:
         self._period_is_measured = False
         self._acting = Acting()
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
+        self.progress = Progress()  # along the reference that is followed
         self.reset()
 
     def reset(self) -> None:
         """Start anew, from an unknown state at an unknown time."""
         self.stamp = 0  # [ns]
-        self._acting.restart()
         self.motion: Motion | None = None
+        self.restart()
         self.forget()
 
+    def restart(self) -> None:
+        """Go on at an unknown time, from an unknown state: the clock was set back."""
+        self.stamp = 0
+        self._acting.restart()
+        self.motion = None
+
     def forget(self) -> None:
-        """Forget what was learnt, and that the reference waited."""
+        """Forget what was learnt of the disturbance."""
         self.disturbance = Wrench(0.0, 0.0)
         self._learning: Any = False
-        self.start_pace()
-
-    def start_pace(self) -> None:
-        """Follow the reference in its own time."""
-        self.pace = IN_TIME
-        self._paced_at: int | None = None
 
     def retune(
         self, controller: Controller, observer: Observer, timing: Timing, pacing: Pacing
@@ -113,31 +121,34 @@ class Tracker:
             motion = motion._replace(speed=0.0, yaw_rate=0.0)
         self.stamp, self.motion = stamp, motion
 
-    def answer(self, preview: Preview, age: float) -> Command | None:
+    def answer(
+        self, preview: Preview, age: float, constraints: ConstraintSet | None = None
+    ) -> Command | None:
         """Torques for the last odometry, of `age` [s]; None where the preview does not reach.
 
+        `constraints` are followed in the place of the controller's own.
         Raises `ValueError` or `ArithmeticError` if they are not finite.
         """
         begins, situation = self._situation(age)
-        controller, pace = self.controller, self.pace
-        if self._retuned is not None:
+        controller = self.controller
+        if constraints is not None:
+            controller = replace(controller, constraints=constraints)
+        elif self._retuned is not None:
             controller = replace(controller, constraints=self._constraints())
         aim = begins + round(controller.law.lookahead(self.period) * SECOND)
-        if pace is not IN_TIME and self.pacing.catch_up > 0:
-            since = begins if self._paced_at is None else self._paced_at
-            pace = pace.after((begins - since) / SECOND, self.pacing)
-        target = preview.target(aim) if pace is IN_TIME else pace.target(preview, aim)
+        progress = self.progress.advanced(begins, self.pacing)
+        target = progress.target(preview, aim)
         if target is None:
             return None
         command = controller.command(situation, target)
         if self.pacing.catch_up > 0 and abs(command.lost.drive) > CUT:
-            pace = pace.slowed(
+            progress = progress.slowed(
                 command.lost.drive / controller.climber.mass, preview, aim, self.period
             )
-            command = controller.command(situation, pace.target(preview, aim) or target)
+            command = controller.command(situation, progress.target(preview, aim) or target)
         wheels, _, _, (drive, turn) = command
         _check(wheels)
-        self.pace, self._paced_at = pace, begins
+        self.progress = progress
         self._learning = (abs(drive) <= CUT) & (abs(turn) <= CUT)
         self._send(begins, wheels)
         return command
@@ -157,12 +168,20 @@ class Tracker:
     def let_go(self, age: float) -> Torques:
         """No torques."""
         self._learning = False
-        self._send(self._begin(age), NONE)
+        self._send(self.begin(age), NONE)
         return NONE
 
     def correct(self, torques: Torques) -> None:
         """Believe that other torques were sent than it answered last."""
         self._acting.correct(torques)
+
+    def mean_torques(self, stamp: int) -> Torques:
+        """Mean of the torques that act from the last odometry to `stamp` [ns]."""
+        spans = self._acting.between(self.stamp, stamp)
+        whole = sum(time for _, time in spans) or 1.0
+        right = sum(torques.right * time for torques, time in spans) / whole
+        left = sum(torques.left * time for torques, time in spans) / whole
+        return Torques(right, left)
 
     def expected_at(self, stamp: int) -> Motion:
         """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
@@ -193,14 +212,14 @@ class Tracker:
         }
         return type(after)(**gains)
 
-    def _begin(self, age: float) -> int:
+    def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
         timing = self.timing
         delay = timing.transport_delay + (age if timing.measure_delay else 0.0)
         return self._acting.begin(self.stamp + round(delay * SECOND))
 
     def _situation(self, age: float) -> tuple[int, Situation]:
-        begins = self._begin(age)
+        begins = self.begin(age)
         motion = self.expected_at(begins)
         situation = motion, self._acting.last, self.disturbance, self.period
         return begins, named(Situation, situation)

@@ -71,6 +71,23 @@ class Preview:
         heading, omega, omega_1, _ = _derivatives(turning, t)
         return named(Target, (x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y))
 
+    @cached_property
+    def fastest(self) -> tuple[float, float]:
+        """Fastest speed [m/s] and yaw rate [rad/s] at its points."""
+        speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1]).max()
+        return float(speed), float(np.abs(self.velocity[:, 2]).max())
+
+    def last(self, points: int) -> "Preview":
+        """The same, with its last `points` at most."""
+        if len(self.times) <= points:
+            return self
+        return Preview(
+            self.times[-points:],
+            self.pose[-points:],
+            self.velocity[-points:],
+            self.acceleration[-points:],
+        )
+
     def goes_on_with(self, newer: "Preview", tolerance: float) -> bool:
         """Whether `newer` begins within `tolerance` [m, rad] of where this one is by then."""
         here = self.at(int(newer.times[0]))

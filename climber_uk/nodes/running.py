@@ -68,11 +68,18 @@ class ClimberNode(Node):
         return self.create_publisher(kind, topic, qos, qos_overriding_options=options)
 
     def subscription(
-        self, kind: type, topic: str, callback: Callable[..., None], qos: QoSProfile = RELIABLE
+        self,
+        kind: type,
+        topic: str,
+        callback: Callable[..., None],
+        qos: QoSProfile = RELIABLE,
+        raw: bool = False,
     ) -> Subscription:
         """Subscription whose QoS the parameters `qos_overrides.<topic>.subscription.*` override."""
         options = QoSOverridingOptions.with_default_policies()
-        return self.create_subscription(kind, topic, callback, qos, qos_overriding_options=options)
+        return self.create_subscription(
+            kind, topic, callback, qos, qos_overriding_options=options, raw=raw
+        )
 
     def say(self, subject: str, trouble: str, detail: str = "", is_fault: bool = True) -> None:
         """Log a trouble, or that it is over (''), once each time the trouble changes.

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import FluidPressure, JointState
+from sensor_msgs.msg import FluidPressure, JointState, TimeReference
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -25,7 +26,9 @@ from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading, reading_reference, writing
 from climber_uk.nodes.managed import ManagedNode
 from climber_uk.nodes.margins import Margins
-from climber_uk.nodes.running import BEST_EFFORT, LATCHED, SLOW, WALL_CLOCK, Rhythm, run
+from climber_uk.nodes.running import BEST_EFFORT, LATCHED, RELIABLE, SLOW, WALL_CLOCK, Rhythm, run
+
+LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points: to read one takes a quarter of a second
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,15 @@ class UkTorqueController(ManagedNode):
         self.follower = new_follower(self.parameters, self.pressure)
         self.answers = self.saturations = 0
         self.is_due = Rhythm(SLOW)  # to tell the disturbance
+        self.is_position_due = Rhythm(SLOW)
+        self.told_mode = Mode.WAITING
 
         self.torques = self.publisher(JointState, "wheel_torques")
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         self.error = self.publisher(Vector3Stamped, "~/tracking_error")
         self.force = self.publisher(WrenchStamped, "~/constraint_force")
         self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
+        self.reference_time = self.publisher(TimeReference, "reference_time")
         self.told = self.publisher(ParameterEvent, "~/parameters", LATCHED)
         self.tell_parameters()
         safety = self.follower.safety
@@ -79,7 +85,9 @@ class UkTorqueController(ManagedNode):
         self.follower.enable(False)
         return [
             self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT),
-            self.subscription(MultiDOFJointTrajectory, "reference", self.on_reference),
+            self.subscription(
+                MultiDOFJointTrajectory, "reference", self.on_reference, RELIABLE, raw=True
+            ),
             self.subscription(FluidPressure, "suction_pressure", self.on_pressure, BEST_EFFORT),
         ]
 
@@ -122,9 +130,12 @@ class UkTorqueController(ManagedNode):
             return
         self.tell(self.follower.on_odometry(self.now(), stamp, state))
 
-    def on_reference(self, message: MultiDOFJointTrajectory) -> None:
+    def on_reference(self, serialized: bytes) -> None:
         """Keep the reference; answer the odometry that waits for it."""
         try:
+            if len(serialized) > LARGEST_REFERENCE:
+                raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
+            message = deserialize_message(serialized, MultiDOFJointTrajectory)
             preview = reading_reference.preview(message, self.names.odom_frame)
         except ValueError as error:
             self.say("reference", "refused", str(error))
@@ -156,17 +167,32 @@ class UkTorqueController(ManagedNode):
 
     def tell(self, answer: Answer | None) -> None:
         """Say what has changed, and publish an answer if there is one."""
-        mode = self.follower.mode
-        if mode is not Mode.WAITING:
-            trouble = "" if mode is Mode.FOLLOWING else mode.value
-            self.say("safe output", trouble, self.follower.detail, mode.is_fault)
+        follower = self.follower
+        mode = follower.mode
         if answer is not None:
             self.publish_torques(answer)
+        self.tell_position()
+        if mode is not Mode.WAITING:
+            approaches = mode is Mode.APPROACHING
+            self.say("reference waits", mode.value if approaches else "", follower.detail, False)
+            trouble = "" if approaches or mode is Mode.FOLLOWING else mode.value
+            self.say("safe output", trouble, follower.detail, mode.is_fault)
+        if answer is not None:
             state = self.follower.state
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command, state)
             if state is not None:
                 self.take_margins(answer, state)
+
+    def tell_position(self) -> None:
+        """Tell how far along the reference the climber is: its planner waits for it."""
+        follower, stamp = self.follower, self.follower.stamp
+        position = follower.course.position(stamp)
+        has_changed, self.told_mode = follower.mode is not self.told_mode, follower.mode
+        if position is not None and (self.is_position_due(stamp) or has_changed):
+            self.reference_time.publish(
+                writing.time_reference(position, stamp, follower.mode.name.lower())
+            )
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
@@ -187,7 +213,8 @@ class UkTorqueController(ManagedNode):
         if self.is_due(stamp):
             drive, turn = follower.tracker.disturbance
             self.disturbance.publish(writing.wrench((drive, 0.0, turn), stamp, base_frame))
-        desired = follower.preview.at(stamp) if follower.preview else None
+        followed = follower.preview
+        desired = followed.at(follower.course.time_followed(stamp)) if followed else None
         if state is not None and desired is not None:
             error = tracking_error(state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
@@ -225,7 +252,7 @@ class UkTorqueController(ManagedNode):
             "answers": self.answers,
             "saturated answers": self.saturations,
             "odometry period [s]": tracker.period,
-            "reference waits [s]": tracker.pace.lag,
+            "reference waits [s]": self.follower.course.waited,
             "disturbance of the drive [N]": drive,
             "disturbance of the turn [N m]": turn,
             "suction pressure [Pa]": tracker.controller.climber.suction_pressure,
