@@ -121,7 +121,7 @@ class Course:
     def strayed(self, motion: Motion | None) -> tuple[Mode, str] | None:
         """Whether a climber that follows is too far from what it follows."""
         followed = self.followed
-        if followed is None or motion is None:
+        if followed is None or motion is None or self._is_paused:
             return None
         target = followed.target(self.time_followed(self.tracker.stamp))
         if target is None:

@@ -175,6 +175,7 @@ class Follower:
             if self.safety.has_jumped(expected, motion, tracker.controller.climber.half_track):
                 self._start_anew()
                 self._unsettled = self.safety.settling_messages
+                trouble = None  # no rate explains a jump
             self._unsettled -= self._unsettled > 0
             self._watch(stamp, last, motion, trouble)
             tracker.see(stamp, motion, expected)

@@ -1,8 +1,10 @@
 """What every node of this package shares: how it starts, talks and ends."""
 
 import gc
+import math
 import signal
 import sys
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -31,7 +33,26 @@ BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 SLOW = SECOND // 20  # [ns] from one message to the next of what need not be told each time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
+LINES, LINES_PERIOD = 6, 10.0  # [s]: of the log, on one subject
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Ration:
+    """Allows a few of many: `number` in each `period` [s] of the wall clock."""
+
+    def __init__(self, number: int, period: float) -> None:
+        self.period, self.times = period, deque([-math.inf] * number)
+        self.refused = 0  # since the last one that was allowed
+
+    def __call__(self) -> bool:
+        """Whether one more is allowed."""
+        now = WALL_CLOCK.now().nanoseconds / SECOND
+        if now - self.times[0] < self.period:
+            self.refused += 1
+            return False
+        self.times.popleft()
+        self.times.append(now)
+        return True
 
 
 class Rhythm:
@@ -55,6 +76,7 @@ class ClimberNode(Node):
         self.parameters.declare(Names)
         self.names = self.parameters.read(Names).within(self.get_namespace())
         self._troubles: dict[str, tuple[str, bool]] = {}
+        self._lines: dict[str, Ration] = {}  # that are logged on each subject
         self._alone_on: Sequence[str] = ()
         self._values: Callable[[], Mapping[str, object]] = dict
         self._diagnostics: Publisher | None = None
@@ -84,15 +106,21 @@ class ClimberNode(Node):
     def say(self, subject: str, trouble: str, detail: str = "", is_fault: bool = True) -> None:
         """Log a trouble, or that it is over (''), once each time the trouble changes.
 
-        In diagnostics it is an error if `is_fault`, else a warning.
+        In diagnostics it is an error if `is_fault`, else a warning. Of troubles that come and go
+        too fast to be read, most are counted only.
         """
         if trouble == self._troubles.get(subject, ("", True))[0]:
             return
         self._troubles[subject] = trouble, is_fault
+        ration = self._lines.setdefault(subject, Ration(LINES, LINES_PERIOD))
+        if not ration():
+            return
+        more = f" [{ration.refused} changes were not logged]" if ration.refused else ""
+        ration.refused = 0
         if trouble:
-            self.get_logger().warning(f"{subject}: {trouble}{detail and f' ({detail})'}")
+            self.get_logger().warning(f"{subject}: {trouble}{detail and f' ({detail})'}{more}")
         else:
-            self.get_logger().info(f"{subject}: ok again")
+            self.get_logger().info(f"{subject}: ok again{more}")
         self.diagnose()
 
     def start_diagnostics(
