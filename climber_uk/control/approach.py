@@ -26,7 +26,7 @@ class Approach:
     """How a climber gets to its reference, which waits for it meanwhile."""
 
     max_start_distance: float = parameter(
-        1.0, "m", "from further away the reference is refused", above=0
+        2.0, "m", "from further away the reference is refused", above=0
     )
     max_distance: float = parameter(
         1.0, "m", "from the reference, beyond which it waits and is approached", above=0

@@ -18,6 +18,7 @@ from climber_uk.mechanics.motion import Motion, Target
 from climber_uk.mechanics.preview import Preview
 
 SAME = 0.05  # [m, rad] within which a new preview goes on with the old one
+AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastest motion counts
 KEPT = 2 * SECOND  # [ns] of a reference that is kept behind the climber
 MOST_POINTS = 5000  # of a reference that are kept: who plans it may not wait
 LONGEST_SKIP = SECOND  # [ns] of a reference that a climber, which went on unanswered, may be ahead
@@ -45,6 +46,8 @@ class Course:
         self.way: Preview | None = None  # to where it waits
         self._position: int | None = None  # [ns] time of the reference; None: not begun
         self._is_paused = True
+        # what was asked of `fastest` last: preview, number of `AROUND`, what it was
+        self._around: tuple[Preview, int, Fastest] | None = None
         self._began_at = 0.0  # [m] from the reference, when it was begun to follow it
 
     @property
@@ -58,8 +61,13 @@ class Course:
         followed = self.followed
         if followed is None:
             return Fastest(0.0, 0.0), Fastest(math.inf, math.inf)
-        reference = Fastest(*followed.fastest)
         tracker = self.tracker
+        here = self.time_followed(tracker.stamp)
+        number = here // AROUND
+        if self._around is None or self._around[0] is not followed or self._around[1] != number:
+            fastest = followed.fastest((number - 1) * AROUND, (number + 2) * AROUND)
+            self._around = followed, number, Fastest(*fastest)
+        reference = self._around[2]
         constraints = (
             self.approach_constraints if self._is_gentle else tracker.controller.constraints
         )
@@ -166,7 +174,6 @@ class Course:
         target = preview.target(position)
         if target is None:
             return Followed(Mode.WAITING)
-        self._position = position
         distance = math.hypot(motion.x - target.x, motion.y - target.y)
         if distance > options.max_start_distance:
             return Followed(
@@ -174,7 +181,7 @@ class Course:
                 f"{distance:.2f} m, from ({motion.x:.2f}, {motion.y:.2f}) to ({target.x:.2f}, "
                 f"{target.y:.2f}); max_start_distance is {options.max_start_distance} m",
             )
-        self._is_paused, self._began_at = False, distance
+        self._is_paused, self._began_at, self._position = False, distance, position
         turned = abs(wrapped(motion.heading - target.heading))
         if distance > options.max_distance or turned > options.max_heading:
             self.way = options.way(motion, target, time)

@@ -26,8 +26,9 @@ CLOCK_STEP = round(0.2 * SECOND)  # [ns] back, from which time has started anew
 SELDOM = 0.8  # of the timeout from one odometry to the next: the least delay would exceed it
 REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
 STALL_REST = 10  # times the rest after which a stalled climber tries again
-BRAKING = 0.02  # [s] after which the safe output has to have braked what moves
-PUSHED = 0.05  # [m/s] by which it may be faster than before
+BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
+PUSHED = 0.05  # [m/s] by which it may be faster than before; if it is, something pushes it:
+COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
 FLAPPING = 3  # faults within `FLAPPING_TIME`, after which the next one has to be over for a while
 FLAPPING_TIME = 2 * SECOND  # [ns]
 CALM = SECOND // 2  # [ns] for which it has to be over
@@ -74,7 +75,7 @@ class Follower:
         self._last_fault: tuple[int, Trouble] | None = None  # [ns] when it was there last
         self._fault_times: deque[int] = deque(maxlen=FLAPPING)  # [ns] when each began
         self._braked: tuple[int, float] | None = None  # [ns] begin of the safe output, rim speed
-        self._lets_go = False  # as the safe output `hold` made the climber faster
+        self._coasts_until = 0  # [ns]
 
     @property
     def state(self) -> State | None:
@@ -320,20 +321,21 @@ class Follower:
             self.course.pause(self._stamp)
             torques = self._safe_torques(age)
         else:
-            self._braked, self._lets_go = None, False
+            self._braked = None
             torques = command.wheels
         self.answer = Answer(self._stamp, pack(*torques), command)
         return self.answer
 
     def _safe_torques(self, age: float) -> Torques:
-        motion = self.tracker.motion
-        if self.safety.safe_output == "hold" and motion is not None and not self._lets_go:
-            rim = abs(motion.speed) + self.tracker.controller.climber.half_track * abs(
-                motion.yaw_rate
-            )
+        motion, climber = self.tracker.motion, self.tracker.controller.climber
+        if self.mode is Mode.DEAD_WHEEL and climber.seal_friction >= climber.weight_along_wall:
+            return self.tracker.let_go(age)  # one wheel that holds turns the climber
+        holds = self.safety.safe_output == "hold" and self._stamp >= self._coasts_until
+        if holds and motion is not None:
+            rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
             begin, before = self._braked = self._braked or (self._stamp, rim)
             if self._stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
-                self._lets_go = True  # it does not hold, it pushes
+                self._coasts_until, self._braked = self._stamp + round(COASTING * SECOND), None
                 return self.tracker.let_go(age)
             braking = 0.0 if self.mode.doubts_odometry else self.safety.braking_rate
             try:

@@ -32,10 +32,10 @@ class GuardOptions:
         0.05, "m/s", "above the fastest that the constraints ask for on this reference", at_least=0
     )
     yaw_rate_margin: float = parameter(
-        0.5, "rad/s", "above the fastest turn that they ask for", at_least=0
+        1.0, "rad/s", "above the fastest turn that they ask for", at_least=0
     )
     stall_time: float = parameter(
-        0.15, "s", "for which a torque at its limit may move nothing", at_least=0
+        0.12, "s", "for which a torque at its limit may move nothing", at_least=0
     )
     max_disturbance: float = parameter(
         1.0, "", "of what adhesion and weight could cause, as force and as moment", at_least=0
@@ -160,9 +160,10 @@ class Guard:
         self, climber: Climber, motion: Motion, time: float, torques: Torques, reference: Fastest
     ) -> tuple[Mode, str] | None:
         largest = max(abs(torques.right), abs(torques.left))
-        rim = climber.half_track * abs(motion.yaw_rate)
-        fastest = max(reference.speed, climber.half_track * reference.yaw_rate)
-        stands = max(abs(motion.speed), rim) < STANDS * fastest
+        if reference.speed > MOVES:
+            stands = abs(motion.speed) < STANDS * reference.speed
+        else:  # it turns in place, or rests
+            stands = abs(motion.yaw_rate) < STANDS * reference.yaw_rate
         is_stalled = stands and largest >= AT_LIMIT * climber.max_wheel_torque
         self._stalled = self._stalled + time if is_stalled else 0.0
         if not 0 < self.options.stall_time < self._stalled:

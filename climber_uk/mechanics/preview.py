@@ -71,11 +71,15 @@ class Preview:
         heading, omega, omega_1, _ = _derivatives(turning, t)
         return named(Target, (x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y))
 
-    @cached_property
-    def fastest(self) -> tuple[float, float]:
-        """Fastest speed [m/s] and yaw rate [rad/s] at its points."""
-        speed = np.hypot(self.velocity[:, 0], self.velocity[:, 1]).max()
-        return float(speed), float(np.abs(self.velocity[:, 2]).max())
+    def fastest(self, begin: int, end: int) -> tuple[float, float]:
+        """Fastest speed [m/s] and yaw rate [rad/s] at its points from `begin` to `end` [ns].
+
+        Of the nearest one, if there is none.
+        """
+        first = min(int(np.searchsorted(self.times, begin)), len(self.times) - 1)
+        last = max(int(np.searchsorted(self.times, end, "right")), first + 1)
+        v_x, v_y, yaw_rate = self.velocity[first:last].T
+        return float(np.hypot(v_x, v_y).max()), float(np.abs(yaw_rate).max())
 
     def last(self, points: int) -> "Preview":
         """The same, with its last `points` at most."""
