@@ -27,7 +27,7 @@ class Ages:
 
     def offset(self, max_latency: float) -> float:
         """Offset of the odometry's clock [s]: that part of its age that no latency explains."""
-        return 0.0 if 0 <= self.least <= max_latency else self.least
+        return 0.0 if abs(self.least) <= max_latency else self.least
 
     def latency(self, age: float, max_latency: float) -> float:
         """Latency [s] of an odometry of some age [s], without the offset."""

@@ -89,6 +89,11 @@ class Follower:
         return self._stamp
 
     @property
+    def clock_offset(self) -> float:
+        """By how much the node's clock is ahead of the odometry's [s]; 0 if that may be latency."""
+        return self.ages.offset(self.tracker.timing.max_latency)
+
+    @property
     def preview(self) -> Preview | None:
         """What is followed, or will be: the reference, or the way to it."""
         return self.course.followed

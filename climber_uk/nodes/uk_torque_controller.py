@@ -172,6 +172,10 @@ class UkTorqueController(ManagedNode):
         if answer is not None:
             self.publish_torques(answer)
         self.tell_position()
+        offset = follower.clock_offset
+        differ = "odometry's differs from this node's" if offset else ""
+        detail = f"by {offset:.3f} s; if that is latency, set transport_delay"
+        self.say("clock", differ, detail, is_fault=False)
         if mode is not Mode.WAITING:
             approaches = mode is Mode.APPROACHING
             self.say("reference waits", mode.value if approaches else "", follower.detail, False)
@@ -252,6 +256,7 @@ class UkTorqueController(ManagedNode):
             "answers": self.answers,
             "saturated answers": self.saturations,
             "odometry period [s]": tracker.period,
+            "clock offset [s]": self.follower.clock_offset,
             "reference waits [s]": self.follower.course.waited,
             "disturbance of the drive [N]": drive,
             "disturbance of the turn [N m]": turn,
