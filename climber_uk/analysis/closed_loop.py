@@ -23,6 +23,8 @@ from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
 
+CONTACT = Contact()
+
 
 @dataclass(frozen=True)
 class Link:
@@ -85,6 +87,10 @@ class Run:
         """Root mean square of the distance from the reference, `after` [s] [m]."""
         return float(np.sqrt(np.mean(self.distance[self.time >= after] ** 2)))
 
+    def chatter(self, after: float = 0.0) -> float:
+        """Root mean square of the torques' changes from one odometry to the next [N m]."""
+        return float(np.sqrt(np.mean(np.diff(self.torques[self.time >= after], axis=0) ** 2)))
+
 
 def simulate(
     trajectory: Trajectory,
@@ -95,7 +101,7 @@ def simulate(
     link: Link = Link(),
     motors: Callable[[State, Array], Array] = as_commanded,
     seed: int = 0,
-    contact: Contact = Contact(),
+    contact: Contact = CONTACT,
 ) -> Run:
     """Run of `duration` [s] from `start`; `climber` may change with time.
 

@@ -1,19 +1,20 @@
 """How much later than told a torque acts: learnt where the loop begins to oscillate for it.
 
-Where a torque acts δ later than the model believes, speeds are off by ε = -δ (a - a₀), with a and a₀
-the accelerations of the torques that act at the end and at the begin of a period, so far as the
-disturbance observer does not put that down to a disturbance: φ = ∂ε/∂δ goes through the observer as
-ε does. δ follows by recursive least squares that forget (Ljung & Söderström 1983, 3.6):
+Where a torque acts δ later than the model believes, speeds are off by ε = -δ (a - a₀), with a and
+a₀ the accelerations by the torques that act at the end and at the begin of a period, so far as the
+disturbance observer does not put that down to a disturbance: φ = ∂ε/∂δ goes through the observer
+as ε does. δ follows by recursive least squares that forget (Ljung & Söderström 1983, 3.6):
 
-    S ← S exp(-T / T_f) + φ²,    δ ← δ - ε φ / (S + S₀)
+    S ← S (1 - T / T_f) + φ²,    δ ← δ - ε φ / (S + S₀)
 
 A single disturbance looks like a delay, too, while the observer learns it. So only what goes to
-and fro counts. A motor's lag, and a twist that is the mean of a period, are taken for a delay.
+and fro counts. A motor's lag is taken for a delay.
 """
 
 from typing import Any
 
 LONGEST = 0.05  # [s] that is taken for a delay
+FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
 FASTEST = 0.05  # [s/s] by which it changes
 MEMORY = 1.0  # T_f [s]
 LEAST = 0.1  # S₀ [m²/s²] of changes of acceleration
@@ -46,10 +47,17 @@ class Latency:
     def __init__(self) -> None:
         self.delay = 0.0  # [s]
         self.oscillations = Oscillation(), Oscillation()
+        self._far_off = False
         self._energy = 0.0  # S
         self._before = 0.0, 0.0  # [m/s²]
         # ∂/∂δ of the observer's disturbance, as accelerations, and of its rates
         self._slopes = [(0.0, 0.0), (0.0, 0.0)]
+
+    @property
+    def is_far_off(self) -> bool:
+        """Whether it is more than the loop bears without learning; until it is less than half."""
+        self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
+        return self._far_off
 
     def learn(
         self,
@@ -57,10 +65,11 @@ class Latency:
         errors: tuple[float, float],
         time: float,
         shares: tuple[Any, Any],
+        told: float = 0.0,
     ) -> None:
         """Take in accelerations a [m/s²] and errors ε [m/s] after `time` [s].
 
-        `shares` are those of the observer.
+        `shares` are those of the observer; a delay that is `told` [s] may be too long.
         """
         new, newer = shares
         left = max(0.0, 1.0 - time / MEMORY)
@@ -76,4 +85,4 @@ class Latency:
         self._energy = self._energy * left + square
         most = FASTEST * time
         change = min(max(-product / (self._energy + LEAST), -most), most)
-        self.delay = min(max(self.delay + change, 0.0), LONGEST)
+        self.delay = min(max(self.delay + change, -told), LONGEST)

@@ -69,9 +69,10 @@ class Observer:
     """Learns the disturbance, and the speeds if need be, from what comes out other than expected.
 
     With measured speeds it is a momentum observer of second order: a disturbance that grows
-    steadily leaves no error. Both poles are at K, or lower: K (2 T + δ) <= `MOST_LEARNT`, T the period and δ the delay.
-    Without them it is a critically damped filter of poses (fading memory of third order, or of
-    second order if K = 0). What friction holds teaches nothing: the model expects no motion.
+    steadily leaves no error. Both poles are at K, or lower: K (2 T + δ) <= `MOST_LEARNT`, with T
+    the period and δ the delay that is known. Without measured speeds it is a critically damped
+    filter of poses (fading memory of third order, or of second order if K = 0). What friction
+    holds teaches nothing: the model expects no motion.
     """
 
     bandwidth: float = parameter(
@@ -86,7 +87,7 @@ class Observer:
     twist: str = parameter(
         "auto",
         "",
-        "speeds that odometry tells: of its stamp, or the mean of the period before, as of encoders",
+        "speeds of odometry: those of its stamp, or means of the period before, as of encoders",
         choices=("auto", "instantaneous", "mean"),
     )
     pose_bandwidth: float = parameter(

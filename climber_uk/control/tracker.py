@@ -215,7 +215,7 @@ class Tracker:
         )
 
     def _learn_delay(self, stamp: int, expected: Motion, found: Motion, time: float) -> None:
-        """Learn how much later torques act, after `time` [s] in which they did as expected or not."""
+        """Learn how much later than told torques act, from the `time` [s] that is over."""
         assert self.motion is not None
         climber = self.controller.climber
         drive, turn = forces(climber, *self._acting.between(self.stamp, stamp)[-1][0])
@@ -225,6 +225,7 @@ class Tracker:
             (found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)),
             time,
             self.observer.shares(time, self._delay),
+            self.timing.transport_delay,
         )
 
     def _constraints(self) -> ConstraintSet:

@@ -1,7 +1,8 @@
-"""Whether an odometry's twist is that of its stamp, or the mean of the period before, as encoders tell.
+"""Whether an odometry's twist is that of its stamp, or the mean of the period before it.
 
-A mean is the way that the pose has gone, by the time; a twist of the stamp is so only together with
-the one before: (v + v₀)/2. Whichever fits the poses better is taken, and if in doubt the latter.
+Encoders tell means: the way of a period, by its time. A twist of the stamp is that way by the time
+only together with the one before: (v + v₀)/2. What fits the poses better is taken; if in doubt,
+the twist is that of its stamp.
 """
 
 import math

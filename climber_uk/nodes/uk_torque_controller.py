@@ -30,9 +30,8 @@ from climber_uk.nodes.running import BEST_EFFORT, LATCHED, SLOW, WALL_CLOCK, Rhy
 
 @dataclass(frozen=True)
 class Options:
-    """What holds the climber, and what is published."""
+    """What is published."""
 
-    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
     effort_commands: bool = parameter(False, "", "publish effort_controller/commands as well")
     effort_order: str = parameter(
         "left_right", "", "order of the torques in them", choices=("left_right", "right_left")
@@ -91,7 +90,8 @@ class UkTorqueController(ManagedNode):
 
     def hold_now(self) -> Hold:
         """What the parameters say that holds the climber on its wall."""
-        read, name = self.parameters.read, self.options.adhesion
+        read = self.parameters.read
+        name = read(Choice).adhesion
         return Hold(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
 
     def on_parameters(self) -> None:
@@ -211,8 +211,17 @@ class UkTorqueController(ManagedNode):
 
     def diagnose(self) -> None:
         """Publish troubles and values, and how near to slipping and tipping it has been."""
+        self.tell_delay()
         super().diagnose()
         self.margins.diagnose()
+
+    def tell_delay(self) -> None:
+        """Say where torques act much later than `transport_delay` says, or earlier."""
+        tracker = self.follower.tracker
+        late = tracker.latency.is_far_off
+        delay = tracker.timing.transport_delay + tracker.latency.delay
+        hint = f"set transport_delay to {delay:.3f}, or see check_driver --move"
+        self.say("delay", "torques do not act when transport_delay says" * late, hint, False)
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
@@ -226,6 +235,7 @@ class UkTorqueController(ManagedNode):
             "saturated answers": self.saturations,
             "odometry period [s]": tracker.period,
             "reference waits [s]": tracker.pace.lag,
+            "delay learnt [s]": tracker.latency.delay,
             "disturbance of the drive [N]": drive,
             "disturbance of the turn [N m]": turn,
             "suction pressure [Pa]": tracker.controller.climber.suction_pressure,
