@@ -13,6 +13,7 @@ from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.hold import ADHESION, with_its_seal
 from climber_uk.mechanics.parameter import check, parameter
 
 T = TypeVar("T")
@@ -27,9 +28,10 @@ class Parameters(Protocol):
 
 @dataclass(frozen=True)
 class Choice:
-    """Which constraints are followed."""
+    """Which constraints are followed, and what kind of climber follows them."""
 
     constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
+    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
 
     def __post_init__(self) -> None:
         check(self)
@@ -50,7 +52,8 @@ def settings(
 ) -> tuple[Controller, Observer, Timing, Pacing]:
     """What the parameters, and the measured pressure [Pa], say now."""
     read = parameters.read
-    climber, name = read(Climber), read(Choice).constraints
+    choice = read(Choice)
+    name, climber = choice.constraints, with_its_seal(read(Climber), choice.adhesion)
     if pressure is not None:
         climber = replace(climber, suction_pressure=pressure)
     controller = Controller(climber, read(CONSTRAINTS[name], f"{name}."), read(Law))

@@ -11,8 +11,10 @@ from typing import Any
 from climber_uk.control.acting import NONE, Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
-from climber_uk.control.model import Observer, rolled
+from climber_uk.control.latency import Latency
+from climber_uk.control.model import Learnt, Observer, rolled
 from climber_uk.control.pacing import Pacing, Progress
+from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, named
@@ -55,6 +57,10 @@ class Timing:
         True, "", "add the odometry's age to the transport delay", runtime=True
     )
 
+    learn_delay: bool = parameter(
+        True, "", "learn what is missing in the transport delay while it runs", runtime=True
+    )
+
     def __post_init__(self) -> None:
         check(self)
 
@@ -70,6 +76,8 @@ class Tracker:
         self.period = timing.control_period  # [s] from one odometry to the next
         self._period_is_measured = False
         self._acting = Acting()
+        self.latency, self.twist = Latency(), TwistKind()
+        self._delay = 0.0  # [s] of the last answer
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
         self.progress = Progress()  # along the reference that is followed
         self.reset()
@@ -78,6 +86,7 @@ class Tracker:
         """Start anew, from an unknown state at an unknown time."""
         self.stamp = 0  # [ns]
         self.motion: Motion | None = None
+        self._told: Motion | None = None  # the last odometry, as it was told
         self.restart()
         self.forget()
 
@@ -85,12 +94,21 @@ class Tracker:
         """Go on at an unknown time, from an unknown state: the clock was set back."""
         self.stamp = 0
         self._acting.restart()
-        self.motion = None
+        self.motion = self._told = None
 
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
-        self.disturbance = Wrench(0.0, 0.0)
+        self.learnt = Learnt()
         self._learning: Any = False
+
+    @property
+    def disturbance(self) -> Wrench:
+        """What pushes and turns the climber besides what the model knows."""
+        return named(Wrench, self.learnt[:2])
+
+    @disturbance.setter
+    def disturbance(self, disturbance: Wrench) -> None:
+        self.learnt = Learnt(*disturbance)
 
     def retune(
         self, controller: Controller, observer: Observer, timing: Timing, pacing: Pacing
@@ -109,13 +127,18 @@ class Tracker:
             self.period += share * (time - self.period)
             self._period_is_measured = True
             expected = expected or self.expected_at(stamp)
+            is_known = self._acting.are_known_since(self.stamp)
+            if self.observer.velocity_source == "odometry" and isinstance(motion.x, float):
+                motion = self._at_its_stamp(expected, motion, time)
+                if self.timing.learn_delay and is_known:
+                    self._learn_delay(stamp, expected, motion, time)
             motion, learnt = self.observer.corrected(
-                self.controller.climber, self.disturbance, expected, motion, time
+                self.controller.climber, self.learnt, expected, motion, time, self._delay
             )
-            if self._acting.are_known_since(self.stamp):
+            if is_known:
                 is_learnt = self._learning
-                self.disturbance = (
-                    learnt if is_learnt is True else chosen(is_learnt, learnt, self.disturbance)
+                self.learnt = (
+                    learnt if is_learnt is True else chosen(is_learnt, learnt, self.learnt.held)
                 )
         elif self.observer.velocity_source == "pose":
             motion = motion._replace(speed=0.0, yaw_rate=0.0)
@@ -195,6 +218,35 @@ class Tracker:
             motion = rolled(climber, motion, drive, turn, time)
         return motion
 
+    def _at_its_stamp(self, expected: Motion, found: Motion, time: float) -> Motion:
+        """Motion whose speeds are those of its stamp, not the mean of the `time` [s] before."""
+        assert self.motion is not None
+        kind = self.observer.twist
+        if kind == "auto" and self._told is not None:
+            self.twist.learn(self._told, found, time)
+        self._told = found
+        if kind == "instantaneous" or (kind == "auto" and not self.twist.is_mean):
+            return found
+        speed, rate = mean_twist(self.motion, expected, time)
+        return found._replace(
+            speed=found.speed + expected.speed - speed,
+            yaw_rate=found.yaw_rate + expected.yaw_rate - rate,
+        )
+
+    def _learn_delay(self, stamp: int, expected: Motion, found: Motion, time: float) -> None:
+        """Learn how much later than told torques act, from the `time` [s] that is over."""
+        assert self.motion is not None
+        climber = self.controller.climber
+        drive, turn = forces(climber, *self._acting.between(self.stamp, stamp)[-1][0])
+        lever = climber.half_track
+        self.latency.learn(
+            (drive / climber.mass, lever * turn / climber.yaw_inertia),
+            (found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)),
+            time,
+            self.observer.shares(time, self._delay),
+            self.timing.transport_delay,
+        )
+
     def _constraints(self) -> ConstraintSet:
         """Constraints as they are now, on their way from the gains that were before."""
         if self._retuned is None:
@@ -216,6 +268,8 @@ class Tracker:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
         timing = self.timing
         delay = timing.transport_delay + (age if timing.measure_delay else 0.0)
+        delay += self.latency.delay if timing.learn_delay else 0.0
+        self._delay = delay
         return self._acting.begin(self.stamp + round(delay * SECOND))
 
     def _situation(self, age: float) -> tuple[int, Situation]:

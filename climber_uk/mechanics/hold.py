@@ -6,7 +6,7 @@ F_a is the adhesion, N_w the load on the wheels, g_n and g_t gravity into the wa
 new kind of adhesion is one class and one entry. Everything broadcasts.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from climber_uk.mechanics.climber import Climber
@@ -100,6 +100,14 @@ ADHESION: dict[str, type[Adhesion]] = {
     "magnetic": Magnetic,
     "none": NoAdhesion,
 }
+
+
+def with_its_seal(climber: Climber, adhesion: str) -> Climber:
+    """The climber with the friction that its kind of `ADHESION` has: without suction, no seal rubs.
+
+    For models that know no more of what holds a climber than its own parameters.
+    """
+    return climber if adhesion == "suction" else replace(climber, seal_friction_coefficient=0.0)
 
 
 @dataclass(frozen=True)

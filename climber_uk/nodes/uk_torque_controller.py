@@ -33,9 +33,8 @@ LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points: to read one takes a q
 
 @dataclass(frozen=True)
 class Options:
-    """What holds the climber, and what is published."""
+    """What is published."""
 
-    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
     effort_commands: bool = parameter(False, "", "publish effort_controller/commands as well")
     effort_order: str = parameter(
         "left_right", "", "order of the torques in them", choices=("left_right", "right_left")
@@ -99,7 +98,8 @@ class UkTorqueController(ManagedNode):
 
     def hold_now(self) -> Hold:
         """What the parameters say that holds the climber on its wall."""
-        read, name = self.parameters.read, self.options.adhesion
+        read = self.parameters.read
+        name = read(Choice).adhesion
         return Hold(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
 
     def on_parameters(self) -> None:
@@ -242,8 +242,17 @@ class UkTorqueController(ManagedNode):
 
     def diagnose(self) -> None:
         """Publish troubles and values, and how near to slipping and tipping it has been."""
+        self.tell_delay()
         super().diagnose()
         self.margins.diagnose()
+
+    def tell_delay(self) -> None:
+        """Say where torques act much later than `transport_delay` says, or earlier."""
+        tracker = self.follower.tracker
+        late = tracker.latency.is_far_off
+        delay = tracker.timing.transport_delay + tracker.latency.delay
+        hint = f"set transport_delay to {delay:.3f}, or see check_driver --move"
+        self.say("delay", "torques do not act when transport_delay says" * late, hint, False)
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
@@ -258,6 +267,7 @@ class UkTorqueController(ManagedNode):
             "odometry period [s]": tracker.period,
             "clock offset [s]": self.follower.clock_offset,
             "reference waits [s]": self.follower.course.waited,
+            "delay learnt [s]": tracker.latency.delay,
             "disturbance of the drive [N]": drive,
             "disturbance of the turn [N m]": turn,
             "suction pressure [Pa]": tracker.controller.climber.suction_pressure,

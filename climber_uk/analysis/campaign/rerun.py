@@ -7,7 +7,7 @@ from typing import Any
 
 from climber_uk.analysis.campaign.campaign import Campaign
 from climber_uk.analysis.campaign.limits import METRICS
-from climber_uk.analysis.campaign.names import MEASURED, PARAMETERS, PRESSURE
+from climber_uk.analysis.campaign.names import MEASURED, PARAMETERS, PRESSURE, WITHOUT
 from climber_uk.analysis.campaign.parts import computed
 from climber_uk.analysis.changed_parameters import write_changed
 
@@ -35,7 +35,7 @@ def rerun(campaign: Campaign, run: int, output: Path) -> int:
 def parameters(campaign: Campaign, run: int) -> dict[str, dict[str, Any]]:
     """All parameters of a run, by node and name."""
     own = {name: column.tolist()[0] for name, column in campaign.columns(run, 1).items()}
-    values = {**campaign.scenario.values, **own}
+    values = {**WITHOUT, **campaign.scenario.values, **own}
     values[MEASURED] = values.get(PRESSURE, PARAMETERS[PRESSURE].default)
     by_node: dict[str, dict[str, Any]] = {}
     for name, value in values.items():

@@ -1,0 +1,88 @@
+"""How much later than told a torque acts: learnt where the loop begins to oscillate for it.
+
+Where a torque acts δ later than the model believes, speeds are off by ε = -δ (a - a₀), with a and
+a₀ the accelerations by the torques that act at the end and at the begin of a period, so far as the
+disturbance observer does not put that down to a disturbance: φ = ∂ε/∂δ goes through the observer
+as ε does. δ follows by recursive least squares that forget (Ljung & Söderström 1983, 3.6):
+
+    S ← S (1 - T / T_f) + φ²,    δ ← δ - ε φ / (S + S₀)
+
+A single disturbance looks like a delay, too, while the observer learns it. So only what goes to
+and fro counts. A motor's lag is taken for a delay.
+"""
+
+from typing import Any
+
+LONGEST = 0.05  # [s] that is taken for a delay
+FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
+FASTEST = 0.05  # [s/s] by which it changes
+MEMORY = 1.0  # T_f [s]
+LEAST = 0.1  # S₀ [m²/s²] of changes of acceleration
+SWING = 0.3  # [m/s²] by which an acceleration has to go back to count as a reversal
+OSCILLATES = 4.0  # reversals in the memory
+
+
+class Oscillation:
+    """How often an acceleration has gone to and fro of late."""
+
+    def __init__(self) -> None:
+        self.reversals = 0.0
+        self._way, self._extreme = 1.0, 0.0
+
+    def add(self, acceleration: float, left: float) -> bool:
+        """Whether it oscillates, with an `acceleration` [m/s²]; `left` of what was before."""
+        back = self._way * (self._extreme - acceleration)
+        self.reversals *= left
+        if back < 0 or back > SWING:
+            self._extreme = acceleration
+        if back > SWING:
+            self._way = -self._way
+            self.reversals += 1.0
+        return self.reversals > OSCILLATES
+
+
+class Latency:
+    """δ of one climber, from the drive and from the turn; lengths of a turn are at the wheels."""
+
+    def __init__(self) -> None:
+        self.delay = 0.0  # [s]
+        self.oscillations = Oscillation(), Oscillation()
+        self._far_off = False
+        self._energy = 0.0  # S
+        self._before = 0.0, 0.0  # [m/s²]
+        # ∂/∂δ of the observer's disturbance, as accelerations, and of its rates
+        self._slopes = [(0.0, 0.0), (0.0, 0.0)]
+
+    @property
+    def is_far_off(self) -> bool:
+        """Whether it is more than the loop bears without learning; until it is less than half."""
+        self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
+        return self._far_off
+
+    def learn(
+        self,
+        accelerations: tuple[float, float],
+        errors: tuple[float, float],
+        time: float,
+        shares: tuple[Any, Any],
+        told: float = 0.0,
+    ) -> None:
+        """Take in accelerations a [m/s²] and errors ε [m/s] after `time` [s].
+
+        `shares` are those of the observer; a delay that is `told` [s] may be too long.
+        """
+        new, newer = shares
+        left = max(0.0, 1.0 - time / MEMORY)
+        product, square = 0.0, 0.0
+        for i in (0, 1):
+            slope, rate = self._slopes[i]
+            phi = accelerations[i] - self._before[i] - time * slope
+            if self.oscillations[i].add(accelerations[i], left):
+                product += errors[i] * phi
+                square += phi * phi
+            self._slopes[i] = slope + time * rate + new * phi / time, rate + newer * phi / time**2
+        self._before = accelerations
+        self._energy = self._energy * left + square
+        most = FASTEST * time
+        change = min(max(-product / (self._energy + LEAST), -most), most)
+        self.delay = min(max(self.delay + change, -told), LONGEST)
