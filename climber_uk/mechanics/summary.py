@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.shapes import Shape
 from climber_uk.mechanics.trajectory import Trajectory
 
-SAMPLES = 4001  # along the path, and in time
+SAMPLES = 4001  # in time
 LONG = 500.0  # [m] of a path that a climber hardly has
 
 
@@ -44,7 +45,7 @@ def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
     """Extremes of any trajectory; with `half_track` [m] those of its wheels as well."""
 
     def curvature(s: Array) -> Array:
-        _, p_1, p_2, _ = trajectory.shape.derivatives(s)
+        _, p_1, p_2, _ = path.derivatives(s)
         return np.abs(_cross(p_1, p_2)) / _size(p_1) ** 3
 
     def speed(time: Array) -> Array:
@@ -57,11 +58,10 @@ def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
         reference = trajectory.at(time)
         return np.abs(reference.speed) + (half_track or 0.0) * np.abs(reference.yaw_rate)
 
-    shape, times = trajectory.shape, _times(trajectory)
-    s = np.linspace(0.0, shape.length, SAMPLES)
-    length = float(_size(np.diff(shape.derivatives(s)[0], axis=0)).sum())
-    tightest, bend = _highest(curvature, s)
-    x, y = shape.derivatives(np.array(tightest))[0] + trajectory.origin
+    path, times = trajectory.course, _times(trajectory)
+    length = _length(path)
+    tightest, bend = _highest(curvature, path.stations)
+    x, y = path.derivatives(np.array(tightest))[0] + trajectory.origin
     return Summary(
         length=length,
         duration=trajectory.duration,
@@ -70,7 +70,7 @@ def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
         smallest_radius=1 / bend if bend * length > 1e-9 else math.inf,
         tightest_place=(float(x), float(y)),
         fastest_wheel_speed=None if half_track is None else _highest(wheel_speed, times)[1],
-        closed=shape.closed,
+        closed=path.closed,
         remarks=_remarks(trajectory, length),
     )
 
@@ -80,18 +80,29 @@ def _remarks(trajectory: Trajectory, length: float) -> tuple[str, ...]:
     if length > LONG:
         remarks.append(f"the path is {length:.4g} m long: are its sizes in mm rather than in m?")
     laps = getattr(trajectory.law, "laps", 1)
-    if laps > 1 and not trajectory.shape.closed:
+    if laps > 1 and not trajectory.course.closed:
         remarks.append(f"laps={laps} has no effect: the path is open")
     return tuple(remarks)
 
 
 def _times(trajectory: Trajectory) -> Array:
     """Times [s] until all repeats itself, evenly spaced in time and in the path's parameter."""
-    end = trajectory.law.horizon(trajectory.shape)
-    times = np.linspace(0.0, end, 4 * SAMPLES)
-    progress = np.maximum.accumulate(trajectory.law.progress(times, trajectory.shape)[0])
-    even = np.interp(np.linspace(0.0, progress[-1], 2 * SAMPLES), progress, times)
+    path, law = trajectory.course, trajectory.law
+    times = np.linspace(0.0, law.horizon(path), 4 * SAMPLES)
+    progress = np.maximum.accumulate(law.progress(times, path)[0])
+    stations = path.stations
+    if path.closed:
+        stations = np.concatenate([stations, stations + path.length])
+    even = np.interp(stations[stations < progress[-1]], progress, times)
     return np.union1d(times, even)
+
+
+def _length(path: Shape) -> float:
+    """Length [m] by Simpson's rule between stations."""
+    s = path.stations
+    middle, step = (s[:-1] + s[1:]) / 2, np.diff(s)
+    ends, halfway = (_size(path.derivatives(at)[1]) for at in (s, middle))
+    return float(((ends[:-1] + 4 * halfway + ends[1:]) * step).sum() / 6)
 
 
 def _highest(f: Callable[[Array], Array], x: Array) -> tuple[float, float]:
