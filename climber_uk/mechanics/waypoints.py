@@ -26,7 +26,7 @@ class Waypoints:
     nearer than a sixth of the tolerance to its first. Raises `ValueError` naming the file.
     """
 
-    file: str = parameter("", "", "text file with x and y of a point a line, in m")
+    file: str = parameter("", "", "text file with x and y of a point a line, in m", is_path=True)
     tolerance: float = parameter(
         0.02, "m", "how far the path may be from the lines between the points", above=0
     )
