@@ -48,7 +48,7 @@ def rounded(points: Array, tolerance: float, reversal_angle: float) -> Rounded:
     near, spacing = NEAR * tolerance, ROUNDING * tolerance / MOMENT
     closed = len(points) > 2 and math.dist(points[0], points[-1]) < near
     corners = _thinned(points, near, closed)
-    if len(corners) < 2 + closed:
+    if len(corners) < 2 + closed or (corners[0] == corners[1]).all():
         raise ValueError(f"all points are within {near:.3g} m, a sixth of the tolerance")
     back = _reversals(corners, reversal_angle, closed)
     if closed and len(back) % 2:  # it ends tail first where it began
@@ -114,6 +114,7 @@ def _periodic(s: Array, corners: Array, breaks: Array, _: Array) -> Any:
 
     steps = np.pad(np.diff(breaks), DEGREE, "wrap")
     knots = np.concatenate([[0.0], np.cumsum(steps)]) - steps[:DEGREE].sum()
+    knots[DEGREE:-DEGREE] = breaks
     return BSpline(knots, _at(s, corners, _means(knots) % s[-1]), DEGREE, extrapolate="periodic")
 
 

@@ -62,9 +62,8 @@ class Trajectory:
         _, p_1, p_2, p_3 = path = self.course.derivatives(s)
         position, velocity, acceleration, jerk = compose(path, (s_1, s_2, s_3))
 
-        gear = self.course.gear(s) * (-1 if self.reverse_gear else 1)
-        heading = np.arctan2(p_1[..., 1], p_1[..., 0]) + np.pi * (np.asarray(gear) < 0)
-        heading = heading[..., None]
+        forwards = p_1 * np.asarray(self.course.gear(s))[..., None]
+        heading = np.arctan2(forwards[..., 1:], forwards[..., :1]) + np.pi * self.reverse_gear
         square = np.sum(p_1**2, axis=-1, keepdims=True)
         turning = _cross(p_1, p_2) / square  # dθ/ds
         turning_rate = (

@@ -126,6 +126,7 @@ class UkTorqueController(ManagedNode):
         """Keep the reference; answer the odometry that waits for it."""
         try:
             preview = reading_reference.preview(message, self.names.odom_frame)
+            preview.check_heading()
         except ValueError as error:
             self.say("reference", "refused", str(error))
             return
