@@ -121,10 +121,10 @@ class RestToRest:
     def _along(self, since: Array, places: Array, times: Array) -> Derivatives:
         """s and its derivatives at `since` (...) of a run, from rest to rest on each leg."""
         leg = np.clip(np.searchsorted(times, since, "right") - 1, 0, len(times) - 2)
-        way, time = places[leg + 1] - places[leg], times[leg + 1] - times[leg]
-        rate = way / (time - self.ramp_time)
-        faster = smooth_start(since - times[leg], self.ramp_time)
-        slower = smooth_start(since - times[leg + 1] + self.ramp_time, self.ramp_time)
+        way, since = places[leg + 1] - places[leg], since - times[leg]
+        rate = np.minimum(self.rate, way / self.ramp_time)
+        faster = smooth_start(since, self.ramp_time)
+        slower = smooth_start(since - way / rate, self.ramp_time)
         s, s_1, s_2, s_3 = (rate * (up - down) for up, down in zip(faster, slower, strict=True))
         return places[leg] + s, s_1, s_2, s_3
 
