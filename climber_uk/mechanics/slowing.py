@@ -122,7 +122,9 @@ def _look(curve: Any, start: Array, size: Array, limits: Limits) -> tuple[Array,
         turning * (MARGIN * limits.rate / limits.yaw_rate),
         np.sqrt(bend * (2**0.5 * limits.rate**2 / limits.acceleration)),
     )
-    return turning, np.maximum(needed, np.maximum(1.0, np.sqrt(square.max(axis=1))))
+    # beside a reversal |p'| is a little above 1, and more so between the places looked at
+    excess = np.maximum(np.sqrt(square.max(axis=1)) - 1.0, 0.0)
+    return turning, np.maximum(needed, 1.0 + 1.25 * excess)
 
 
 def _foreseen(middle: Array, needed: Array, period: float | None, most: float) -> Array:

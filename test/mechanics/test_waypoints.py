@@ -78,7 +78,8 @@ def check(folder, points, tolerance=0.02):
     assert speed.max() <= 1 + 1e-6  # it is looked at 1e-6 of a cell beside its ends
     turning = (p_1[:, 0] * p_2[:, 1] - p_1[:, 1] * p_2[:, 0]) / speed**2
     assert RATE * np.abs(turning).max() <= YAW_RATE * (1 + 1e-3)
-    assert RATE**2 * np.hypot(*p_2.T).max() <= ACCELERATION * 1.1
+    # each of braking and turning keeps to its part, but for how a spline may be steeper
+    assert RATE**2 * np.hypot(*p_2.T).max() <= ACCELERATION * 1.5
     smooth_in_time(trajectory)
     return trajectory
 
