@@ -9,8 +9,17 @@ from typing import Any, TypeVar
 
 import yaml
 
+from climber_uk.mechanics.plan import KINDS
+
 T = TypeVar("T")
 OWN = "ros__parameters"
+# parameters that name a file: relative to the parameter file
+PATHS = {
+    prefix + field.name
+    for kind, prefix in KINDS
+    for field in dataclasses.fields(kind)
+    if field.metadata.get("is_path")
+}
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,7 @@ def read_file(path: Path, node: str) -> dict[str, Any]:
     """Values that a parameter file has for a node, of two entries the later one's.
 
     `node` is the full name, which the file may give with wildcards; `ValueError` if it does not.
+    What names a file is as seen from the working directory, not from the parameter file.
     """
     try:
         tree = yaml.safe_load(path.read_text())
@@ -45,7 +55,9 @@ def read_file(path: Path, node: str) -> dict[str, Any]:
         if OWN in keys:
             own = keys.index(OWN)
             if re.fullmatch(_pattern("/".join(keys[:own])), node):
-                found[".".join(keys[own + 1 :])] = value
+                name = ".".join(keys[own + 1 :])
+                is_path = name in PATHS and isinstance(value, str) and value
+                found[name] = str(path.parent / Path(value).expanduser()) if is_path else value
     if not found:
         raise ValueError(f"{path} has no parameters for {node}")
     return found

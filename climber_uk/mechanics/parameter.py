@@ -19,11 +19,13 @@ def parameter(
     at_most: float | None = None,
     choices: Sequence[str] | None = None,
     runtime: bool = False,
+    is_path: bool = False,
 ) -> Any:
     """Declare a dataclass field together with all that a user may ask about it.
 
     `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; `runtime` marks
-    what a running node may change. Pass the dataclass's instance to `check` in `__post_init__`.
+    what a running node may change, `is_path` the name of a file, which in a parameter file is
+    relative to that. Pass the dataclass's instance to `check` in `__post_init__`.
     """
     return dataclasses.field(
         default=default,
@@ -35,6 +37,7 @@ def parameter(
             "at_most": at_most,
             "choices": choices,
             "runtime": runtime,
+            "is_path": is_path,
         },
     )
 

@@ -13,9 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array, Stamps
+from climber_uk.mechanics.climber import across, along
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.motion import Target, named
 from climber_uk.mechanics.reference import Reference
+
+MOST_SIDEWAYS = 0.1  # [rad] between heading and velocity, forwards or backwards
+REST = 0.005  # [m/s] sideways, below which a heading has no direction to agree with
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,26 @@ class Preview:
         for name in ("pose", "velocity", "acceleration"):
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} of a point is not finite")
+
+    def check_heading(self) -> None:
+        """Raise `ValueError` unless every point moves along its heading, forwards or backwards.
+
+        Wheels do not roll sideways (17). Angles of less than `MOST_SIDEWAYS` pass, which finite
+        differences may give, and any heading passes at rest.
+        """
+        heading = self.pose[:, 2]
+        forwards = np.abs(along(heading, self.velocity))
+        sideways = np.abs(across(heading, self.velocity))
+        angle = np.arctan2(sideways, forwards)
+        is_wrong = (angle > MOST_SIDEWAYS) & (sideways > REST)
+        if is_wrong.any():
+            i = int(np.argmax(is_wrong))
+            raise ValueError(
+                f"point {i + 1} moves sideways: its velocity of "
+                f"{np.hypot(forwards[i], sideways[i]):.3g} m/s is {np.degrees(angle[i]):.3g}° off "
+                f"its heading of {heading[i]:.3g} rad, at most {np.degrees(MOST_SIDEWAYS):.2g}° "
+                "can be followed"
+            )
 
     @cached_property
     def _pieces(self) -> tuple[list[int], list[list[list[float]]]]:

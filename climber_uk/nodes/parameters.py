@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from climber_uk.mechanics.parameter import check_value
+from climber_uk.nodes.parameter_paths import located
 
 T = TypeVar("T")
 Field = dataclasses.Field[Any]
@@ -76,6 +77,10 @@ class Parameters:
         if (prefix, kind) not in self._kept:
             names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
             values = {name: self._node.get_parameter(prefix + name).value for name in names}
+            for field in dataclasses.fields(kind):  # type: ignore[arg-type]
+                if field.metadata.get("is_path") and values[field.name]:
+                    path, owner = values[field.name], self._node.get_fully_qualified_name()
+                    values[field.name] = located(path, prefix + field.name, owner, sys.argv)
             try:
                 self._kept[prefix, kind] = kind(**values)
             except ValueError as error:

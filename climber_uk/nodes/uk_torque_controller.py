@@ -137,6 +137,7 @@ class UkTorqueController(ManagedNode):
                 raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
             message = deserialize_message(serialized, MultiDOFJointTrajectory)
             preview = reading_reference.preview(message, self.names.odom_frame)
+            preview.check_heading()
         except ValueError as error:
             self.say("reference", "refused", str(error))
             return

@@ -71,3 +71,12 @@ def test_arguments_are_read_as_yaml():
     said = ("mass:=6.0", "predict:=false", "constraints:=exact")
     read = [read_argument(argument) for argument in said]
     assert read == [("mass", 6.0), ("predict", False), ("constraints", "exact")]
+
+
+@pytest.mark.parametrize(
+    ("given", "found"), [("lanes.csv", "{0}/lanes.csv"), ("../a/b", "{0}/../a/b"), ("/c", "/c")]
+)
+def test_a_file_named_in_a_parameter_file_is_relative_to_that(file, given, found):
+    path = file(f"/**:\n  ros__parameters:\n    waypoints: {{file: {given}}}\n")
+    values = read_file(path, "/trajectory_publisher")
+    assert values == {"waypoints.file": found.format(path.parent)}

@@ -32,7 +32,7 @@ def test_a_bad_parameter_is_refused_with_one_line(world, name, parameters, line)
 
 
 @pytest.mark.parametrize(
-    ("content", "wrong"), [("1 2\n", "1 point"), ("0 0\n1 nan\n", "point 2 is not finite")]
+    ("content", "wrong"), [("1 2\n", "1 point"), ("0 0\n1 nan\n", "line 2: point 2 is not finite")]
 )
 def test_a_bad_waypoint_file_is_refused_with_one_line(world, tmp_path, content, wrong):
     file = tmp_path / "points.txt"

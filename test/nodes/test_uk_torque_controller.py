@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -193,6 +195,21 @@ def set_parameter(world, name, value):
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
     request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
     return world.call(SetParameters, f"{NAME}/set_parameters", request).results[0]
+
+
+def test_a_reference_that_moves_sideways_is_refused_with_numbers_and_the_last_one_kept(world):
+    loop = Loop(world)
+    loop.plan()
+    loop.follows()
+    point = CIRCLE.at(1.0)
+    points = [writing.reference_point(CIRCLE.at(time), time) for time in (0.0, 1.0, 2.0)]
+    turned = replace(point, pose=point.pose + np.array([0.0, 0.0, 1.0]))
+    points[1] = writing.reference_point(turned, 1.0)
+    loop.reference.publish(writing.reference(points, loop.begin, "odom", "base_link"))
+    world.wait(lambda: "reference: refused" in world.log(NAME), "word of the refusal")
+    assert "point 2 moves sideways" in world.log(NAME)
+    assert "57.3° off its heading" in world.log(NAME)
+    loop.follows()
 
 
 def test_gains_change_while_running_but_not_geometry_and_not_beyond_bounds(world):
