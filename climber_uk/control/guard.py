@@ -41,7 +41,7 @@ class GuardOptions:
         1.0, "", "of what adhesion and weight could cause, as force and as moment", at_least=0
     )
     response_time: float = parameter(
-        0.07, "s", "in which a wheel has to answer its torque", at_least=0
+        0.15, "s", "in which a wheel has to answer its torque", at_least=0
     )
     recovery_time: float = parameter(
         0.5, "s", "of rest after which the reference is followed again", at_least=0
