@@ -12,7 +12,7 @@ from climber_uk.analysis.topics import Topics
 from climber_uk.mechanics.climber import GRAVITY, Climber
 
 EXACT = {"rel": 1e-9, "abs": 1e-12}
-UNITS = {"", "%", "m", "rad", "s", "m/s", "N", "N m", "W", "J", "J/m", "Pa"}
+UNITS = {"", "%", "m", "rad", "s", "m/s", "1/s", "N", "N m", "W", "J", "J/m", "Pa"}
 
 
 def metrics_of(made, path, climber=None, settled=0.01):

@@ -14,9 +14,16 @@ def following(case: Case) -> float:
 
 
 def stops(case: Case) -> float:
-    """How often a fault began."""
-    modes = case.run.modes
-    return float(sum(mode.level == ERROR for mode, _, _ in modes)) if modes else NAN
+    """How often a fault began, once it had followed or in the time of the run.
+
+    Before that it is how nodes start up, and so is a simulated clock that is not there yet.
+    """
+    modes, count, followed = case.run.modes, 0, False
+    for mode, begin, end in modes:
+        followed = followed or mode.text == Mode.FOLLOWING.value
+        is_starting = begin == end or mode.text == Mode.NO_CLOCK.value
+        count += mode.level == ERROR and (followed or not is_starting)
+    return float(count) if modes else NAN
 
 
 def errors(case: Case) -> float:
@@ -36,7 +43,8 @@ METRICS = (
     Metric(
         "safety_stops",
         "",
-        "how often the controller gave its safe output because of a fault, by /diagnostics",
+        "how often the controller gave its safe output because of a fault, by /diagnostics; not "
+        "as it starts up",
         stops,
     ),
     Metric("errors", "", "how often a node came to be in the state ERROR, by /diagnostics", errors),
