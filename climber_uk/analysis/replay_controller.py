@@ -43,16 +43,16 @@ def replayed(options: argparse.Namespace) -> Comparison:
     def choose(told: Mapping[str, Any]) -> dict[str, Any]:
         return {**(told if file is None else file), **given}
 
+    recorded = RecordedController(options.bag, namespace, file)
+    if recorded.parameters is None and file is None:
+        raise ValueError(
+            f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
+        )
     if not are_known(options.bag, [f"{namespace}/{TORQUES}"]):
         print(
             f"replay_controller: {options.bag} does not tell when messages were published: they "
             "are taken in the order of their arrival at the recorder",
             file=sys.stderr,
-        )
-    recorded = RecordedController(options.bag, namespace, file)
-    if recorded.parameters is None and file is None:
-        raise ValueError(
-            f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
         )
     replay = Replay(recorded, namespace, choose)
     replay.run(options.bag, namespace)

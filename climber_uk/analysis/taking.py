@@ -24,17 +24,13 @@ FAULTS = (
 
 def heading(batch: Batch, path: str) -> tuple[Array, Faults]:
     """Headings (n,) [rad] of orientations at `path`, and what is wrong with them."""
-    x, y, z, w = (orientation := batch.columns(*(f"{path}.{axis}" for axis in "xyzw"))).T
-    norm = np.sqrt((orientation**2).sum(axis=1))
-    faults = np.select(
-        [
-            ~np.isfinite(norm),
-            ~(np.abs(norm - 1) <= NORM_TOLERANCE),
-            ~(np.hypot(x, y) < MOST_TILT * norm),
-        ],
-        [3, 4, 5],
-    )
-    return np.arctan2(2 * w * z, w * w - z * z), faults
+    x, y, z, w = batch.columns(*(f"{path}.{axis}" for axis in "xyzw")).T
+    with np.errstate(over="ignore", invalid="ignore"):
+        tilted = np.hypot(x, y)
+        norm = np.hypot(tilted, np.hypot(z, w))
+        is_finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z) & np.isfinite(w)
+        wrong = ~is_finite, ~(np.abs(norm - 1) <= NORM_TOLERANCE), ~(tilted < MOST_TILT * norm)
+        return np.arctan2(2 * w * z, w * w - z * z), np.select(wrong, [3, 4, 5])
 
 
 def are_sound(values: Array) -> NDArray[np.bool]:

@@ -141,8 +141,7 @@ def test_many_orientations_are_judged_as_the_controller_judges_one(parts):
         ),
     )
     (batch,), _ = decode([(0, bytes(STORE.serialize_cdr(stamped, kind)))], kind, STORE)
-    with np.errstate(all="ignore"):
-        (found,), (fault,) = heading(batch, "quaternion")
+    (found,), (fault,) = heading(batch, "quaternion")
     try:
         expected = heading_of(sent)
     except ValueError:

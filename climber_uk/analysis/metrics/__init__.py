@@ -26,7 +26,8 @@ METRICS = {metric.name: metric for group in GROUPS.values() for metric in group}
 def evaluate(case: Case) -> dict[str, float]:
     """All metrics of a run, by their names; nan for what cannot be told."""
     return {
-        name: metric.of(case) if metric.concerns(case) else NAN for name, metric in METRICS.items()
+        name: float(metric.of(case)) if metric.concerns(case) else NAN
+        for name, metric in METRICS.items()
     }
 
 
