@@ -24,6 +24,7 @@ from climber_uk.mechanics.climber import Climber
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
 NOTHING = Recorded.of([])
+NAMES = "left_wheel_joint", "right_wheel_joint", "adhesion"
 Told = Mapping[str, Any]  # parameters of a controller, by name
 
 
@@ -126,10 +127,19 @@ class Reading:
         if len(odometry) < 2:
             raise NoRunError(self.too_few(whole))
         start, end = int(odometry.stamps[0]), int(odometry.stamps[-1])
-        recorded = {name: self.recorded(found, name).within(start, end) for name in TAKEN}
-        parameters = self.parameters(self.namespace) if self.parameters else self.told(found)
+        parameters = self.known(found)
+        recorded = {name: self.recorded(found, name) for name in TAKEN.keys() - {topics.ODOMETRY}}
         commands = self.commands(found, parameters)
         right, left = self.wheels(found, parameters)
+
+        def at_its_times(recorded: Recorded, name: str) -> Recorded:
+            within = recorded.within(start, end)
+            if len(recorded) and not len(within):
+                self.bag.lose(f"{self.topic(name)}: no message has a time of the odometry's")
+            return within
+
+        recorded = {name: at_its_times(told, name) for name, told in recorded.items()}
+        commands = at_its_times(commands, topics.TORQUES)
         own = [
             event
             for event in told
@@ -142,7 +152,7 @@ class Reading:
             odometry=odometry,
             reference=reference,
             commands=commands.where(np.isin(commands.stamps, odometry.stamps)),
-            wheels=(right.within(start, end), left.within(start, end)),
+            wheels=(at_its_times(right, topics.JOINTS), at_its_times(left, topics.JOINTS)),
             truth_reference=poses_at(found.reference, recorded[topics.TRUTH].stamps),
             recorded=recorded,
             events=sorted(news, key=itemgetter(0)),
@@ -171,6 +181,14 @@ class Reading:
             return f"no run on {topic}: one message only has a reference"
         others = f", {odometry.repeated} with the stamp of another" if odometry.repeated else ""
         return f"no run on {topic}: {count or 'no'} message of use{others}"
+
+    def known(self, found: Collected) -> Told:
+        """The parameters of the controller: as given, but names may be those that it told."""
+        told = self.told(found)
+        if self.parameters is None:
+            return told
+        names = {name: told[name] for name in NAMES if name in told}
+        return names | dict(self.parameters(self.namespace))
 
     def told(self, found: Collected) -> Told:
         """The parameters of the controller, as it told them last; says what is wrong with them."""

@@ -6,21 +6,23 @@ import numpy as np
 
 from climber_uk.mechanics import Stamps
 
-LASTING = 5  # messages, one after the other, that lie before one received earlier
+AROUND = 5  # messages before and after, by which it is told
 
 
 def restarts(stamps: Stamps) -> list[int]:
     """Places in the stamps (n,) of one topic, in the order of arrival, where they start again.
 
-    A single message that comes late lies back too, but the next ones do not go on from it.
+    There the next few all lie before most of the last few, and go on from each other. A message
+    that comes late, or with a wrong stamp, lies back or ahead too, but those around it do not.
     """
-    back = np.flatnonzero(np.diff(stamps) < 0) + 1
-    return [int(i) for i in back if _go_on(stamps[i : i + LASTING], stamps[i - 1])]
-
-
-def _go_on(stamps: Stamps, before: int) -> bool:
-    forwards = bool((np.diff(stamps) >= 0).all())
-    return len(stamps) == LASTING and forwards and bool(stamps[-1] < before)
+    found: list[int] = []
+    for i in (np.flatnonzero(np.diff(stamps) < 0) + 1).tolist():
+        before, after = np.sort(stamps[max(0, i - AROUND) : i]), stamps[i : i + AROUND]
+        is_new = not found or i - found[-1] >= AROUND
+        goes_on = len(after) == AROUND and after[-1] >= after[0]
+        if is_new and goes_on and after.max() < before[len(before) // 2]:
+            found.append(i)
+    return found
 
 
 def windows(stamps: Stamps, arrivals: Stamps) -> list[tuple[float, float]]:

@@ -20,6 +20,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.reference import Reference
 
 REACH = 0.1  # [s] to either side, over which a speed is taken from poses
+LEAST = 1e-3  # [m/s, rad/s] that poses have to tell, for zeros to be no rate
 SLIP_REACH = 0.25  # [s] likewise a speed to the side: slow, and to be told from the poses' noise
 
 
@@ -61,11 +62,12 @@ class RecordedRun:
     @cached_property
     def rates(self) -> Array:
         """(n, 3) forwards, to the left [m/s], about z [rad/s]: the twist, else by the poses."""
-        twist = self.odometry.values[:, 3:]
-        by_pose = body_rates(self.time, self.pose, REACH)
-        if not twist.any() and np.ptp(self.pose[:, :2], axis=0).any():  # there is none
-            return by_pose
-        return np.where(np.isfinite(twist).all(axis=0), twist, by_pose)
+        twist, by_pose = self.odometry.values[:, 3:], body_rates(self.time, self.pose, REACH)
+        is_told = np.isfinite(twist).all(axis=0)
+        # zeros of a rate that there is; to the side, drivers may know better than noisy poses
+        are_zeros = ~twist.any(axis=0) & (np.abs(by_pose).max(axis=0) > LEAST)
+        are_zeros[1] &= are_zeros[0]
+        return np.where(is_told & ~are_zeros, twist, by_pose)
 
     @property
     def side_slip(self) -> Array:

@@ -202,6 +202,15 @@ def test_without_a_twist_speeds_are_those_of_the_poses(tmp_path, value):
     assert got["max_side_slip"] < 1e-3
 
 
+def test_a_yaw_rate_that_is_not_filled_in_is_that_of_the_poses(tmp_path):
+    made = Made(400)
+    made.add_odometry()
+    made.edit("odom", setting("twist.twist.angular.z", 0.0))
+    (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    np.testing.assert_allclose(run.rates[:, 2], RATE, rtol=1e-6)
+    assert (run.rates[:, :2] == [1.0, 0.0]).all()
+
+
 def test_a_climber_that_stands_has_not_travelled_whatever_its_odometry_tells(tmp_path):
     made = pose_only()
     made.edit("odom", setting("pose.pose.position.x", 1.0))

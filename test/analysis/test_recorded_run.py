@@ -171,6 +171,30 @@ def test_parameters_that_cannot_be_are_said_and_not_used(tmp_path):
     assert said == ["/uk_torque_controller/parameters: not used, mass=-1.0 must be > 0 [kg]"]
 
 
+def test_names_that_a_parameter_file_does_not_give_are_those_that_the_controller_told(tmp_path):
+    made = a_run(N)
+    made.add_parameters(left_wheel_joint="right", right_wheel_joint="left", mass=7.0)
+    bag = made.write(tmp_path / "bag")
+    (run,), _ = read_runs(bag, Topics(), parameters=lambda _: {"max_wheel_torque": 2.0})
+    assert len(run.torques) == N
+    assert run.climber == Climber(max_wheel_torque=2.0)
+    (run,), (said,) = read_runs(bag, Topics(), parameters=lambda _: {"left_wheel_joint": "l"})
+    assert "no l among the joints left, right" in said
+
+
+def test_that_a_topic_has_another_clock_is_said(tmp_path):
+    made = a_run(N)
+    made.add_truth(made.pose)
+    for topic in ("ground_truth", "wheel_torques"):
+        made.edit(topic, lambda sent: setattr(sent.header.stamp, "sec", 99))
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert len(run.torques) == len(run.truth_distance) == 0
+    assert sorted(said) == [
+        f"/{topic}: no message has a time of the odometry's"
+        for topic in ("ground_truth", "wheel_torques")
+    ]
+
+
 def test_points_are_where_they_were_written(tmp_path):
     made = Made(N)
     made.add_odometry()

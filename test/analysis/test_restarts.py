@@ -27,18 +27,21 @@ def again(first, second, pause=SECOND):
 
 @ANYTHING
 @given(
-    lengths=st.lists(st.integers(6, 40), min_size=1, max_size=5),
-    back=st.integers(6, 10**6),
+    lengths=st.lists(st.integers(10, 40), min_size=1, max_size=5),
+    back=st.integers(10, 10**6),
     repeats=st.integers(0, 12),
+    swapped=st.integers(0, 3),
 )
-def test_each_time_that_stamps_start_again_is_found(lengths, back, repeats):
+def test_each_time_that_stamps_start_again_is_found(lengths, back, repeats, swapped):
+    """Also if a plant that waits says its first again, or a message comes late right after it."""
     stamps, places = [], []
     begin = 10**9
     for length in lengths:
         places.append(len(stamps))
-        run = begin + np.arange(length)
-        stamps += [run[0]] * repeats + run.tolist()  # a plant that waits says the first again
+        run = (begin + np.arange(length)).tolist()
         begin = run[-1] - max(back, length)
+        run[swapped], run[swapped + 1] = run[swapped + 1], run[swapped]
+        stamps += [min(run)] * repeats + run
     assert restarts(PERIOD * np.array(stamps)) == places[1:]
 
 
@@ -46,14 +49,19 @@ def test_each_time_that_stamps_start_again_is_found(lengths, back, repeats):
 @given(
     late=st.dictionaries(st.integers(0, 99), st.integers(1, 200), max_size=30),
     repeated=st.lists(st.integers(0, 99), max_size=30),
+    wrong=st.dictionaries(st.integers(0, 9), st.integers(-(10**6), 10**6)),
 )
-def test_messages_that_come_late_or_twice_start_nothing_again(late, repeated):
-    """Late by up to 30 periods, but no more than three of them at a time."""
+def test_messages_that_come_late_or_twice_or_with_wrong_stamps_start_nothing_again(
+    late, repeated, wrong
+):
+    """No more than one of some messages is late, or has a wrong stamp."""
     arrivals = {number: number for number in range(100)}
     for number, by in late.items():
-        if sum(abs(arrivals[other] - number - by) < 5 for other in late) < 3:
+        if sum(abs(arrivals[other] - number - by) < 5 for other in late) < 2:
             arrivals[number] = number + by % 30 + 0.5
     order = sorted([*arrivals, *repeated], key=lambda number: (arrivals[number], number))
+    for place, by in wrong.items():
+        order[10 * place + 9] += by
     assert restarts(PERIOD * np.array(order)) == []
 
 
