@@ -321,13 +321,13 @@ def test_a_change_of_the_torque_over_a_gap_is_none(tmp_path):
 
 @pytest.mark.parametrize(
     ("modes", "stops"),
-    [
+    [  # each of them an error too
         ([(-0.5, "no clock"), (0.0, "following")], 0),
         ([(-0.5, "no odometry"), (-0.1, "waiting for a reference"), (0.0, "following")], 0),
         ([(0.2, "no clock"), (0.4, "following")], 0),
         ([(0.0, "no clock"), (0.1, "following"), (0.5, "no clock"), (0.6, "following")], 1),
         ([(-0.5, "bad odometry"), (0.5, "following")], 1),
-        ([(0.0, "following"), (0.5, "no odometry"), (0.6, "bad odometry")], 2),
+        ([(0.0, "following"), (0.5, "no odometry"), (0.6, "following"), (0.7, "bad odometry")], 2),
     ],
 )
 def test_to_start_up_without_a_clock_is_no_safety_stop(tmp_path, modes, stops):
@@ -336,7 +336,7 @@ def test_to_start_up_without_a_clock_is_no_safety_stop(tmp_path, modes, stops):
     for time, mode in modes:
         text = Mode.NO_CLOCK.value if mode == "no clock" else mode
         made.add_mode(time, text, level=2 if is_fault(text) else 0)
-    same(metrics_of(made, tmp_path), safety_stops=float(stops))
+    same(metrics_of(made, tmp_path), safety_stops=float(stops), errors=float(stops))
 
 
 @pytest.mark.parametrize(("adhesion", "lowest"), [("suction", 8000.0), ("magnetic", math.nan)])
