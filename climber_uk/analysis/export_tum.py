@@ -15,8 +15,8 @@ import numpy as np
 from climber_uk.analysis.bag import open_bag
 from climber_uk.analysis.collecting import collect
 from climber_uk.analysis.outputs import output, printable
-from climber_uk.analysis.recorded_run import Reading
 from climber_uk.analysis.reference import poses_at
+from climber_uk.analysis.run_reader import RunReader
 from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TRUTH, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 
@@ -29,14 +29,14 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
     Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
     """
     with open_bag(bag) as opened:
-        reading = Reading(opened, Topics(), namespace, None)
+        reader = RunReader(opened, Topics(), namespace, None)
         found = collect(opened, Topics(), [namespace])[0][namespace]
-        topic = reading.topic(ODOMETRY)
+        topic = reader.topic(ODOMETRY)
         if not found.parts[ODOMETRY]:
             raise ValueError("; ".join([f"{bag} has no message on {topic}", *opened.losses]))
         runs = []
         for part in found.runs():
-            odometry, truth = (reading.recorded(part, name) for name in (ODOMETRY, TRUTH))
+            odometry, truth = (reader.recorded(part, name) for name in (ODOMETRY, TRUTH))
             reference = poses_at(part.reference, odometry.stamps)
             known = np.isfinite(reference[:, 0])
             poses = {

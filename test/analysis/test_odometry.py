@@ -230,7 +230,7 @@ def test_poses_with_noise_make_the_way_no_longer(tmp_path):
     (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
     got = evaluate(Case(run))
     assert got["travelled"] == pytest.approx(RADIUS * RATE * 10, rel=2e-3)
-    assert got["slip_share"] == 0.0
+    assert math.isnan(got["slip_share"])  # it would be told if there were some
 
 
 def test_seconds_are_not_lost_where_time_is_long(tmp_path):

@@ -40,11 +40,15 @@ def _margin(case: Case, column: int) -> Array:
 
 
 def slip_share(case: Case) -> float:
-    """Share of time that it slips [%], by the margin or by the way it goes, whichever is more."""
-    rates = case.run.path_rates
-    aside = np.abs(rates[:, 1]) > np.maximum(ASIDE, ASKEW * np.abs(rates[:, 0]))
-    shares = np.array([share(_margin(case, 0) < 1), share(aside)])
-    return largest(shares)
+    """Share of time that it slips [%], by the margin or by the way it goes, whichever is more.
+
+    Odometry of wheels sees no slip: that it alone tells none is not known to be none.
+    """
+    run = case.run
+    aside = np.abs(run.path_rates[:, 1]) > np.maximum(ASIDE, ASKEW * np.abs(run.path_rates[:, 0]))
+    if not (len(run.hold) or len(run.recorded[topics.TRUTH]) or aside.any()):
+        return NAN
+    return largest(np.array([share(_margin(case, 0) < 1), share(aside)]))
 
 
 def max_side_slip(case: Case) -> float:
