@@ -16,7 +16,7 @@ from climber_uk.analysis.bag import open_bag
 from climber_uk.analysis.collecting import collect
 from climber_uk.analysis.outputs import output, printable
 from climber_uk.analysis.reference import poses_at
-from climber_uk.analysis.run_reader import RunReader
+from climber_uk.analysis.run_reader import NoRunError, RunReader
 from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TRUTH, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 
@@ -36,6 +36,10 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
             raise ValueError("; ".join([f"{bag} has no message on {topic}", *opened.losses]))
         runs = []
         for part in found.runs():
+            try:
+                reader.check_agreement(part)
+            except NoRunError as error:
+                raise ValueError(f"{bag}: {error}") from None
             odometry, truth = (reader.recorded(part, name) for name in (ODOMETRY, TRUTH))
             reference = poses_at(part.reference, odometry.stamps)
             known = np.isfinite(reference[:, 0])

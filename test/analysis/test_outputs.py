@@ -174,3 +174,16 @@ def test_a_bound_that_nothing_exceeds_is_refused(tmp_path, run, bound):
 )
 def test_nothing_that_is_printed_commands_a_terminal(text, printed):
     assert printable(text) == printed
+
+
+@pytest.mark.parametrize("tool", [analyze_bag, export_tum])
+def test_two_runs_at_the_same_times_are_refused_in_one_line(tmp_path, run, tool):
+    first, second = a_run(100), a_run(100)
+    second.pose[:, 0] += 0.5
+    second.messages.clear()
+    second.add_odometry()
+    bag = write(tmp_path / "bag", first.messages + second.messages)
+    failed, out, err = run(tool, bag)
+    assert (failed, out) == (True, "")
+    (line,) = err.splitlines()
+    assert f"{bag}: no run on /odom: 100 messages are more than 0.05 m from another" in line

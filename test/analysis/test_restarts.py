@@ -121,6 +121,25 @@ def test_one_run_is_not_read_of_a_bag_with_two(tmp_path):
         read_run(bag)
 
 
+def test_two_runs_at_the_same_log_times_are_refused(tmp_path):
+    """As of a recorder that takes its time from a simulation, which was restarted."""
+    first = a_run(100)
+    second = Made(100, errors=lambda time: np.tile([0.0, 0.5, 0.0], (len(time), 1)))
+    second.add_odometry()
+    bag = write(tmp_path / "bag", [*first.messages, *second.messages])
+    said = r"/bag: no run on /odom: 100 messages are more than 0.05 m from another with the same"
+    with pytest.raises(ValueError, match=said):
+        read_runs(bag, Topics())
+
+
+def test_messages_that_are_sent_twice_agree(tmp_path):
+    made = a_run(100)
+    bag = write(tmp_path / "bag", [*made.messages, *made.messages])
+    (run,), said = read_runs(bag, Topics())
+    assert said == []
+    assert (len(run.time), run.odometry.repeated) == (100, 100)
+
+
 def test_only_the_climber_whose_time_starts_again_has_two_runs(tmp_path):
     other = a_run(100, namespace="/other")
     bag = write(tmp_path / "bag", [*two_runs(), *other.messages])
