@@ -78,8 +78,12 @@ def _tiles(column: Column) -> Iterable[tuple[str, str, str, str, int]]:
         "Hold on the wall",
         "lowest_slip_margin",
         f"{shown('lowest_slip_margin')} slip margin",
-        f"{shown('lowest_tip_margin')} tip margin; below 1 it slips, it tips",
-        Alarm().level(min(values["lowest_slip_margin"], values["lowest_tip_margin"])),
+        f"{shown('lowest_tip_margin')} tip margin; below 1 it slips, it tips: it slipped "
+        f"{shown('slip_share')} of the time",
+        max(
+            Alarm().level(min(values["lowest_slip_margin"], values["lowest_tip_margin"])),
+            WARNING if values["slip_share"] > 0 else OK,
+        ),
     )
     stops = values["safety_stops"]
     yield (
