@@ -95,7 +95,6 @@ class RunReader:
 
     def run(self, found: Collected, told: Collection[Event], part: str) -> RecordedRun:
         """One run; raises `NoRunError`."""
-        self.check_agreement(found)
         whole = odometry = self.recorded(found, topics.ODOMETRY)
         reference = poses_at(found.reference, odometry.stamps)
         known = np.flatnonzero(np.isfinite(reference[:, 0]))
@@ -105,6 +104,7 @@ class RunReader:
             reference = reference[first : last + 1]
         if len(odometry) < 2:
             raise NoRunError(self.too_few(whole))
+        self.check_agreement(found)
         start, parameters = int(odometry.stamps[0]), self.known(found)
         recorded = {
             name: self.within(self.recorded(found, name), name, odometry)
