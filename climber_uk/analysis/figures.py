@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.analysis import topics
 from climber_uk.analysis.events import ERROR, OK
-from climber_uk.analysis.recorded_run import RecordedRun
+from climber_uk.analysis.run import RecordedRun
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 
@@ -65,10 +65,14 @@ def _path(runs: Runs) -> Figure:
     for label, run in runs:
         step = max(1, len(run.time) // MOST_POSES)
         (line,) = axes.plot(*run.pose[::step, :2].T, label=label, linewidth=1.5, zorder=3)
+        truth = run.recorded[topics.TRUTH].values[::step, :2].T
+        axes.plot(*truth, ":", color=line.get_color(), linewidth=1.5, zorder=2)
         axes.plot(*run.reference[::step, :2].T, color="0.75", linewidth=4, zorder=1)
         for pose, marker in ((run.pose[0], "o"), (run.pose[-1], "s")):
             axes.plot(*pose[:2], marker, color=line.get_color(), zorder=4)
     axes.plot([], [], color="0.75", linewidth=4, label="reference")
+    if any(len(run.recorded[topics.TRUTH]) for _, run in runs):
+        axes.plot([], [], ":", color="0.4", label="truth")
     for marker, meaning in (("o", "start"), ("s", "end")):
         axes.plot([], [], marker, color="0.4", label=meaning)
     axes.set(xlabel="x [m]", ylabel="y [m]", title="Path on the wall")

@@ -2,7 +2,8 @@
 
 A recorder that is behind, or has to be sent a message again, receives a topic's messages in their
 order, but late: beside those of another topic, their log times say little. MCAP has the time of
-publishing as well; where there is none, as in sqlite3, it is the log time.
+publishing as well. Where there is none, as in sqlite3, or where a middleware or a converter left
+it 0, it is the log time.
 """
 
 import struct
@@ -28,6 +29,11 @@ def read_published(bag: Path, topics: Collection[str]) -> Iterator[tuple[str, in
     yield from merge(*streams, key=lambda message: message[1])
 
 
+def are_known(bag: Path, topics: Collection[str]) -> bool:
+    """Whether a bag tells when the messages of some topics were published."""
+    return bool(_times(bag, topics))
+
+
 def _published(bag: Path, topic: str, times: "array[int]") -> Iterator[tuple[str, int, Any]]:
     number = 0
     for _, logged, message in read_messages(bag, [topic]):
@@ -41,7 +47,7 @@ def _published(bag: Path, topic: str, times: "array[int]") -> Iterator[tuple[str
 
 
 def _times(bag: Path, topics: Collection[str]) -> "dict[str, array[int]]":
-    """Log and publishing time [ns] in turn, by topic, of messages of which both are known."""
+    """Log and publishing time [ns] in turn, by topic; none at all if they are not all known."""
     times: dict[str, array[int]] = defaultdict(lambda: array("q"))
     for file in sorted(bag.glob("*.mcap")) if bag.is_dir() else [bag]:
         names: dict[int, str] = {}
@@ -50,5 +56,7 @@ def _times(bag: Path, topics: Collection[str]) -> "dict[str, array[int]]":
                 if isinstance(record, Channel):
                     names[record.id] = record.topic
                 elif isinstance(record, Message) and names[record.channel_id] in topics:
+                    if record.publish_time == 0:
+                        return defaultdict(lambda: array("q"))
                     times[names[record.channel_id]].extend((record.log_time, record.publish_time))
     return times

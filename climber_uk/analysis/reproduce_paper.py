@@ -7,9 +7,11 @@ CSV), drift.png and off_constraint.png. All that takes long runs in processes of
 import argparse
 import multiprocessing
 import os
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from climber_uk.analysis.outputs import check_writable
 from climber_uk.analysis.paper import attempts, figures, motion, table
 from climber_uk.analysis.paper.study import (
     BOTH,
@@ -118,7 +120,10 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="coarser and shorter, without nodes")
     options = parser.parse_args()
     extent = QUICK if options.quick else FULL
-    options.output.mkdir(parents=True, exist_ok=True)
+    try:
+        check_writable(options.output)
+    except OSError as error:
+        sys.exit(f"reproduce_paper: {error}")
     # matrices of 3 by 3 gain nothing from threads, which would only be in each other's way
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     spawn = multiprocessing.get_context("spawn")

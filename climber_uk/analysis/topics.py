@@ -4,11 +4,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
+TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PARAMETERS = "joint_states", "suction_pressure", "uk_torque_controller/parameters"
 FORCE = "uk_torque_controller/constraint_force"
 MARGINS = "plant_simulator/margins", "uk_torque_controller/margins"  # the plant knows better
 DIAGNOSTICS, LOG = "/diagnostics", "/rosout"
-NAMES = (ODOMETRY, REFERENCE, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE, *MARGINS)
+NAMES = (ODOMETRY, TRUTH, REFERENCE, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE, *MARGINS)
 KNOWN = {*NAMES, DIAGNOSTICS, LOG}
 
 

@@ -12,7 +12,7 @@ from climber_uk.control.ages import Ages
 from climber_uk.control.approach import Approach
 from climber_uk.control.controller import Command
 from climber_uk.control.course import Course
-from climber_uk.control.guard import Guard, GuardOptions
+from climber_uk.control.guard import STANDS, Guard, GuardOptions
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import LONGEST_STEP, Tracker
 from climber_uk.control.twist_check import SUSPECTED, TwistCheck
@@ -217,9 +217,16 @@ class Follower:
         if self._fault is None:
             if self.mode in (Mode.FOLLOWING, Mode.APPROACHING) and time > 0:
                 reference, allowed = self.course.fastest
-                acted = tracker.mean_torques(stamp)
                 trouble = trouble or guard.watch(
-                    climber, last, motion, time, acted, tracker.disturbance, reference, allowed
+                    climber,
+                    last,
+                    motion,
+                    time,
+                    tracker.mean_torques(stamp),
+                    tracker.disturbance,
+                    reference,
+                    allowed,
+                    waits=tracker.progress.pace.rate < STANDS,
                 )
                 trouble = trouble or self.course.strayed(tracker.motion)
                 if trouble and trouble[0] is Mode.TOO_FAST:

@@ -18,6 +18,7 @@ from climber_uk.mechanics.parameter import check, parameter
 IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which it is known how much the seal rubs, and against what
 AT_LIMIT = 0.98  # of the largest torque
+STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
 EXCITED = 0.12  # of the largest torque: standard deviation that tells whether a wheel answers
@@ -130,14 +131,18 @@ class Guard:
         disturbance: Wrench,
         reference: Fastest,
         allowed: Fastest,
+        waits: bool,
     ) -> tuple[Mode, str] | None:
-        """What is wrong `time` [s] later, after mean `torques`; None if all is well."""
+        """What is wrong `time` [s] later, after mean `torques`; None if all is well.
+
+        `reference` is followed, no faster than `allowed`; it `waits` where torque is missing.
+        """
         self._add_to_wheels(climber, before, after, time, torques)
         too_fast = self._watch_rates(after, allowed)
         return (
             self._watch_wheels(climber, torques, SUSPECTED if too_fast else 1.0)
             or too_fast
-            or self._watch_limit(climber, after, time, torques, reference)
+            or self._watch_limit(climber, after, time, torques, reference, waits)
             or self._watch_disturbance(climber, disturbance)
         )
 
@@ -157,14 +162,21 @@ class Guard:
         )
 
     def _watch_limit(
-        self, climber: Climber, motion: Motion, time: float, torques: Torques, reference: Fastest
+        self,
+        climber: Climber,
+        motion: Motion,
+        time: float,
+        torques: Torques,
+        reference: Fastest,
+        waits: bool,
     ) -> tuple[Mode, str] | None:
         largest = max(abs(torques.right), abs(torques.left))
+        share = largest / climber.max_wheel_torque
         if reference.speed > MOVES:
             stands = abs(motion.speed) < STANDS * reference.speed
         else:  # it turns in place, or rests
             stands = abs(motion.yaw_rate) < STANDS * reference.yaw_rate
-        is_stalled = stands and largest >= AT_LIMIT * climber.max_wheel_torque
+        is_stalled = (stands and share >= STRONG) or (waits and share >= AT_LIMIT)
         self._stalled = self._stalled + time if is_stalled else 0.0
         if not 0 < self.options.stall_time < self._stalled:
             return None

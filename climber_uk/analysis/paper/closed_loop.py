@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from climber_uk.analysis.recorded_run import RecordedRun, read_run
+from climber_uk.analysis.recorded_run import read_run
+from climber_uk.analysis.run import RecordedRun
 
 CONFIG = "config/paper.yaml"
 TIMEOUT = 100.0  # [s]
