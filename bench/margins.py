@@ -26,9 +26,11 @@ from robustness import (
 from scipy.linalg import expm
 
 from climber_uk.analysis.closed_loop import Link
+from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
+from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
@@ -118,7 +120,7 @@ def simulated(scenario: Scenario, observer: Observer, learns: bool, link: Link) 
     """Whether the loop of the nodes stands."""
     controller = Controller(scenario.climber, scenario.gains, Law())
     tracker = Tracker(controller, observer, Timing(learn_delay=learns), Pacing())
-    follower = Follower(tracker, Safety())
+    follower = Follower(tracker, Safety(), ANYWHERE, UNGUARDED)
     run = run_of(scenario.trajectory, scenario.start, 15.0, follower, scenario.climber, link)
     return run.rms(7.5) < OFF and run.chatter() < CHATTER
 

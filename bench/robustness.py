@@ -15,9 +15,11 @@ from scipy.spatial import cKDTree
 
 from climber_uk.analysis.closed_loop import Controlling, Link, Run, as_commanded, simulate
 from climber_uk.analysis.identification_experiments import SCENARIOS
+from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import ConstraintSet, Exact, Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
+from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
@@ -51,7 +53,7 @@ def ours(
     """The controller as the node runs it."""
     controller = Controller(climber, gains, Law())
     timing = Timing(transport_delay=delay)
-    return Follower(tracker(controller, observer, timing, Pacing()), Safety())
+    return Follower(tracker(controller, observer, timing, Pacing()), Safety(), ANYWHERE, UNGUARDED)
 
 
 def without_observer(

@@ -85,6 +85,10 @@ class Approach:
         return rows
 
 
+ANYWHERE = Approach(max_start_distance=1e6, max_distance=1e6, max_heading=10.0)
+"""Follows at once, from wherever the climber is: the law by itself."""
+
+
 def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:
     """Times (n,) [s], and p, ṗ, p̈ at them, of a move of `size` at a rate of `fastest` at most."""
     duration = max(PEAK * size / fastest, SHORTEST)

@@ -56,6 +56,11 @@ class GuardOptions:
         check(self)
 
 
+UNGUARDED = GuardOptions(
+    speed_margin=0.0, yaw_rate_margin=0.0, stall_time=0.0, max_disturbance=0.0, response_time=0.0
+)
+
+
 class Fastest(NamedTuple):
     """Fastest motion of a reference, or of what follows it."""
 

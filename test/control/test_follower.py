@@ -9,7 +9,7 @@ from climber_uk.analysis.closed_loop import sampled
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
-from climber_uk.control.guard import GuardOptions
+from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
@@ -33,7 +33,7 @@ class Loop:
         controller = Controller(Climber(), Guidance(), Law())
         tracker = Tracker(controller, observer or Observer(), Timing(), Pacing())
         # it is moved by no torque
-        guard = GuardOptions(max_disturbance=0.0, stall_time=0.0, response_time=0.0)
+        guard = replace(UNGUARDED, speed_margin=0.05, yaw_rate_margin=1.0)
         self.follower = Follower(tracker, Safety(**safety), guard=guard)
         self.now = SECOND
         self.answer = None
