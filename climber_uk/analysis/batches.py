@@ -17,7 +17,7 @@ from climber_uk.analysis.layout import Layout
 from climber_uk.mechanics import SECOND, Array
 
 LATEST = 2**63 - 1  # [ns]
-CHUNK = 4096  # messages of a topic that are decoded at a time
+CHUNK, CHUNK_SIZE = 4096, 2**24  # messages, and bytes, of a topic that are decoded at a time
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ class Batch:
 def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
     """Yield topic and batch; the messages of a topic are nearly in the order of their log times."""
     waiting: dict[Any, list[tuple[int, bytes]]] = defaultdict(list)
+    sizes: dict[Any, int] = defaultdict(int)
     connections: dict[Any, Any] = {}
 
     def decoded(key: tuple[str, str]) -> Iterator[tuple[str, Batch]]:
@@ -66,8 +67,9 @@ def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch
         store = bag.store(connections[key])
         assert store is not None
         batches, spoilt = decode(waiting.pop(key), type_name, store)
+        sizes[key] = 0
         if spoilt:
-            bag.lose(f"{topic}: a message cannot be read ({spoilt})")
+            bag.lose_message(topic, spoilt)
         for batch in batches:
             yield topic, batch
 
@@ -75,7 +77,8 @@ def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch
         key = connection.topic, connection.msgtype
         connections[key] = connection
         waiting[key].append((log_time, data))
-        if len(waiting[key]) == CHUNK:
+        sizes[key] += len(data)
+        if len(waiting[key]) == CHUNK or sizes[key] > CHUNK_SIZE:
             yield from decoded(key)
     for key in list(waiting):
         yield from decoded(key)
@@ -101,7 +104,7 @@ def decode(
                 numbers = rows.view(layout.numbers)[:, 0]
                 same = layout.fits(rows)
                 batches.append(Batch(times[same], layout.strings, layout.lengths, numbers[same]))
-            except (ValueError, IndexError, UnicodeDecodeError) as error:
+            except (ValueError, LookupError, TypeError, OverflowError, RecursionError) as error:
                 spoilt = str(error)
                 same = np.arange(len(rows)) == 0
             times, rows = times[~same], rows[~same]
