@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from climber_uk.analysis.bag_files import open_file, other_files, storage_files
-from climber_uk.analysis.connection import Connection, Logged, StorageFile
+from climber_uk.analysis.connection import Connection, Logged, StorageFile, one_line
 from climber_uk.analysis.storage import TYPESTORE
 from climber_uk.analysis.unpacking import (
     LARGEST_DEFINITION,
@@ -78,7 +78,7 @@ class Bag:
             try:
                 message = store.deserialize_cdr(data, connection.msgtype)
             except Exception as error:  # there is no telling what damaged bytes do to it
-                self.lose_message(connection.topic, _line(error))
+                self.lose_message(connection.topic, _said(error))
                 continue
             yield connection, log_time, publish_time, message
 
@@ -158,10 +158,10 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
             try:
                 files.append(stack.enter_context(closing(open_file(file, own, lose))))
             except (ValueError, OSError) as error:
-                tell_loss(failures, f"{file.name}: {_line(error)}")
+                tell_loss(failures, f"{file.name}: {_said(error)}")
         if not files:
             why = "; ".join(failures) or "neither metadata.yaml nor an .mcap or .db3 file in it"
-            raise ValueError(f"{path} is no readable bag: {why}{other_files(path)}")
+            raise ValueError(f"{path} is no readable bag: {why}{one_line(other_files(path))}")
         for failure in failures:
             lose(f"{failure}: not read")
         yield Bag(path, sorted(files, key=attrgetter("start")), losses)
@@ -169,6 +169,7 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
 
 def tell_loss(losses: list[str], what: str) -> None:
     """Add a loss, unless it was told, or too many were."""
+    what = one_line(what)
     if what in losses or len(losses) > MOST_LOSSES:
         return
     losses.append(what if len(losses) < MOST_LOSSES else "and more, which are not told")
@@ -189,5 +190,5 @@ def read_messages(
             yield connection.topic, log_time, message
 
 
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+def _said(error: Exception) -> str:
+    return str(error) or type(error).__name__

@@ -6,7 +6,7 @@ from typing import Protocol
 
 CDR = "cdr"
 MOST_TOPICS = 65535  # of a file, as many as MCAP can have
-LONGEST_NAME = 1000  # of a topic or a type
+LONGEST_NAME, LONGEST_LINE = 500, 1000  # characters of a topic or a type, and of what is told
 
 
 @dataclass(frozen=True)
@@ -53,5 +53,14 @@ def listed(names: Sequence[str]) -> str:
 
 
 def is_name(name: object) -> bool:
-    """Whether a topic or a type may be called so."""
-    return isinstance(name, str) and len(name) <= LONGEST_NAME
+    """Whether a topic or a type may be called so; no terminal obeys what may."""
+    return isinstance(name, str) and len(name) <= LONGEST_NAME and name.isprintable()
+
+
+def one_line(text: str) -> str:
+    r"""One line to print, of what a file tells: what a terminal could obey is written as `\x1b`."""
+    shown = "".join(
+        character if character.isprintable() else character.encode("unicode_escape").decode()
+        for character in " ".join(text[:LONGEST_LINE].split())
+    )
+    return shown + "…" * (len(text) > LONGEST_LINE)

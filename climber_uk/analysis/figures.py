@@ -1,5 +1,6 @@
 """Runs in pictures, one over the other."""
 
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from io import BytesIO
@@ -33,13 +34,15 @@ STYLE = {
     "axes.spines.right": False,
     "lines.linewidth": 1.0,
     "legend.frameon": False,
+    "text.parse_math": False,  # names of bags are no formulas
 }
 Runs = Sequence[tuple[str, RecordedRun]]
 
 
 def draw(runs: Runs) -> dict[str, bytes]:
     """Figures of some named runs as PNG, by name; without those for which nothing is known."""
-    with plt.rc_context(STYLE):
+    with plt.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=UserWarning)  # letters without a glyph, no room
         return {name: _png(figure) for name, figure in _figures(runs)}
 
 

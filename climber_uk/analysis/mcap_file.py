@@ -19,7 +19,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
-from climber_uk.analysis.connection import CDR, Connection, Logged, Lose, tell_encodings
+from climber_uk.analysis.connection import CDR, Connection, Logged, Lose, is_name, tell_encodings
 from climber_uk.analysis.mcap_records import (
     HEAD,
     MESSAGE_HEAD,
@@ -169,10 +169,13 @@ class McapFile:
     def _connections(self) -> Iterator[Connection]:
         others: dict[str, list[str]] = defaultdict(list)
         for channel in self._contents.channels.values():
+            schema = self._contents.schemas.get(channel.schema_id, Schema(0, b"", "", ""))
+            if not (is_name(channel.topic) and is_name(schema.name)):
+                self.lose(f"a topic that cannot be called so is left out: {channel.topic!r:.60}")
+                continue
             if channel.message_encoding != CDR:
                 others[channel.message_encoding].append(channel.topic)
                 continue
-            schema = self._contents.schemas.get(channel.schema_id, Schema(0, b"", "", ""))
             told = schema.data.decode("utf-8", "replace") if schema.encoding == "ros2msg" else ""
             count = self._contents.counts[channel.id]
             yield Connection(channel.id, channel.topic, schema.name, count, told)

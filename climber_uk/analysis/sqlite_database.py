@@ -39,8 +39,9 @@ def open_database(path: Path) -> sqlite3.Connection:
         definitions = database.execute(
             f"SELECT sql FROM sqlite_master WHERE typeof(sql) = 'text' LIMIT {MOST_DEFINITIONS}"
         ).fetchall()
-        if not all(PLAIN.match(sql) for (sql,) in definitions):
-            raise sqlite3.DatabaseError("it has virtual tables")
+        for (sql,) in definitions:
+            if not PLAIN.match(sql):
+                raise sqlite3.DatabaseError(f"it defines more than tables: {sql:.40}")
     except BaseException:
         database.close()
         raise

@@ -136,7 +136,7 @@ class SqliteFile:
             f"SELECT {columns} FROM topics NOT INDEXED LIMIT {MOST_TOPICS}"
         ):
             if type(number) is not int or not (is_name(topic) and is_name(type_name)):
-                self.lose("a row of topics is none: left out")
+                self.lose(f"a topic that cannot be called so is left out: {topic!r:.60}")
             elif encoding != CDR:
                 others[str(encoding)].append(topic)
             else:
