@@ -14,22 +14,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from climber_uk.analysis.bag_files import open_file, other_files, storage_files
 from climber_uk.analysis.connection import Connection, Logged, StorageFile, one_line
-from climber_uk.analysis.storage import TYPESTORE
-from climber_uk.analysis.unpacking import (
-    LARGEST_DEFINITION,
-    LARGEST_MESSAGE,
-    ZSTD_MAGIC,
-    Allowance,
-    unpack,
-)
+from climber_uk.analysis.definitions import LONGEST, defined, known
+from climber_uk.analysis.unpacking import LARGEST_MESSAGE, ZSTD_MAGIC, Allowance, unpack
 
 MOST_LOSSES = 20  # that are told
-MOST_DEFINED = 4 * LARGEST_DEFINITION  # [bytes] of definitions that are read, all together
+MOST_DEFINITIONS = 4  # of the longest that are read
 
 
 @dataclass
@@ -103,21 +96,16 @@ class Bag:
 
     def _read_definition(self, connection: Connection) -> Typestore | None:
         name, definition = connection.msgtype, connection.definition
-        known = TYPESTORE if name in TYPESTORE.fielddefs else None
         if not definition:
-            return known
+            return known(name)
         self._defined += len(definition)
-        if len(definition) > LARGEST_DEFINITION or self._defined > MOST_DEFINED:
-            self.lose(f"{connection.topic}: definition of {name} is too long")
-            return known
         try:
-            store = get_typestore(Stores.EMPTY)
-            store.register(get_types_from_msg(definition, name))
-            store.get_msgdef(name)
-            return store
-        except Exception:  # as above
-            self.lose(f"{connection.topic}: definition of {name} cannot be read")
-            return known
+            if max(len(definition), self._defined / MOST_DEFINITIONS) > LONGEST:
+                raise ValueError("too long")
+            return defined(name, definition)
+        except ValueError as error:
+            self.lose(f"{connection.topic}: definition of {name} is not used: {error}")
+            return known(name)
 
     def _of(self, file: StorageFile, topics: Collection[str]) -> Iterator[Logged]:
         wanted = [c for c in file.connections if c.topic in topics and self.store(c)]

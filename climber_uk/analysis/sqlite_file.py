@@ -23,8 +23,9 @@ from climber_uk.analysis.connection import (
     is_name,
     tell_encodings,
 )
+from climber_uk.analysis.definitions import LONGEST
 from climber_uk.analysis.sqlite_database import has_columns, open_database, recovered, size_told
-from climber_uk.analysis.unpacking import LARGEST_DEFINITION, LARGEST_MESSAGE
+from climber_uk.analysis.unpacking import LARGEST_MESSAGE
 
 TABLES = {
     "topics": ("id", "name", "type", "serialization_format"),
@@ -151,7 +152,7 @@ class SqliteFile:
         told = self._selected(
             "SELECT topic_type, encoded_message_definition FROM message_definitions NOT INDEXED"
             " WHERE encoding = 'ros2msg' AND typeof(encoded_message_definition) = 'text'"
-            f" AND length(encoded_message_definition) <= {LARGEST_DEFINITION} LIMIT {MOST_TOPICS}"
+            f" AND length(encoded_message_definition) <= {LONGEST} LIMIT {MOST_TOPICS}"
         )
         return dict(told)
 

@@ -5,7 +5,6 @@ import zstandard
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # with which no serialised message begins
 LARGEST_MESSAGE = 2**24  # [bytes] of a message that is read
-LARGEST_DEFINITION = 2**16  # [bytes] of a message's type
 LARGEST_CHUNK = 2**28  # [bytes] of messages that are unpacked together
 LEAST, RATIO = 2**26, 32  # a file may unpack to 64 MiB and 32 times its size
 WINDOW = 2**27  # [bytes] that unpacking zstd may keep, as the command zstd has it
