@@ -1,6 +1,7 @@
 """Which files a bag consists of, and what kind they are, by how they begin."""
 
-from collections.abc import Iterator
+import re
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
@@ -16,6 +17,10 @@ from climber_uk.analysis.unpacking import PIECE, ZSTD_MAGIC, Allowance, zstandar
 
 METADATA = "metadata.yaml"
 LARGEST_METADATA = 2**24  # [bytes]
+LIST = re.compile(
+    r"^[ \t]*relative_file_paths:[ \t]*(\[(?P<row>[^\[\]]*)\]|(?P<lines>(\r?\n[ \t]*-[^\n]*)+))",
+    re.MULTILINE,
+)
 MOST_FILES = 10_000  # of a directory that are looked at
 MCAP, SQLITE, ZSTD = "MCAP", "SQLite", "zstd"
 MAGICS = {MCAP0_MAGIC: MCAP, SQLITE_MAGIC: SQLITE, ZSTD_MAGIC: ZSTD}
@@ -50,11 +55,11 @@ def storage_files(bag: Path, lose: Lose) -> list[Path]:
         return [bag]
     present = _present(bag)
     try:
-        names = list(dict.fromkeys(Path(name).name for name in _named(bag / METADATA)))
-    except (OSError, ValueError, yaml.YAMLError):
+        names = list(dict.fromkeys(Path(name).name or name for name in _named(bag / METADATA)))
+    except (OSError, ValueError):
         lose(f"{METADATA}: missing or damaged, not needed")
         return [bag / name for name in present]
-    found = [name for name in names if (bag / name).exists()]
+    found = [name for name in names if name.strip(".") and (bag / name).exists()]
     missing = [name for name in names if name not in found]
     others = [name for name in present if name not in found]
     if found:
@@ -141,25 +146,25 @@ def _begins(file: Path) -> str | None:
     return next((kind for magic, kind in MAGICS.items() if start.startswith(magic)), None)
 
 
-def _named(metadata: Path) -> Iterator[str]:
+def _named(metadata: Path) -> list[str]:
     """Names of the files that a metadata.yaml lists; raises `ValueError` if it has no list.
 
-    It is never more than read through: nothing is built of it that could be nested or refer to
-    itself.
+    Nothing but the list is looked at: what YAML can do else, no bag needs.
     """
     if not metadata.is_file() or metadata.stat().st_size > LARGEST_METADATA:
         raise ValueError("missing, or too large")
-    loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
-    events = iter(yaml.parse(metadata.read_bytes(), loader))
-    for event in events:
-        if isinstance(event, yaml.ScalarEvent) and event.value == "relative_file_paths":
-            break
-    if not isinstance(next(events, None), yaml.SequenceStartEvent):
+    if (listed := LIST.search(metadata.read_text(encoding="utf-8"))) is None:
         raise ValueError("it has no list of files")
-    for event in events:
-        if not isinstance(event, yaml.ScalarEvent):
-            break
-        yield event.value
+    row, lines = listed["row"], listed["lines"] or ""
+    items = row.split(",") if row is not None else re.split(r"\n[ \t]*-", lines)
+    return [_unquoted(item.strip()) for item in items if item.strip()]
+
+
+def _unquoted(name: str) -> str:
+    if name.startswith('"'):  # escapes
+        with suppress(yaml.YAMLError):
+            return str(yaml.safe_load(name))
+    return name.strip("'\"")
 
 
 def _unpacked(packed: Path, scratch: Path, lose: Lose) -> Path:

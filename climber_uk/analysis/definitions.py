@@ -37,6 +37,8 @@ def _count(types: Any, name: str, within: tuple[str, ...]) -> int:
     """How many fields a type has; raises `ValueError` of too many, and of a type in itself."""
     if name in within:
         raise ValueError(f"{name} contains itself")
+    if name not in types:
+        raise ValueError(f"it does not tell {name}")
     count = 0
     for _, (kind, what) in types[name][1]:
         times = 1

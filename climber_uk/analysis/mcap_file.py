@@ -81,15 +81,24 @@ class Contents:
         return counted == indexed and indexed <= self.channels.keys()
 
     def rescue(self, damaged: bytes) -> None:
-        """Keep channels, and names of schemas, that can be told from damaged bytes."""
+        """Keep channels, and names of schemas, that can be told from damaged bytes.
+
+        Of two with one number nobody knows which is right.
+        """
+        schemas: dict[int, list[str]] = defaultdict(list)
         for number, size, name in SCHEMA.findall(damaged):
             if len(name) == _int(size):
-                schema = Schema(_int(number), b"", "", name.decode())
-                self.schemas.setdefault(schema.id, schema)
+                schemas[_int(number)].append(name.decode())
+        for number, names in schemas.items():
+            if len(set(names)) == 1:
+                self.schemas.setdefault(number, Schema(number, b"", "", names[0]))
+        channels: dict[int, list[tuple[str, int]]] = defaultdict(list)
         for number, schema, size, topic in CHANNEL.findall(damaged):
             if len(topic) == _int(size):
-                channel = Channel(_int(number), topic.decode(), CDR, {}, _int(schema))
-                self.channels.setdefault(channel.id, channel)
+                channels[_int(number)].append((topic.decode(), _int(schema)))
+        for number, told in channels.items():
+            if len(set(told)) == 1:
+                self.channels.setdefault(number, Channel(number, told[0][0], CDR, {}, told[0][1]))
 
 
 class McapFile:
@@ -229,6 +238,7 @@ class _Search:
         while not closed and place < file.size:
             record = file.record(place) if place >= 0 else None
             if record is None:
+                self._end_row()
                 is_chunk = self._chunks > 0 or file.read(max(0, place), place + 1) == CHUNK
                 found = file.search(place + 1, chunks_only=is_chunk)
                 damages += 1
@@ -248,8 +258,10 @@ class _Search:
             mcap.lose("cut off, read up to the last whole message")
         elif not closed:
             mcap.lose(f"damaged at byte {max(0, place)}, not read from there on")
-        for data in self._damaged:
-            self.contents.rescue(data)
+        self.contents.rescue(b"".join(self._damaged))
+        nameless = self.contents.counts.keys() - self.contents.channels.keys()
+        if count := sum(self.contents.counts[channel] for channel in nameless):
+            mcap.lose(f"{count} messages are left out: their topic is not told")
 
     def _take(self, record: Record) -> None:
         if record.opcode == Opcode.MESSAGE:

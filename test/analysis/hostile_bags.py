@@ -83,7 +83,9 @@ def mcap(bag, messages=None, extra=None, schemas=None, encodings=None, **how):
             if topic not in channels:
                 if type_name not in made:
                     text = (schemas or {}).get(type_name)
-                    text = STORE.generate_msgdef(type_name)[0] if text is None else text
+                    text = (
+                        STORE.generate_msgdef(type_name, ros_version=2)[0] if text is None else text
+                    )
                     made[type_name] = writer.register_schema(type_name, "ros2msg", text.encode())
                 encoding = (encodings or {}).get(topic, "cdr")
                 channels[topic] = writer.register_channel(topic, encoding, made[type_name])
@@ -110,7 +112,7 @@ def text(value):
 
 
 def schema_and_channel(type_name=ODOMETRY, topic="/odom"):
-    definition = STORE.generate_msgdef(type_name)[0].encode()
+    definition = STORE.generate_msgdef(type_name, ros_version=2)[0].encode()
     schema = struct.pack("<H", 1) + text(type_name.encode()) + text(b"ros2msg") + text(definition)
     channel = struct.pack("<HH", 1, 1) + text(topic.encode()) + text(b"cdr") + text(b"")
     return [(3, schema), (4, channel)]
