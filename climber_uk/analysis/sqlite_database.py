@@ -18,7 +18,7 @@ from urllib.parse import quote_from_bytes
 from climber_uk.analysis.unpacking import LARGEST_MESSAGE
 
 MAGIC = b"SQLite format 3\0"
-PATIENCE = 10.0  # [s] for SQLite to read the definitions of the tables
+PATIENCE = 10.0  # [s]
 INSTRUCTIONS = 100_000  # of SQLite, after which it is asked how long it has been at it
 LARGEST_SQL = 10**6  # [characters] of a definition
 MOST_DEFINITIONS = 10_000
@@ -28,13 +28,26 @@ FUNCTIONS = "typeof", "length"
 TABLES = "sqlite_master", "topics", "messages", "message_definitions"
 
 
-def open_database(path: Path) -> sqlite3.Connection:
+class Patience:
+    """How long SQLite may still go on without a row: a tree of pages may have no end."""
+
+    def __init__(self) -> None:
+        self.renew()
+
+    def renew(self) -> None:
+        """Begin anew."""
+        self.until = monotonic() + PATIENCE
+
+    def is_over(self) -> bool:
+        """Whether SQLite has to give up."""
+        return monotonic() > self.until
+
+
+def open_database(path: Path, patience: Patience) -> sqlite3.Connection:
     """Open a database for nothing but to select from its tables; raises `sqlite3.Error`."""
-    database = _connect(path, "mode=ro&immutable=1")
+    database = _connect(path, "mode=ro&immutable=1", patience)
     database.text_factory = lambda text: text.decode("utf-8", "replace")
     database.set_authorizer(_authorize)
-    deadline = monotonic() + PATIENCE
-    database.set_progress_handler(lambda: monotonic() > deadline, INSTRUCTIONS)
     try:
         definitions = database.execute(
             f"SELECT sql FROM sqlite_master WHERE typeof(sql) = 'text' LIMIT {MOST_DEFINITIONS}"
@@ -45,7 +58,6 @@ def open_database(path: Path) -> sqlite3.Connection:
     except BaseException:
         database.close()
         raise
-    database.set_progress_handler(None, 0)
     return database
 
 
@@ -72,9 +84,7 @@ def recovered(path: Path, scratch: Path, lose: Callable[[str], None]) -> Path:
         shutil.copyfile(file, target)
         with target.open("ab") as journal:  # its end may name another file, which SQLite removes
             journal.write(bytes(NOTHING))
-    with suppress(sqlite3.Error), closing(_connect(copy, "mode=rw")) as database:
-        deadline = monotonic() + PATIENCE
-        database.set_progress_handler(lambda: monotonic() > deadline, INSTRUCTIONS)
+    with suppress(sqlite3.Error), closing(_connect(copy, "mode=rw", Patience())) as database:
         database.execute("PRAGMA journal_mode = DELETE").fetchall()
         database.execute("SELECT count(*) FROM sqlite_master").fetchall()
     lose(f"its recorder was killed, read together with {left[0].name}")
@@ -93,12 +103,13 @@ def size_told(path: Path) -> int:
     return (65536 if page_size == 1 else page_size) * int.from_bytes(header[28:32])
 
 
-def _connect(path: Path, how: str) -> sqlite3.Connection:
+def _connect(path: Path, how: str, patience: Patience) -> sqlite3.Connection:
     uri = f"file:{quote_from_bytes(bytes(path.absolute()))}?{how}"
     database = sqlite3.connect(uri, uri=True, isolation_level=None)
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE + LARGEST_SQL)
     database.setlimit(sqlite3.SQLITE_LIMIT_SQL_LENGTH, LARGEST_SQL)
     database.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+    database.set_progress_handler(patience.is_over, INSTRUCTIONS)
     for pragma in (
         "trusted_schema = OFF",
         "cell_size_check = ON",

@@ -8,7 +8,6 @@ import sqlite3
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,13 @@ from climber_uk.analysis.connection import (
     tell_encodings,
 )
 from climber_uk.analysis.definitions import LONGEST
-from climber_uk.analysis.sqlite_database import has_columns, open_database, recovered, size_told
+from climber_uk.analysis.sqlite_database import (
+    Patience,
+    has_columns,
+    open_database,
+    recovered,
+    size_told,
+)
 from climber_uk.analysis.unpacking import LARGEST_MESSAGE
 
 TABLES = {
@@ -47,6 +52,8 @@ class SqliteFile:
 
     def __init__(self, path: Path, scratch: Path, lose: Lose) -> None:
         self.name, self._lose = path.name, lose
+        self._patience = Patience()
+        self._endless = False  # whether to look for many rows at once had no end
         readable = recovered(path, scratch, self.lose)
         self.size = path.stat().st_size
         if readable == path and self.size < size_told(path):
@@ -54,7 +61,7 @@ class SqliteFile:
         elif readable != path:
             self.size += sum(file.stat().st_size for file in scratch.glob(f"{path.name}-*"))
         try:
-            self._database = open_database(readable)
+            self._database = open_database(readable, self._patience)
         except sqlite3.Error as error:
             raise ValueError(f"no readable database: {error}") from None
         try:
@@ -77,9 +84,9 @@ class SqliteFile:
     def messages(self, connections: Collection[Connection]) -> Iterator[Logged]:
         """Yield what is sound of some topics, in the order of the log times."""
         wanted = {connection.id: connection for connection in connections}
-        rows = self._rows[np.isin(self._rows[:, 2], list(wanted))]
-        rows = rows[np.argsort(rows[:, 1], kind="stable")]
-        for block in _blocks(rows):
+        chosen = np.flatnonzero(np.isin(self._rows[:, 2], list(wanted)))
+        chosen = chosen[np.argsort(self._rows[chosen, 1], kind="stable")]
+        for block in self._blocks(chosen):
             data = self._data(block, wanted)
             for number, log_time, topic, _ in block.tolist():
                 if number in data:
@@ -108,6 +115,7 @@ class SqliteFile:
                 ):
                     if number <= last:
                         raise sqlite3.DatabaseError("rows are not in order")
+                    self._patience.renew()
                     last, step = number, 0
                     is_fit = type(log_time) is type(topic) is int and kind == "blob"
                     size += length if is_fit else 0
@@ -158,6 +166,7 @@ class SqliteFile:
 
     def _selected(self, query: str, *values: int) -> Iterator[Any]:
         """Rows up to the first that is damaged."""
+        self._patience.renew()
         try:
             yield from self._database.execute(query, values)
         except sqlite3.Error as error:
@@ -167,31 +176,31 @@ class SqliteFile:
         """Messages of some rows (n, 4), by their numbers."""
         numbers = block[:, 0]
         first, last = int(numbers[0]), int(numbers[-1])
-        if (np.diff(numbers) > 0).all() and last - first < WIDEST * len(numbers):
+        found: dict[int, bytes] = {}
+        near = (np.diff(numbers) > 0).all() and last - first < WIDEST * len(numbers)
+        if near and not self._endless:
             topics = ", ".join(map(str, wanted))
-            with suppress(sqlite3.Error):
-                return dict(
-                    self._database.execute(
-                        "SELECT _rowid_, data FROM messages NOT INDEXED"
-                        f" WHERE _rowid_ BETWEEN ? AND ? AND topic_id IN ({topics})",
-                        [first, last],
-                    )
-                )
-        found = {}
-        query = "SELECT data FROM messages NOT INDEXED WHERE _rowid_ = ?"
+            query = (
+                "SELECT _rowid_, data FROM messages NOT INDEXED WHERE _rowid_ BETWEEN ? AND ?"
+                f" AND topic_id IN ({topics}) AND length(data) <= {LARGEST_MESSAGE} LIMIT {BLOCK}"
+            )
+            self._patience.renew()
+            try:
+                found = dict(self._database.execute(query, [first, last]))
+            except sqlite3.Error:  # they are asked for one by one then
+                self._endless = self._patience.is_over()
         for number in numbers.tolist():
-            for (data,) in self._selected(query, number):
-                found[number] = data
+            if number not in found:
+                query = "SELECT data FROM messages NOT INDEXED WHERE _rowid_ = ?"
+                for (data,) in self._selected(query, number):
+                    found[number] = data
         return found
 
-
-def _blocks(rows: Any) -> Iterator[Any]:
-    """Some of the rows (n, 4) at a time, as many as fit in memory."""
-    begin = size = 0
-    for i, length in enumerate(rows[:, 3].tolist()):
-        if i - begin == BLOCK or (size + length > BLOCK_SIZE and i > begin):
-            yield rows[begin:i]
-            begin, size = i, 0
-        size += length
-    if begin < len(rows):
-        yield rows[begin:]
+    def _blocks(self, chosen: Any) -> Iterator[Any]:
+        """Rows (n, 4) with some indices, as many at a time as fit in memory."""
+        while len(chosen):
+            rows = self._rows[chosen[:BLOCK]]
+            fitting = int(np.searchsorted(np.cumsum(rows[:, 3]), BLOCK_SIZE, "right"))
+            count = max(1, fitting)
+            yield rows[:count]
+            chosen = chosen[count:]

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import watched
-from hostile_bags import KINDS, damage, victims
+from hostile_bags import HEAVY, KINDS, damage, victims
 
 BAGS = int(os.environ.get("HOSTILE_BAGS", "2000"))
 # the tools in turn; to draw takes most of the time
@@ -115,8 +115,9 @@ def test_none_of_many_does(watch):
     ends, times, memory = Counter(), Counter(), Counter()
     failures = []
     for seed in range(BAGS):
-        name = list(KINDS)[seed % len(KINDS)]
-        tool = TURNS[seed // len(KINDS) % len(TURNS)]
+        kinds = list(KINDS) if seed % 8 == 0 else [name for name in KINDS if name not in HEAVY]
+        name = kinds[seed * 7 // 8 % len(kinds)]
+        tool = TURNS[seed // 5 % len(TURNS)]
         try:
             ended = watch.run(name, seed, spoil=seed % 3 > 0, tool=tool)
         except AssertionError as failure:
@@ -124,6 +125,8 @@ def test_none_of_many_does(watch):
             print(failures[-1], flush=True)
             continue
         ends[ended["status"]] += 1
+        if seed % 100 == 99:
+            print(f"{seed + 1} bags, {len(failures)} failures", flush=True)
         times[name] = max(times[name], ended["seconds"])
         memory[name] = max(memory[name], ended["memory"] >> 20)
     print(f"\n{BAGS} bags: status {dict(ends)}")
