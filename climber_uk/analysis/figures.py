@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.analysis import topics
+from climber_uk.analysis.connection import one_line
 from climber_uk.analysis.events import ERROR, OK
 from climber_uk.analysis.recorded_run import RecordedRun
 from climber_uk.control.safety import Mode
@@ -43,7 +44,8 @@ def draw(runs: Runs) -> dict[str, bytes]:
     """Figures of some named runs as PNG, by name; without those for which nothing is known."""
     with plt.rc_context(STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", category=UserWarning)  # letters without a glyph, no room
-        return {name: _png(figure) for name, figure in _figures(runs)}
+        shown = [(one_line(name), run) for name, run in runs]
+        return {name: _png(figure) for name, figure in _figures(shown)}
 
 
 def _figures(runs: Runs) -> Iterable[tuple[str, Figure]]:

@@ -5,6 +5,7 @@ what comes behind it may be a record, or the end.
 """
 
 import re
+import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -17,7 +18,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
-from climber_uk.analysis.unpacking import PIECE
+from climber_uk.analysis.unpacking import LARGEST_CHUNK, PIECE, Allowance, unpack
 
 HEAD = Struct("<BQ")  # of a record: opcode and length
 CHUNK_HEAD = Struct("<QQQII")  # log times of first and last, size, CRC, length of the compression
@@ -50,6 +51,14 @@ class ChunkHead(NamedTuple):
     crc: int
     compression: str
     packed: tuple[int, int]  # from where to where
+
+
+class DamagedError(ValueError):
+    """Wrong bytes, of which some may be told all the same."""
+
+    def __init__(self, what: str, data: bytes) -> None:
+        super().__init__(what)
+        self.data = data
 
 
 class RecordFile:
@@ -98,6 +107,23 @@ class RecordFile:
         if int.from_bytes(head[behind - 8 : behind], "little") != packed[1] - packed[0]:
             return None
         return ChunkHead(start, end, size, crc, compression.decode("ascii", "replace"), packed)
+
+    def unpacked(self, place: Record, allowance: Allowance) -> bytes:
+        """Messages of a chunk, or of a row of them; raises `ValueError` if they cannot be read."""
+        if place.opcode == Opcode.MESSAGE:
+            return self.read(place.start, place.end)
+        record = self.record(place.start - HEAD.size)
+        head = self.chunk_head(record) if record else None
+        if head is None:
+            raise ValueError("it is not where it should be")
+        if head.size > LARGEST_CHUNK or head.packed[1] - head.packed[0] > LARGEST_CHUNK:
+            raise ValueError(f"it is larger than {LARGEST_CHUNK >> 20} MiB")
+        if head.compression:
+            allowance.take(head.size)
+        data = unpack(self.read(*head.packed), head.compression, head.size)
+        if len(data) != head.size or (head.crc and zlib.crc32(data) != head.crc):
+            raise DamagedError("its checksum is wrong", data)
+        return data
 
     def search(self, place: int, chunks_only: bool) -> int | None:
         """Return the next place from which on there is a sound chunk, or some sound messages."""

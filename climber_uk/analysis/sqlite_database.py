@@ -74,7 +74,7 @@ def recovered(path: Path, scratch: Path, lose: Callable[[str], None]) -> Path:
     left = [file for file in beside if file.is_file() and file.stat().st_size > NOTHING]
     if not left:
         return path
-    if sum(file.stat().st_size for file in (path, *left)) > shutil.disk_usage(scratch).free:
+    if 2 * sum(file.stat().st_size for file in (path, *left)) > shutil.disk_usage(scratch).free:
         lose(f"{left[0].name} is not read: no room for a copy in {scratch}")
         return path
     copy = scratch / path.name
