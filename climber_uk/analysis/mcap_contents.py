@@ -24,12 +24,14 @@ from climber_uk.analysis.mcap_records import (
     parsed,
     records_in,
 )
-from climber_uk.analysis.unpacking import LARGEST_CHUNK, LARGEST_MESSAGE, PIECE, Allowance
+from climber_uk.analysis.unpacking import LARGEST_MESSAGE, PIECE, Allowance
 
 FOOTER = HEAD.pack(Opcode.FOOTER, 20)  # how the last record begins
 ENDING = len(FOOTER) + 20 + len(MCAP0_MAGIC)
 CHUNK = bytes([Opcode.CHUNK])
 MOST_DAMAGES = 1000  # places after which the rest of a file is left alone
+MOST_PARTS = 10**6  # chunks, and rows of messages outside of chunks
+LARGEST_SUMMARY = 2**26  # [bytes]
 MOST_KEPT = 2**26  # [bytes] of what is damaged, in which topics are looked for
 NOTHING = 2**63 - 1, 0  # start and end [ns] of no messages
 # a channel and a schema of ROS 2, which are found even where the records around them are damaged
@@ -105,7 +107,7 @@ def from_summary(file: RecordFile) -> Contents | None:
         return None
     start, crc = _int(ending[9:17]), _int(ending[25:29])
     end = file.size - ENDING
-    if not (crc and 0 < start < end) or end - start > LARGEST_CHUNK:
+    if not (crc and 0 < start < end) or end - start > LARGEST_SUMMARY:
         return None
     summary = file.read(start, end)
     contents = Contents()
@@ -192,6 +194,9 @@ class _Search:
 
     def _look_into(self, place: Record) -> None:
         """Keep what a chunk, or a row of messages, tells."""
+        if len(self.contents.parts) == MOST_PARTS:
+            self._lose(f"more than {MOST_PARTS} chunks, of which the others are left out")
+            return
         counts: Counter[int] = Counter()
         first, last = NOTHING
         try:

@@ -125,8 +125,8 @@ def test_none_of_many_does(watch):
             print(failures[-1], flush=True)
             continue
         ends[ended["status"]] += 1
-        if seed % 100 == 99:
-            print(f"{seed + 1} bags, {len(failures)} failures", flush=True)
+        if seed % 50 == 49:
+            print(f"{seed + 1} bags, {len(failures)} failures, {dict(ends)}", flush=True)
         times[name] = max(times[name], ended["seconds"])
         memory[name] = max(memory[name], ended["memory"] >> 20)
     print(f"\n{BAGS} bags: status {dict(ends)}")
