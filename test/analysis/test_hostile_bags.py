@@ -35,7 +35,6 @@ class Watch:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONPATH": str(Path(watched.__file__).parent)},
         )
 
     def close(self):
