@@ -9,8 +9,8 @@ FORCE = "uk_torque_controller/constraint_force"
 MARGINS = "plant_simulator/margins", "uk_torque_controller/margins"  # the plant knows better
 DIAGNOSTICS, LOG = "/diagnostics", "/rosout"
 NAMES = (ODOMETRY, REFERENCE, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE, *MARGINS)
-MOST_CLIMBERS = 100  # that are told of, unless they were chosen
 KNOWN = {*NAMES, DIAGNOSTICS, LOG}
+MOST_CLIMBERS = 100  # that are told of, unless they were chosen
 
 
 @dataclass(frozen=True)
