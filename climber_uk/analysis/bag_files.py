@@ -1,5 +1,6 @@
 """Which files a bag consists of, and what kind they are, by how they begin."""
 
+import os
 import re
 from contextlib import suppress
 from itertools import islice
@@ -59,18 +60,19 @@ def storage_files(bag: Path, lose: Lose) -> list[Path]:
     except (OSError, ValueError):
         lose(f"{METADATA}: missing or damaged, not needed")
         return [bag / name for name in present]
-    found = [name for name in names if name.strip(".") and (bag / name).exists()]
+    here = os.listdir(bag)
+    found = [name for name in names if name in here]
     missing = [name for name in names if name not in found]
     others = [name for name in present if name not in found]
-    if found:
-        for name in missing:
-            lose(f"{name}: not there")
-        if others:
-            lose(f"{METADATA} does not name {listed(others)}: not read")
-        return [bag / name for name in found]
-    told = f"names {listed(missing)}, not there" if missing else "names no file"
-    lose(f"{METADATA} {told}: {listed(others)} read instead")
-    return [bag / name for name in others]
+    if (missing and others) or not found:
+        what = f"names {listed(missing)}, not there" if missing else "names no file"
+        lose(f"{METADATA} {what}: {listed(others)} read instead")
+        return [bag / name for name in found + others]
+    for name in missing:
+        lose(f"{name}: not there")
+    if others:
+        lose(f"{METADATA} does not name {listed(others)}: not read")
+    return [bag / name for name in found]
 
 
 def open_file(path: Path, scratch: Path, lose: Lose) -> StorageFile:
@@ -126,7 +128,9 @@ def other_files(bag: Path) -> str:
 def _present(bag: Path) -> list[str]:
     """Names of the storage files in a directory: by their names, else by how they begin."""
     entries = _entries(bag)
-    return [entry.name for entry in entries if _is_named(entry)] or [
+    named = [entry.name for entry in entries if _is_named(entry)]
+    unpacked = {f"{name}{packed}" for name in named for packed in SUFFIXES}
+    return [name for name in named if name not in unpacked] or [
         entry.name for entry in entries if entry.is_file() and _begins(entry)
     ]
 

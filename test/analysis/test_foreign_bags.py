@@ -175,6 +175,23 @@ def test_a_file_that_the_metadata_do_not_name_is_said_and_not_read(tmp_path):
     assert losses == "metadata.yaml does not name copy.mcap: not read"
 
 
+def test_a_part_of_a_bag_may_have_another_name(tmp_path):
+    bag = mcap(tmp_path / "bag", base()[:40])
+    (bag / "bag_0.mcap").rename(bag / "b.mcap")
+    mcap(bag, base()[40:])
+    (bag / "metadata.yaml").write_text(INNER + "[bag_0.mcap, a.mcap]")
+    read, losses = contents(bag)
+    assert is_part(read, in_order(base())) == 0
+    assert losses == "metadata.yaml names a.mcap, not there: b.mcap read instead"
+
+
+def test_a_file_that_is_there_packed_as_well_is_read_once(tmp_path):
+    bag = mcap(tmp_path / "bag")
+    packed = zstandard.compress((bag / "bag_0.mcap").read_bytes())
+    (bag / "bag_0.mcap.zstd").write_bytes(packed)
+    assert contents(bag) == (in_order(base()), "")
+
+
 @pytest.mark.parametrize("make", [mcap, sqlite])
 @pytest.mark.parametrize("name", ["bag_0", "bag_0.bin", "bag_0.mcap.zstd", "bag_0.db3.zst"])
 def test_a_storage_file_is_known_by_how_it_begins(tmp_path, make, name):
