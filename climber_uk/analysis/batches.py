@@ -18,6 +18,7 @@ from climber_uk.mechanics import SECOND, Array
 
 LATEST = 2**63 - 1  # [ns]
 CHUNK, CHUNK_SIZE = 4096, 2**24  # messages, and bytes, of a topic that are decoded at a time
+MOST_ALONE = 32  # messages in a row that are like no other, after which no others are looked for
 
 
 @dataclass(frozen=True)
@@ -97,15 +98,20 @@ def decode(
     for size, alike in by_size.items():
         times = np.array([min(log_time, LATEST) for log_time, _ in alike], np.int64)
         rows = np.frombuffer(b"".join(data for _, data in alike), np.uint8).reshape(-1, size)
+        alone = 0  # in a row, that have no others like them
         while len(rows):
             layout = Layout(rows[0].tobytes(), store)
+            same = np.arange(len(rows)) == 0
             try:
                 layout.walk(type_name)
                 numbers = rows.view(layout.numbers)[:, 0]
-                same = layout.fits(rows)
+                if alone < MOST_ALONE:
+                    same = layout.fits(rows)
                 batches.append(Batch(times[same], layout.strings, layout.lengths, numbers[same]))
             except (ValueError, LookupError, TypeError, OverflowError, RecursionError) as error:
                 spoilt = str(error)
-                same = np.arange(len(rows)) == 0
-            times, rows = times[~same], rows[~same]
+            is_one = not same[1:].any()
+            alone = alone + 1 if is_one else 0
+            others = slice(1, None) if is_one else ~same
+            times, rows = times[others], rows[others]
     return batches, spoilt
