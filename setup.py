@@ -23,7 +23,7 @@ setup(
         # rclpy and the messages, where no ROS installation brings them
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
-        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard"],
+        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard", "lz4"],
         # campaigns of many runs, and to have them run on a Dask cluster
         "campaign": ["pyarrow", "matplotlib", "tqdm"],
         "cluster": ["distributed"],

@@ -1,5 +1,6 @@
 """Runs in pictures, one over the other."""
 
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from io import BytesIO
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.analysis import topics
+from climber_uk.analysis.connection import one_line
 from climber_uk.analysis.events import ERROR, OK
 from climber_uk.analysis.run import RecordedRun
 from climber_uk.control.safety import Mode
@@ -33,14 +35,17 @@ STYLE = {
     "axes.spines.right": False,
     "lines.linewidth": 1.0,
     "legend.frameon": False,
+    "text.parse_math": False,  # names of bags are no formulas
 }
 Runs = Sequence[tuple[str, RecordedRun]]
 
 
 def draw(runs: Runs) -> dict[str, bytes]:
     """Figures of some named runs as PNG, by name; without those for which nothing is known."""
-    with plt.rc_context(STYLE):
-        return {name: _png(figure) for name, figure in _figures(runs)}
+    with plt.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=UserWarning)  # letters without a glyph, no room
+        shown = [(one_line(name), run) for name, run in runs]
+        return {name: _png(figure) for name, figure in _figures(shown)}
 
 
 def _figures(runs: Runs) -> Iterable[tuple[str, Figure]]:

@@ -145,7 +145,8 @@ def _write(
         "metrics.csv": to_csv(columns),
         "metrics.json": to_json(columns),
     }
-    written = {directory / name: text.encode() for name, text in texts.items()}
+    coded = {name: text.encode("utf-8", "backslashreplace") for name, text in texts.items()}
+    written = {directory / name: data for name, data in coded.items()}
     if pictures is not None:
         written |= {pictures / f"{name}.png": image for name, image in images.items()}
     for path, data in written.items():
