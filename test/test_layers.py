@@ -9,12 +9,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "climber_uk"
 BELOW = {
+    "system": set(),
     "mechanics": set(),
     "control": {"mechanics"},
     "simulation": {"mechanics"},
     "messages": {"mechanics"},
-    "analysis": {"mechanics", "control", "simulation", "messages"},
-    "nodes": {"mechanics", "control", "simulation", "messages", "analysis"},
+    "analysis": {"system", "mechanics", "control", "simulation", "messages"},
+    "nodes": {"system", "mechanics", "control", "simulation", "messages", "analysis"},
 }
 ROS_ALLOWED = {"nodes", "messages"}
 # what a node has no use for: importing it would make every start longer
