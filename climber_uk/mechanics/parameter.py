@@ -18,12 +18,13 @@ def parameter(
     at_least: float | None = None,
     at_most: float | None = None,
     choices: Sequence[str] | None = None,
+    plausible: tuple[float, float] | None = None,
     runtime: bool = False,
 ) -> Any:
     """Declare a dataclass field together with all that a user may ask about it.
 
-    `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; `runtime` marks
-    what a running node may change. Pass the dataclass's instance to `check` in `__post_init__`.
+    `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
+    range `plausible` is doubted, not refused; `runtime` marks what a running node may change. Pass the dataclass's instance to `check` in `__post_init__`.
     """
     return dataclasses.field(
         default=default,
@@ -34,6 +35,7 @@ def parameter(
             "at_least": at_least,
             "at_most": at_most,
             "choices": choices,
+            "plausible": plausible,
             "runtime": runtime,
         },
     )

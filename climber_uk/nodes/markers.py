@@ -41,8 +41,10 @@ GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
 class Options:
     """How large it is drawn."""
 
-    half_track: float = parameter(0.3, "m", "distance d of a wheel from the centre", above=0)
-    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0)
+    half_track: float = parameter(
+        0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
+    )
+    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0, plausible=(0.005, 0.5))
     torque_scale: float = parameter(0.3, "m/(N m)", "length of a torque's arrow", above=0)
     force_scale: float = parameter(0.005, "m/N", "length of a force's arrow", above=0)
     way_spacing: float = parameter(0.05, "m", "between two points of the way", above=0)
