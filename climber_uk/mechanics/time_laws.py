@@ -21,6 +21,9 @@ class TimeLaw(Protocol):
     def duration(self, shape: Shape) -> float:
         """Time after which the climber rests for good [s]; infinite if it never does."""
 
+    def horizon(self, shape: Shape) -> float:
+        """Time by which all has been seen that the law does [s]: at most two rounds or one way."""
+
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """s, ṡ, s̈, s⃛ at `time` (...) [s], in the units of the shape's path parameter."""
 
@@ -44,6 +47,10 @@ class ConstantRate:
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
         return math.inf
+
+    def horizon(self, shape: Shape) -> float:
+        """See `TimeLaw`."""
+        return shape.length / self.rate
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """See `TimeLaw`."""
@@ -72,6 +79,11 @@ class RestToRest:
         """See `TimeLaw`."""
         _, _, run_time = self._run(shape)
         return self.runs * (run_time + self.pause) - self.pause if self.runs else math.inf
+
+    def horizon(self, shape: Shape) -> float:
+        """See `TimeLaw`."""
+        rate, _, run_time = self._run(shape)
+        return min(run_time, 2 * shape.length / rate + self.ramp_time)
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """See `TimeLaw`."""
@@ -106,6 +118,10 @@ class Stopping:
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
         return self.start + self.ramp_time
+
+    def horizon(self, shape: Shape) -> float:
+        """See `TimeLaw`."""
+        return self.duration(shape)
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """See `TimeLaw`."""
