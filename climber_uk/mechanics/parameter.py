@@ -24,7 +24,8 @@ def parameter(
     """Declare a dataclass field together with all that a user may ask about it.
 
     `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
-    range `plausible` is doubted, not refused; `runtime` marks what a running node may change. Pass the dataclass's instance to `check` in `__post_init__`.
+    range `plausible` is doubted, not refused; `runtime` marks what a running node may change. Pass
+    the dataclass's instance to `check` in `__post_init__`.
     """
     return dataclasses.field(
         default=default,

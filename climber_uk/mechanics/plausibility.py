@@ -50,6 +50,6 @@ def doubt(field: "dataclasses.Field[Any]", value: Any) -> str:
     said = f"{field.name}={value:g} [{unit}] is hardly meant (usual: {low:g} to {high:g})"
     if not others:
         return said
-    usual = abs(field.default) or math.sqrt(low * high)
-    meant = min(others, key=lambda other: abs(math.log(abs(others[other]) / (usual or 1.0))))
+    default: float = field.default or high  # type: ignore[assignment]
+    meant = min(others, key=lambda other: abs(math.log(abs(others[other] / default))))
     return f"{said}; if it is in {meant}, write {others[meant]:g}"

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.subscription import Subscription
@@ -37,6 +38,8 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
     def start_life(self) -> None:
         """Offer the services of a managed node, and become active unless another is to say so."""
         LifecycleNodeMixin.__init__(self)
+        self._change_state = self._service_change_state.callback
+        self._service_change_state.callback = self.on_change_state
         self.create_service(SetBool, "~/enable", self.on_enable)
         if self.parameters.read(Life).autostart:
             self.trigger_configure()
@@ -54,6 +57,23 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
     def life(self) -> str:
         """State: unconfigured, inactive, active or finalized."""
         return str(self._state_machine.current_state[1])
+
+    def on_change_state(
+        self, request: ChangeState.Request, response: ChangeState.Response
+    ) -> ChangeState.Response:
+        """Change the state, if it has the transition that is asked for.
+
+        The mixin of rclpy would raise, and end the node, if it has not.
+        """
+        asked = request.transition
+        there = {label: number for number, label, *_ in self._state_machine.available_transitions}
+        if asked.label in there if asked.label else asked.id in there.values():
+            return self._change_state(request, response)
+        wanted = repr(asked.label) if asked.label else f"of id {asked.id}"
+        has = ", ".join(f"{label} ({number})" for label, number in there.items()) or "none"
+        self.get_logger().warning(f"no transition {wanted}: {self.life}, from where it has {has}")
+        response.success = False
+        return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to listen."""

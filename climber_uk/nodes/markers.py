@@ -70,6 +70,11 @@ class Markers(ClimberNode):
         for topic, kind in SEEN.items():
             self.subscription(kind, topic, partial(self.latest.__setitem__, topic), BEST_EFFORT)
 
+    def summary(self) -> str:
+        """What is drawn."""
+        radius, half_track = self.options.wheel_radius, self.options.half_track
+        return f"wheels of radius {radius:g} m, {2 * half_track:g} m apart"
+
     def on_odometry(self, message: Odometry) -> None:
         """Draw, if it is time to."""
         stamp = reading.nanoseconds(message.header.stamp)
@@ -148,4 +153,4 @@ class Markers(ClimberNode):
 
 def main() -> None:
     """Run the node."""
-    run(lambda: [Markers()])
+    run(lambda: [Markers()], __doc__)
