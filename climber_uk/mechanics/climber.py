@@ -95,7 +95,7 @@ class Climber:
         0.53, "", "share k of the suction force that the wheels carry", at_least=0, at_most=1
     )
     suction_pressure: float = parameter(
-        2500.0, "Pa", "pressure difference P", at_least=0, runtime=True, plausible=(500, 1e5)
+        2500.0, "Pa", "pressure difference P", at_least=0, runtime=True, plausible=(1000, 1e5)
     )
     suction_area: float = parameter(
         0.06, "m²", "effective suction area S", at_least=0, plausible=(1e-4, 1)

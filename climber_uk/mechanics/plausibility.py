@@ -15,9 +15,9 @@ OTHER_UNITS = {
     "m/s": {"mm/s": 1e-3, "cm/s": 1e-2},
     "deg": {"rad": 1 / DEGREE},
     "rad": {"deg": DEGREE},
-    "rad/s": {"deg/s": DEGREE, "turns a minute": TURN_A_MINUTE},
-    "N m": {"N mm": 1e-3, "N cm": 1e-2},
-    "Pa": {"mbar": 1e2, "kPa": 1e3, "bar": 1e5},
+    "rad/s": {"turns a minute": TURN_A_MINUTE, "deg/s": DEGREE},
+    "N m": {"N mm": 1e-3},
+    "Pa": {"kPa": 1e3, "mbar": 1e2, "bar": 1e5},
 }
 """Units that a number may have been in by mistake, in the one that is meant."""
 
@@ -47,9 +47,11 @@ def doubt(field: "dataclasses.Field[Any]", value: Any) -> str:
         for other, factor in OTHER_UNITS.get(unit, {}).items()
         if low <= abs(value * factor) <= high
     }
-    said = f"{field.name}={value:g} [{unit}] is hardly meant (usual: {low:g} to {high:g})"
+    number = f"{value:g} [{unit}]" if unit else f"{value:g}"
+    said = f"{field.name}={number} is hardly meant (usual: {low:g} to {high:g})"
     if not others:
         return said
-    default: float = field.default or high  # type: ignore[assignment]
-    meant = min(others, key=lambda other: abs(math.log(abs(others[other] / default))))
-    return f"{said}; if it is in {meant}, write {others[meant]:g}"
+    meant, default = next(iter(others)), field.default
+    if default:  # what is nearest to it, in ratio
+        meant = min(others, key=lambda other: abs(math.log(abs(others[other] / default))))
+    return f"{said}; if it is in {meant}, write {others[meant]:.4g}"

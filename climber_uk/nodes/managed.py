@@ -34,15 +34,20 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         ClimberNode.__init__(self, name)
         self.parameters.declare(Life)
         self.inputs: list[Subscription] = []
+        self.failure = ""  # why it could not be configured
 
     def start_life(self) -> None:
-        """Offer the services of a managed node, and become active unless another is to say so."""
+        """Offer the services of a managed node, and become active unless another is to say so.
+
+        Raises `ValueError` if it cannot listen.
+        """
         LifecycleNodeMixin.__init__(self)
         self._change_state = self._service_change_state.callback
         self._service_change_state.callback = self.on_change_state
         self.create_service(SetBool, "~/enable", self.on_enable)
         if self.parameters.read(Life).autostart:
-            self.trigger_configure()
+            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                raise ValueError(self.failure)
             self.trigger_activate()
 
     def listen(self) -> list[Subscription]:
@@ -68,7 +73,10 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         asked = request.transition
         there = {label: number for number, label, *_ in self._state_machine.available_transitions}
         if asked.label in there if asked.label else asked.id in there.values():
-            return self._change_state(request, response)
+            response = self._change_state(request, response)
+            if not response.success:
+                self.get_logger().error(f"still {self.life}: {self.failure}")
+            return response
         wanted = repr(asked.label) if asked.label else f"of id {asked.id}"
         has = ", ".join(f"{label} ({number})" for label, number in there.items()) or "none"
         self.get_logger().warning(f"no transition {wanted}: {self.life}, from where it has {has}")
@@ -77,7 +85,11 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to listen."""
-        self.inputs = self.listen()
+        try:
+            self.inputs = self.listen()
+        except ValueError as error:
+            self.failure = str(error)
+            return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -183,6 +183,7 @@ def run(
     end = Future()
     on_end(lambda *_: end.set_result(None))
     try:
+        ParameterFiles(sys.argv, "")  # rcl would not say where a file is wrong
         chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_nodes(**chosen)
@@ -208,11 +209,7 @@ def run(
 def parse(
     words: Sequence[str], about: str | None, options: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Options that the arguments of a command line choose, and that are not for ROS.
-
-    Raises `OSError`, or `ValueError` of one line, if a parameter file cannot be read.
-    """
-    ParameterFiles(sys.argv, "")  # rcl would not say where a file is wrong
+    """What the words of a command line that are not for ROS choose among `options`."""
     if not words:
         return {}
     from climber_uk.system.command_line import Parser  # most starts have nothing to parse
