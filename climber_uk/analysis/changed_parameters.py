@@ -1,12 +1,12 @@
 """A parameter file with some values changed, for the nodes to load."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from climber_uk.analysis.parameter_file import OWN, TEXT, read_sections, scalar
+from climber_uk.analysis.parameter_file import OWN, TEXT, Section, read_sections, scalar
 
 
 def write_changed(
@@ -16,16 +16,30 @@ def write_changed(
 
     They stand in a section of their own at the end, so that they hold in every namespace.
     """
-    tree: dict[str, Any] = {}
-    for section in read_sections(original) if original else []:
-        for parameter, value in section.values.items():
-            _set(tree.setdefault(section.name, {OWN: {}})[OWN], parameter, value)
+    tree = _tree(read_sections(original) if original else [])
     for node, values in changes.items():
         name = f"/**/{node}"
         section = tree.pop(name, {OWN: {}})
         for parameter, value in values.items():
             _set(section[OWN], parameter, value)
         tree[name] = section
+    _write(tree, path)
+
+
+def write_sections(sections: Iterable[Section], path: Path) -> None:
+    """Write a parameter file of these sections."""
+    _write(_tree(sections), path)
+
+
+def _tree(sections: Iterable[Section]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for section in sections:
+        for parameter, value in section.values.items():
+            _set(tree.setdefault(section.name, {OWN: {}})[OWN], parameter, value)
+    return tree
+
+
+def _write(tree: dict[str, Any], path: Path) -> None:
     path.write_text(yaml.dump(tree, Dumper=_Dumper, sort_keys=False), encoding="utf-8")
 
 

@@ -4,7 +4,6 @@ Lines of `stamp x y z qx qy qz qw`, in the order of the stamps: odom.tum, refere
 reference at the stamps of the odometry, and ground_truth.tum if it was recorded.
 """
 
-import argparse
 import math
 import sys
 from contextlib import suppress
@@ -15,6 +14,7 @@ from climber_uk.analysis.topics import ODOMETRY, REFERENCE
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.preview import joined
 from climber_uk.messages import reading, reading_reference
+from climber_uk.system.command_line import Parser
 
 TRUTH = "ground_truth"
 Poses = dict[int, Array]  # x, y, heading by stamp [ns]
@@ -59,11 +59,11 @@ def lines(poses: Poses) -> str:
 
 def main() -> None:
     """Write the trajectories of a bag."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser("export_tum", __doc__)
     parser.add_argument("bag", type=Path, help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
-    parser.add_argument("--output", type=Path, help="directory (default: tum in the bag)")
-    options = parser.parse_args()
+    parser.add_argument("--output", "-o", type=Path, help="directory (default: tum in the bag)")
+    options = parser.arguments()
     directory = options.output or options.bag / "tum"
     try:
         found = read_poses(options.bag, options.namespace)

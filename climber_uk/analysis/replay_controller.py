@@ -26,6 +26,7 @@ from climber_uk.analysis.torque_comparison import (
     table,
     write_csv,
 )
+from climber_uk.system.command_line import Parser
 
 
 def replayed(options: argparse.Namespace) -> Comparison:
@@ -69,7 +70,7 @@ def draw(found: Comparison, path: Path) -> None:
 
 def main() -> None:
     """Print the comparison and write its files."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser("replay_controller", __doc__)
     parser.add_argument("bag", type=Path, help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument("--params", type=Path, help="parameter file (default: as recorded)")
@@ -80,11 +81,11 @@ def main() -> None:
         metavar="NAME:=VALUE",
         help="change one",
     )
-    parser.add_argument("--output", type=Path, help="directory (default: replay in the bag)")
+    parser.add_argument("--output", "-o", type=Path, help="directory (default: replay in the bag)")
     parser.add_argument(
         "--fail-above", type=float, metavar="TORQUE", help="status 1 if a torque differs more [N m]"
     )
-    options = parser.parse_args()
+    options = parser.arguments()
     directory = options.output or options.bag / "replay"
     try:
         found = replayed(options)

@@ -4,7 +4,6 @@ Writes the figures as printed and consistent, comparison.md, attempts.md and dri
 CSV), drift.png and off_constraint.png. All that takes long runs in processes of its own.
 """
 
-import argparse
 import multiprocessing
 import os
 from concurrent.futures import ProcessPoolExecutor
@@ -23,6 +22,7 @@ from climber_uk.analysis.paper.study import (
     compute,
     jobs,
 )
+from climber_uk.system.command_line import Parser
 
 DRIFT_COLUMNS = (
     *("method", "integrator", "0 to end [m]", "first tenth [m]", "last tenth [m]"),
@@ -113,10 +113,10 @@ def write(
 
 def main() -> None:
     """Compute, print and write everything."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=Path("paper_output"), help="directory")
+    parser = Parser("reproduce_paper", __doc__)
+    parser.add_argument("--output", "-o", type=Path, default=Path("paper_output"), help="directory")
     parser.add_argument("--quick", action="store_true", help="coarser and shorter, without nodes")
-    options = parser.parse_args()
+    options = parser.arguments()
     extent = QUICK if options.quick else FULL
     options.output.mkdir(parents=True, exist_ok=True)
     # matrices of 3 by 3 gain nothing from threads, which would only be in each other's way

@@ -5,10 +5,9 @@
 Log times are those of reception on the system clock, in simulated time too, as in rosbag2.
 """
 
-import signal
 import sys
 import time
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
@@ -35,6 +34,8 @@ from rclpy.validate_topic_name import validate_topic_name
 
 from climber_uk.analysis.bag_writer import NEVER, BagWriter
 from climber_uk.analysis.storage import STORAGES, Qos, is_known
+from climber_uk.system.command_line import Parser
+from climber_uk.system.processes import ignore_end, on_end
 
 FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received within this time
 DISCOVERY_PERIOD = 0.2  # [s]
@@ -229,13 +230,13 @@ def find_message_class(type_name: str) -> type[Any] | None:
 
 def parse(arguments: Sequence[str]) -> Namespace:
     """Return the options of the command line."""
-    parser = ArgumentParser("record_bag", description="Record topics into a rosbag2 directory.")
+    parser = Parser("record_bag", "Record topics into a rosbag2 directory.")
     default = Path(datetime.now().strftime("climber_bag_%Y_%m_%d-%H_%M_%S"))
     parser.add_argument("--output", "-o", type=Path, default=default, help="a new directory")
     parser.add_argument("--storage", "-s", choices=STORAGES, default="mcap")
     for option, meaning in {"--topics": "default: all", "--exclude": "not these"}.items():
         parser.add_argument(option, nargs="+", type=topic_name, default=[], help=meaning)
-    return parser.parse_args(arguments)
+    return parser.arguments(arguments)
 
 
 def topic_name(name: str) -> str:
@@ -252,8 +253,7 @@ def record(options: Namespace) -> None:
     recorder = BagRecorder(options)
     # Our own handlers: those of rclpy would cut off what has arrived and is not yet recorded, and
     # KeyboardInterrupt, a second one too, might come in the middle of a write.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, recorder.stop)
+    on_end(recorder.stop)
     try:
         recorder.run()
     finally:
@@ -273,8 +273,7 @@ def main() -> None:
     except OSError as error:
         sys.exit(f"record_bag: {error}")
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
+        ignore_end()
         rclpy.try_shutdown()
 
 

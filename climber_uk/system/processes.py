@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -25,12 +26,12 @@ def ignore_end() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def start(command: Sequence[str | Path], **options: Any) -> "subprocess.Popen[bytes]":
-    """Start a process that gets SIGTERM when this one ends, however it does; see `Popen`."""
-    return subprocess.Popen(command, preexec_fn=partial(end_with, os.getpid()), **options)
+def dies_with_me() -> Callable[[], None]:
+    """For `Popen`'s `preexec_fn`: a child that gets SIGTERM when this process has ended."""
+    return partial(die_with, os.getpid())
 
 
-def end_with(parent: int) -> None:
+def die_with(parent: int) -> None:
     """Have this process get SIGTERM when its parent, of that id, ends, be it by SIGKILL."""
     import ctypes  # few need it
 
@@ -41,7 +42,7 @@ def end_with(parent: int) -> None:
 
 def call(command: Sequence[str | Path]) -> int:
     """Run a command to its end and return its status; signals to end are passed on to it."""
-    process = start(command)
+    process = subprocess.Popen(command, preexec_fn=dies_with_me())
     before = {number: signal.getsignal(number) for number in END}
     on_end(lambda number, _: process.send_signal(number))
     try:
@@ -49,3 +50,18 @@ def call(command: Sequence[str | Path]) -> int:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def end(processes: Sequence["subprocess.Popen[bytes]"], patience: Callable[[], float]) -> None:
+    """Have processes end by SIGTERM; by SIGKILL those that do not within `patience()` [s].
+
+    It is asked again and again: it may shrink meanwhile.
+    """
+    for process in processes:
+        process.send_signal(signal.SIGTERM)
+    begin = time.monotonic()
+    while alive := [process for process in processes if process.poll() is None]:
+        if time.monotonic() > begin + patience():
+            for process in alive:
+                process.kill()
+        time.sleep(0.02)

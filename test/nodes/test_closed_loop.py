@@ -262,5 +262,5 @@ def test_what_a_demo_cannot_start_with_is_said_in_one_line(world, tmp_path):
     process = demo(world, tmp_path / "run", "nothing.yaml")
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert said.startswith("run_demo: there is no file")
+    assert said.startswith("run_demo: No such file or directory: ")
     assert len(said.splitlines()) == 1
