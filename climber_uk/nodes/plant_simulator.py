@@ -21,6 +21,8 @@ from climber_uk.simulation.options import Options
 from climber_uk.simulation.schedule import Schedule
 from climber_uk.simulation.sensors import Sensors
 
+HEARD = "odom", "joint_states", "wheel_torques", "reference"  # of plant, controller and planner
+
 
 class PlantSimulator(ClimberNode):
     """A climber in a time of its own, or that it shares with others of the same process.
@@ -157,6 +159,13 @@ class PlantSimulator(ClimberNode):
     def now(self) -> str:
         """Time, to be read."""
         return f"{self.time.stamp / SECOND:.3f} s"
+
+    def is_heard_by(self, node: str) -> bool:
+        """Whether a node of that name has subscribed a topic of each node of the climber."""
+        return all(
+            node in (info.node_name for info in self.get_subscriptions_info_by_topic(topic))
+            for topic in map(self.resolve_topic_name, HEARD)
+        )
 
     def advance(self) -> None:
         """Go on by a control period; a climber that falls is heard of no more."""

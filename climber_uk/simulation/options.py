@@ -31,6 +31,9 @@ class Options:
         0.5, "s", "age at which a push ends; 0: with the next one", at_least=0
     )
     lockstep_timeout: float = parameter(5.0, "s", "wall-clock wait that is reported", above=0)
+    wait_for: str = parameter(
+        "", "", "node, as a recorder, that must have subscribed all before time runs; none if empty"
+    )
     initial_x: float = parameter(0.0, "m", "x at the start")
     initial_y: float = parameter(0.0, "m", "y at the start")
     initial_heading: float = parameter(0.0, "rad", "heading at the start")

@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
 from made_bag import a_run, write
@@ -191,7 +190,7 @@ def test_help_says_what_the_exit_status_means(command):
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_reader_that_leaves_takes_neither_files_nor_status_away(bags, tmp_path, unbuffered):
-    command = f"{Path(sys.executable).parent}/analyze_bag {bags}/first -o {tmp_path}"
+    command = f"{sys.executable} -m climber_uk.analysis.analyze_bag {bags}/first -o {tmp_path}"
     ran = subprocess.run(
         ["bash", "-c", f"{command} | true; exit ${{PIPESTATUS[0]}}"],
         capture_output=True,
