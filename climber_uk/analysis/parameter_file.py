@@ -37,9 +37,11 @@ class Values:
 
     def read(self, kind: type[T], prefix: str = "") -> T:
         """Instance of `kind`; raises `ValueError` naming parameter, value and bound."""
-        names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
         given = {
-            name: self.by_name[prefix + name] for name in names if prefix + name in self.by_name
+            field.name: self.by_name[prefix + name]
+            for field in dataclasses.fields(kind)  # type: ignore[arg-type]
+            for name in (field.metadata.get("formerly"), field.name)
+            if name and prefix + name in self.by_name
         }
         try:
             return kind(**given)

@@ -19,13 +19,15 @@ def parameter(
     at_most: float | None = None,
     choices: Sequence[str] | None = None,
     plausible: tuple[float, float] | None = None,
+    formerly: str = "",
     runtime: bool = False,
 ) -> Any:
     """Declare a dataclass field together with all that a user may ask about it.
 
     `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
-    range `plausible` is doubted, not refused; `runtime` marks what a running node may change. Pass
-    the dataclass's instance to `check` in `__post_init__`.
+    range `plausible` is doubted, not refused; a name that it had `formerly` is still taken;
+    `runtime` marks what a running node may change. Pass the dataclass's instance to `check` in
+    `__post_init__`.
     """
     return dataclasses.field(
         default=default,
@@ -37,6 +39,7 @@ def parameter(
             "at_most": at_most,
             "choices": choices,
             "plausible": plausible,
+            "formerly": formerly,
             "runtime": runtime,
         },
     )

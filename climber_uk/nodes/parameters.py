@@ -64,7 +64,7 @@ class Parameters:
         for field in dataclasses.fields(kind):  # type: ignore[arg-type]
             name = prefix + field.name
             try:
-                if (given := self._given(name, field)) is not None:
+                if (given := self._given(name, prefix, field)) is not None:
                     check_value(field, given)
                     self.remarks += [prefix + said for said in [doubt(field, given)] if said]
                 self._node.declare_parameter(name, field.default, _descriptor(field))
@@ -75,9 +75,13 @@ class Parameters:
                 raise ValueError(f"{name}={given!r} must be of type {wanted}") from None
             self._fields[name] = (prefix, kind, field)
 
-    def _given(self, name: str, field: Field) -> Any:
+    def _given(self, name: str, prefix: str, field: Field) -> Any:
         """Value that is given for a parameter, if one is; an integer will do for a float."""
         overrides = self._node._parameter_overrides
+        old = prefix + field.metadata["formerly"]
+        if field.metadata["formerly"] and old in overrides:
+            overrides.setdefault(name, Parameter(name, value=overrides.pop(old).value))
+            self.remarks.append(f"{old} is called {name} now")
         value = overrides[name].value if name in overrides else None
         if isinstance(field.default, float) and type(value) is int and float(value) == value:
             overrides[name] = Parameter(name, value=float(value))

@@ -2,12 +2,16 @@
 
 import math
 import random
+from dataclasses import dataclass
 
+import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
-from climber_uk.analysis.parameter_file import read_file
+from climber_uk.analysis.parameter_file import Values, read_argument, read_file
+from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.nodes.parameters import Parameters
 
 SCALARS = """\
 5 5. 5.0 .5 -.5 +5 5e0 8e3 33e-2 1E5 1e+5 -1e-5 5.e3 08 010 -010 0x1F 0x1p3 0o17 0b1 1_000 1:30 00
@@ -27,6 +31,33 @@ def read_by_rcl(path):
     finally:
         node.destroy_node()
         rclpy.shutdown(context=context)
+
+
+@dataclass(frozen=True)
+class Renamed:
+    """A parameter that was called `size`."""
+
+    length: float = parameter(1.0, "m", "length", formerly="size")
+
+    def __post_init__(self):
+        check(self)
+
+
+@pytest.mark.parametrize(("given", "length"), [(["size:=2"], 2.0), (["size:=2", "length:=3"], 3.0)])
+def test_a_parameter_is_taken_under_its_former_name_with_a_remark(given, length):
+    arguments = ["--ros-args", *(word for one in given for word in ("-p", f"part.{one}"))]
+    context = Context()
+    rclpy.init(args=arguments, context=context)
+    node = Node("x", context=context, start_parameter_services=False, enable_rosout=False)
+    parameters = Parameters(node, arguments)
+    parameters.declare(Renamed, "part.")
+    parameters.refuse_unknown()
+    assert parameters.read(Renamed, "part.") == Renamed(length)
+    assert parameters.remarks == ["part.size is called part.length now"]
+    values = dict(read_argument(f"part.{one}") for one in given)
+    assert Values(values).read(Renamed, "part.") == Renamed(length)
+    node.destroy_node()
+    rclpy.shutdown(context=context)
 
 
 def same(one, other):
