@@ -4,8 +4,8 @@ Writes the figures as printed and consistent, comparison.md, attempts.md and dri
 CSV), drift.png and off_constraint.png. All that takes long runs in processes of its own.
 """
 
-import multiprocessing
 import os
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from climber_uk.analysis.paper.study import (
     jobs,
 )
 from climber_uk.system.command_line import Parser
+from climber_uk.system.workers import workers
 
 DRIFT_COLUMNS = (
     *("method", "integrator", "0 to end [m]", "first tenth [m]", "last tenth [m]"),
@@ -121,10 +122,12 @@ def main() -> None:
     options.output.mkdir(parents=True, exist_ok=True)
     # matrices of 3 by 3 gain nothing from threads, which would only be in each other's way
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=spawn) as pool:
-        results = compute(pool, jobs(extent))
-        paths = write(pool, results, extent, options.output)
+    try:
+        with workers(os.cpu_count()) as pool:
+            results = compute(pool, jobs(extent))
+            paths = write(pool, results, extent, options.output)
+    except KeyboardInterrupt:
+        sys.exit("reproduce_paper: interrupted")
     print(f"{len(paths)} files in {options.output}")
 
 

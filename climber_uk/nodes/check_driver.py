@@ -30,7 +30,7 @@ from climber_uk.nodes.driver_node import DriverNode
 from climber_uk.nodes.parameter_files import paths
 from climber_uk.nodes.running import in_a_line
 from climber_uk.system.command_line import Parser
-from climber_uk.system.processes import on_end
+from climber_uk.system.signals import on_end
 
 NODE, CONTROLLER = "check_driver", "uk_torque_controller"
 PATIENCE = 10.0  # [s] for a publisher to be found

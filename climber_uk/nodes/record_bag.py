@@ -35,7 +35,7 @@ from rclpy.validate_topic_name import validate_topic_name
 from climber_uk.analysis.bag_writer import NEVER, BagWriter
 from climber_uk.analysis.storage import STORAGES, Qos, is_known
 from climber_uk.system.command_line import Parser
-from climber_uk.system.processes import ignore_end, on_end
+from climber_uk.system.signals import ignore_end, on_end
 
 FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received within this time
 DISCOVERY_PERIOD = 0.2  # [s]

@@ -27,7 +27,8 @@ from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading
 from climber_uk.nodes.running import ClimberNode
 from climber_uk.system.command_line import Parser
-from climber_uk.system.processes import die_with, dies_with_me, end, ignore_end, on_end
+from climber_uk.system.processes import die_with, dies_with_me, end
+from climber_uk.system.signals import ignore_end, on_end
 
 # One topic of each node that only the recorder subscribes, and does once it has found the node.
 FOUND = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")

@@ -28,7 +28,7 @@ from climber_uk.messages import writing
 from climber_uk.messages.names import Names
 from climber_uk.nodes.parameter_files import ParameterFiles
 from climber_uk.nodes.parameters import QOS, Parameters
-from climber_uk.system.processes import ignore_end, on_end
+from climber_uk.system.signals import ignore_end, on_end
 
 RELIABLE = QoSProfile(depth=10)
 # what is kept for those who are behind: a recorder that the machine held up for half a second

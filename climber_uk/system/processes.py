@@ -1,5 +1,6 @@
-"""Processes that end together: signals that ask for the end, and children that do not outlive."""
+"""Processes that are started by this one, and do not outlive it."""
 
+import ctypes
 import os
 import signal
 import subprocess
@@ -7,35 +8,26 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-END = signal.SIGINT, signal.SIGTERM, signal.SIGHUP  # Ctrl-C, kill, and a terminal that is closed
+from climber_uk.system.signals import END, on_end
+
+LIBC = ctypes.CDLL(None)
 PR_SET_PDEATHSIG = 1
-
-
-def on_end(handler: Callable[..., Any]) -> None:
-    """Call `handler` for every signal that asks this process to end, but for one nohup ignores."""
-    for number in END:
-        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, handler)
-
-
-def ignore_end() -> None:
-    """Ignore these signals: the process is ending, and they come more than once."""
-    for number in END:
-        signal.signal(number, signal.SIG_IGN)
 
 
 def dies_with_me() -> Callable[[], None]:
     """For `Popen`'s `preexec_fn`: a child that gets SIGTERM when this process has ended."""
-    return partial(die_with, os.getpid())
+    return partial(_begin_child, os.getpid())
+
+
+def _begin_child(parent: int) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # what comes before `exec` would be lost else
+    die_with(parent)
 
 
 def die_with(parent: int) -> None:
     """Have this process get SIGTERM when its parent, of that id, ends, be it by SIGKILL."""
-    import ctypes  # few need it
-
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:  # it ended before
         os.kill(os.getpid(), signal.SIGTERM)
 

@@ -189,3 +189,23 @@ def test_a_terminal_that_is_closed_does_not_end_what_nohup_started(world):
     process.send_signal(signal.SIGHUP)
     assert process.poll() is None
     assert world.end("nohup") == 0
+
+
+@pytest.mark.parametrize("end", [interrupt_twice, kill])
+@pytest.mark.parametrize(
+    "command",
+    [["reproduce_paper", "-o"], ["campaign", CONFIG / "campaign.yaml", "--jobs", "2", "-o"]],
+    ids=lambda command: command[0],
+)
+def test_what_computes_in_many_processes_ends_with_all_of_them(
+    world, start, tmp_path, command, end
+):
+    process = start(executable(command[0]), *command[1:], tmp_path / "out")
+    # one more keeps account of their semaphores
+    family = world.wait(
+        lambda: len(found := descendants(process.pid)) > 2 and found, "processes that compute"
+    )
+    end(process)
+    said = process.communicate(timeout=TIMEOUT)[0]
+    gone(world, family)
+    assert end is kill or f"{command[0]}: interrupted" in said.splitlines()[-1]
