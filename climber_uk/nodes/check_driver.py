@@ -14,6 +14,7 @@ from tempfile import NamedTemporaryFile
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -200,7 +201,7 @@ def main() -> None:
     except Interrupted:
         say("interrupted")
         sys.exit(2)
-    except (ValueError, OSError, RCLError, UnknownROSArgsError) as error:
+    except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
         say(in_a_line(error))
         sys.exit(2)
     finally:

@@ -41,6 +41,7 @@ class Parameters:
         self.origin = ""  # of those that are given, to be read
         self._kept: dict[tuple[str, type], Any] = {}
         self._fields: dict[str, tuple[str, type, Field]] = {}
+        node.add_pre_set_parameters_callback(self._as_declared)
         node.add_on_set_parameters_callback(self._change)
 
     @property
@@ -82,10 +83,10 @@ class Parameters:
         if field.metadata["formerly"] and old in overrides:
             overrides.setdefault(name, Parameter(name, value=overrides.pop(old).value))
             self.remarks.append(f"{old} is called {name} now")
-        value = overrides[name].value if name in overrides else None
-        if isinstance(field.default, float) and type(value) is int and float(value) == value:
-            overrides[name] = Parameter(name, value=float(value))
-        return overrides[name].value if name in overrides else None
+        if name not in overrides:
+            return None
+        overrides[name] = _as_float(overrides[name], field)
+        return overrides[name].value
 
     def read(self, kind: type[T], prefix: str = "") -> T:
         """Instance of `kind`, of fields declared before, as it is now.
@@ -132,6 +133,14 @@ class Parameters:
 
         return similar(name, self._node._parameters)
 
+    def _as_declared(self, changes: list[Parameter]) -> list[Parameter]:
+        return [
+            _as_float(change, self._fields[change.name][2])
+            if change.name in self._fields
+            else change
+            for change in changes
+        ]
+
     def _change(self, changes: list[Parameter]) -> SetParametersResult:
         kept = dict(self._kept)
         try:
@@ -148,6 +157,14 @@ class Parameters:
             self._kept = kept
             self._on_change()
         return SetParametersResult(successful=True)
+
+
+def _as_float(given: Parameter, field: Field) -> Parameter:
+    """The same, of an integer as a float where one is wanted and has the same value."""
+    value = given.value
+    if isinstance(field.default, float) and type(value) is int and float(value) == value:
+        return Parameter(given.name, value=float(value))
+    return given
 
 
 def _descriptor(field: Field) -> ParameterDescriptor:

@@ -195,7 +195,7 @@ def run(
         gc.freeze()  # to look through all that was imported would halt the loop for 20 ms
         while not end.done():
             executor.spin_until_future_complete(end, timeout_sec=3600.0)
-    except (ValueError, OSError, RCLError, UnknownROSArgsError) as error:
+    except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
         if nodes:
             raise
         sys.exit(f"{Path(sys.argv[0]).name}: {in_a_line(error)}")

@@ -30,6 +30,11 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
             ["settling_messages:=5.0"],
             "settling_messages=5.0 must be of type int",
         ),
+        (
+            "uk_torque_controller",
+            ["use_sim_time:=1"],
+            "'use_sim_time' to '1' of type 'INTEGER', exp",
+        ),
         ("uk_torque_controller", ["maas:=5.0"], "maas is not a parameter"),
         ("uk_torque_controller", ["half_trak:=0.3"], "(did you mean half_track?)"),
         ("uk_torque_controller", ["guidance.turnrate:=3.0"], "(did you mean guidance.turn_rate?)"),
