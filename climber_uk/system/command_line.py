@@ -15,7 +15,13 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, name: str, description: str | None, epilog: str | None = None) -> None:
         super().__init__(name, description=description, epilog=epilog)
-        self.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+        self.add_argument(
+            "--version",
+            action=_Version,
+            nargs=0,
+            default=argparse.SUPPRESS,  # it is no option of what runs
+            help="print the version and exit",
+        )
 
     def arguments(self, given: Sequence[str] | None = None) -> argparse.Namespace:
         """Parse; from now on a reader of the output, as `head`, may end before this program."""

@@ -44,7 +44,7 @@ def hold_up_the_recorder(process):
     """Stop it for a while, once the run has begun, as a busy machine may."""
     process.stdout.read(40)
     listed = subprocess.check_output(
-        ["ps", "-o", "pid=,args=", "--ppid", str(process.pid)], text=True
+        ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(process.pid)], text=True
     )
     (recorder,) = [int(line.split()[0]) for line in listed.splitlines() if "record_bag" in line]
     os.kill(recorder, signal.SIGSTOP)
