@@ -16,7 +16,7 @@ SET_UP := $(VENV)/set-up
 .PHONY: demo paper campaign docs bench test lint unit soak colcon clean
 
 demo: $(SET_UP)
-	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
+	@exec $(BIN)/run_demo --with-parent --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
 		$(if $(CLIMBERS),--climbers $(CLIMBERS))
 	@$(BIN)/analyze_bag $(OUTPUT)/bag --params $(CONFIG) --output $(OUTPUT)
 

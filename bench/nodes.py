@@ -59,7 +59,7 @@ def at_rate(rate: int, directory: Path) -> Path:
 def used(process: int) -> dict[str, float]:
     """CPU time [s] of each child of a process so far, by its executable's name."""
     listed = subprocess.run(
-        ["ps", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True
+        ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True
     ).stdout
     times = {}
     for line in listed.splitlines():

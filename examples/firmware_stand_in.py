@@ -156,9 +156,9 @@ class FirmwareStandIn(ClimberNode):
 
 
 def main() -> None:
-    """Run the board until SIGINT or SIGTERM."""
+    """Run the board until a signal to end."""
     end = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: end.set())
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

@@ -349,9 +349,10 @@ class Driver(Node):
 
 
 def main() -> None:
-    """Run the driver until SIGINT, SIGTERM, or the loss of the board."""
+    """Run the driver until a signal to end, or the loss of the board."""
     end = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):  # terminal and launch may both send one
+    # terminal and launch may both send one
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: end.set())
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

@@ -5,7 +5,6 @@ reference at the stamps of the odometry, and ground_truth.tum if it was recorded
 again in the bag, each run has a directory of its own, run_1, run_2, ….
 """
 
-import argparse
 import math
 import sys
 from pathlib import Path
@@ -19,6 +18,7 @@ from climber_uk.analysis.reference import poses_at
 from climber_uk.analysis.run_reader import NoRunError, RunReader
 from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TRUTH, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
+from climber_uk.system.command_line import Parser
 
 Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
 
@@ -65,7 +65,7 @@ def lines(poses: Poses) -> str:
 
 def main() -> None:
     """Write the trajectories of a bag."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser("export_tum", __doc__)
     parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument(
@@ -73,7 +73,7 @@ def main() -> None:
         type=Path,
         help="directory (default: a new one, tum, in the bag or beside it)",
     )
-    options = parser.parse_args()
+    options = parser.arguments()
     try:
         with output(options.bag, "tum", options.output) as directory:
             runs, losses = read_poses(options.bag, options.namespace.strip("/"))

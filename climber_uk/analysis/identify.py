@@ -27,6 +27,7 @@ from climber_uk.analysis.integral_equations import Cut
 from climber_uk.analysis.parameter_file import Values, read_file
 from climber_uk.analysis.recorded_motion import Source, read_motion
 from climber_uk.mechanics.climber import Climber
+from climber_uk.system.command_line import Parser
 
 PUBLISHER = "trajectory_publisher"
 SIDES = "right", "left"
@@ -99,7 +100,7 @@ def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
 
 def main() -> None:
     """Tell, or plan."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser("identify", __doc__)
     parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
@@ -107,7 +108,7 @@ def main() -> None:
     parser.add_argument(
         "--delay", type=float, help="[s] of torques, unless joint_states tells them"
     )
-    parser.add_argument("--output", type=Path, help="write a parameter file for the nodes")
+    parser.add_argument("--output", "-o", type=Path, help="write a parameter file for the nodes")
     parser.add_argument("--json", type=Path, help="write the table as JSON")
     parser.add_argument("--figure", type=Path, help="write a picture of the fit, PNG")
     parser.add_argument(
@@ -118,7 +119,7 @@ def main() -> None:
             rule, name = field.metadata, "--" + field.name.replace("_", "-")
             said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
             parser.add_argument(name, type=float, default=field.default, help=said)
-    options = parser.parse_args()
+    options = parser.arguments()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
     try:

@@ -29,6 +29,7 @@ from climber_uk.analysis.torque_comparison import (
     table,
     write_csv,
 )
+from climber_uk.system.command_line import Parser
 
 
 def replayed(options: argparse.Namespace) -> Comparison:
@@ -78,7 +79,7 @@ def draw(found: Comparison, path: Path) -> None:
 
 def main() -> None:
     """Print the comparison and write its files."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser("replay_controller", __doc__)
     parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument("--params", type=Path, help="parameter file (default: as recorded)")
@@ -97,7 +98,7 @@ def main() -> None:
     parser.add_argument(
         "--fail-above", type=float, metavar="TORQUE", help="status 1 if a torque differs more [N m]"
     )
-    options = parser.parse_args()
+    options = parser.arguments()
     try:
         with output(options.bag, "replay", options.output) as directory:
             found = replayed(options)

@@ -1,7 +1,7 @@
 """What `analyze_bag` and `compare_bags` share: their options, what they read, what they write."""
 
 import sys
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from climber_uk.analysis.recorded_run import read_runs
 from climber_uk.analysis.tables import Column, text, to_csv, to_json
 from climber_uk.analysis.topics import Topics
 from climber_uk.mechanics.climber import Climber
+from climber_uk.system.command_line import Parser
 
 NODE = "uk_torque_controller"
 OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
@@ -30,9 +31,9 @@ EPILOG = (
 )
 
 
-def parser(name: str, description: str | None) -> ArgumentParser:
+def parser(name: str, description: str | None) -> Parser:
     """Parser of the options that both commands have."""
-    made = ArgumentParser(name, description=description, epilog=EPILOG)
+    made = Parser(name, description, EPILOG)
     made.add_argument("--output", "-o", type=Path, help=OUTPUT_HELP)
     made.add_argument(
         "--figures", type=Path, help="directory for the figures, as PNG (default: no)"

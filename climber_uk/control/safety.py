@@ -74,13 +74,25 @@ class Safety:
         choices=("zero", "hold"),
     )
     braking_rate: float = parameter(5.0, "1/s", "of the safe output 'hold'", at_least=0)
-    odometry_timeout: float = parameter(0.1, "s", "age at which odometry is stale", above=0)
-    reference_timeout: float = parameter(0.1, "s", "how long a reference is waited for", above=0)
+    odometry_timeout: float = parameter(
+        0.1, "s", "age at which odometry is stale", above=0, plausible=(0.002, 5)
+    )
+    reference_timeout: float = parameter(
+        0.1, "s", "how long a reference is waited for", above=0, plausible=(0.002, 5)
+    )
     least_pressure: float = parameter(
-        0.0, "Pa", "suction below which the climber is stopped; 0: never", at_least=0
+        0.0,
+        "Pa",
+        "suction below which the climber is stopped; 0: never",
+        at_least=0,
+        plausible=(100, 1e5),
     )
     max_jump: float = parameter(
-        0.2, "m", "by which a wheel may be elsewhere than the model expects", above=0
+        0.2,
+        "m",
+        "by which a wheel may be elsewhere than the model expects",
+        above=0,
+        plausible=(0.005, 5),
     )
     settling_messages: int = parameter(
         5, "", "odometry messages without a jump until it is followed again", at_least=1

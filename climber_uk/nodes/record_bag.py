@@ -7,10 +7,9 @@ never go back, if that is set back.
 """
 
 import os
-import signal
 import sys
 import time
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -35,6 +34,8 @@ from climber_uk.analysis.bag_writer import NEVER, BagWriter
 from climber_uk.analysis.log_clock import LogClock
 from climber_uk.analysis.storage import STORAGES, is_known
 from climber_uk.nodes.offered_qos import QUEUE_DEPTH, is_compatible, request_for, to_metadata
+from climber_uk.system.command_line import Parser
+from climber_uk.system.signals import ignore_end, on_end
 
 FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received within this time
 DISCOVERY_PERIOD = 0.2  # [s]
@@ -279,13 +280,13 @@ def find_message_class(type_name: str) -> type[Any] | None:
 
 def parse(arguments: Sequence[str]) -> Namespace:
     """Return the options of the command line."""
-    parser = ArgumentParser("record_bag", description="Record topics into a rosbag2 directory.")
+    parser = Parser("record_bag", "Record topics into a rosbag2 directory.")
     default = Path(datetime.now().strftime("climber_bag_%Y_%m_%d-%H_%M_%S"))
     parser.add_argument("--output", "-o", type=Path, default=default, help="a new directory")
     parser.add_argument("--storage", "-s", choices=STORAGES, default="mcap")
     for option, meaning in {"--topics": "default: all", "--exclude": "not these"}.items():
         parser.add_argument(option, nargs="+", type=topic_name, default=[], help=meaning)
-    return parser.parse_args(arguments)
+    return parser.arguments(arguments)
 
 
 def topic_name(name: str) -> str:
@@ -302,8 +303,7 @@ def record(options: Namespace) -> None:
     recorder = BagRecorder(options)
     # Our own handlers: those of rclpy would cut off what has arrived and is not yet recorded, and
     # KeyboardInterrupt, a second one too, might come in the middle of a write.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, recorder.stop)
+    on_end(recorder.stop)
     try:
         recorder.run()
     finally:
@@ -325,8 +325,7 @@ def main() -> None:
     except OSError as error:
         sys.exit(f"record_bag: {error}")
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
+        ignore_end()
         rclpy.try_shutdown()
 
 

@@ -17,6 +17,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.plan import KINDS, Plan, planned
+from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
@@ -52,7 +53,7 @@ class TrajectoryPublisher(ClimberNode):
         super().__init__("trajectory_publisher")
         for kind, prefix in [*KINDS, (Options, "")]:
             self.parameters.declare(kind, prefix)
-        self.parameters.refuse_unknown()
+        self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(Options)
         self.planned = planned(self.parameters.read)
         self.trajectory = self.planned
@@ -72,6 +73,12 @@ class TrajectoryPublisher(ClimberNode):
         self.odometry: Subscription | None = None  # only while a start is waited for
         if self.options.autostart:
             self.wait_for_odometry()
+
+    def summary(self) -> str:
+        """Numbers of the trajectory."""
+        found = summary(self.planned)
+        self.parameters.remarks += found.remarks
+        return f"{self.parameters.read(Plan).shape}, {found}"
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start, or start again from the beginning, at the next odometry."""
@@ -180,4 +187,4 @@ class TrajectoryPublisher(ClimberNode):
 
 def main() -> None:
     """Run the node."""
-    run(lambda: [TrajectoryPublisher()])
+    run(lambda: [TrajectoryPublisher()], __doc__)

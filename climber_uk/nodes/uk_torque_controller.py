@@ -20,7 +20,7 @@ from climber_uk.control.controller import Command
 from climber_uk.control.follower import Answer
 from climber_uk.control.safety import Mode
 from climber_uk.control.settings import KINDS, Choice, new_follower, settings
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.hold import ADHESION, Alarm, Grip, Hold
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading, reading_reference, writing
@@ -52,7 +52,7 @@ class UkTorqueController(ManagedNode):
         parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
         for kind, prefix in [*KINDS, (Options, ""), (Grip, ""), (Alarm, ""), *parts]:
             self.parameters.declare(kind, prefix)
-        self.parameters.refuse_unknown()
+        self.parameters.refuse_unknown("the paper's scenario, up to 20 N m a wheel")
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
         self.hold = self.hold_now()
@@ -77,6 +77,17 @@ class UkTorqueController(ManagedNode):
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
         self.start_diagnostics(self.values, alone_on=("odom", "reference", "wheel_torques"))
         self.start_life()
+
+    def summary(self) -> str:
+        """What is driven, how, and within which limits."""
+        climber, choice = self.parameters.read(Climber), self.parameters.read(Choice)
+        law, adhesion = choice.constraints, choice.adhesion
+        pull = self.hold.adhesion.force(climber)
+        return (
+            f"{climber.mass:g} kg, at most {climber.max_wheel_torque:g} N m a wheel, "
+            f"{adhesion} of {pull:.4g} N, constraints {law}, "
+            f"safe output {self.follower.safety.safe_output}"
+        )
 
     def listen(self) -> list[Subscription]:
         """Start from nothing with the safe output, and listen to all inputs."""
@@ -277,4 +288,4 @@ class UkTorqueController(ManagedNode):
 
 def main() -> None:
     """Run the node."""
-    run(lambda: [UkTorqueController()])
+    run(lambda: [UkTorqueController()], __doc__)

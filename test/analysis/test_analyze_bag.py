@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -224,3 +225,16 @@ def test_help_says_what_the_exit_status_means(command):
     module = f"climber_uk.analysis.{command}"
     said = subprocess.check_output([sys.executable, "-m", module, "--help"], text=True)
     assert "exit status" in said
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_leaves_takes_neither_files_nor_status_away(bags, tmp_path, unbuffered):
+    command = f"{sys.executable} -m climber_uk.analysis.analyze_bag {bags}/first -o {tmp_path}"
+    ran = subprocess.run(
+        ["bash", "-c", f"{command} | true; exit ${{PIPESTATUS[0]}}"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert (tmp_path / "metrics.json").is_file()

@@ -44,7 +44,7 @@ def hold_up_the_recorder(process):
     """Stop it for a while, once the run has begun, as a busy machine may."""
     process.stdout.read(40)
     listed = subprocess.check_output(
-        ["ps", "-o", "pid=,args=", "--ppid", str(process.pid)], text=True
+        ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(process.pid)], text=True
     )
     (recorder,) = [int(line.split()[0]) for line in listed.splitlines() if "record_bag" in line]
     os.kill(recorder, signal.SIGSTOP)
@@ -262,5 +262,5 @@ def test_what_a_demo_cannot_start_with_is_said_in_one_line(world, tmp_path):
     process = demo(world, tmp_path / "run", "nothing.yaml")
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert said.startswith("run_demo: there is no file")
+    assert said.startswith("run_demo: No such file or directory: ")
     assert len(said.splitlines()) == 1

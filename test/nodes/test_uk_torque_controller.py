@@ -192,7 +192,10 @@ def test_a_reference_without_accelerations_is_refused_and_the_last_one_kept(worl
 
 
 def set_parameter(world, name, value):
-    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+    if isinstance(value, int):
+        value = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=value)
+    else:
+        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
     request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
     return world.call(SetParameters, f"{NAME}/set_parameters", request).results[0]
 
@@ -215,6 +218,7 @@ def test_a_reference_that_moves_sideways_is_refused_with_numbers_and_the_last_on
 def test_gains_change_while_running_but_not_geometry_and_not_beyond_bounds(world):
     world.start_node(NAME)
     assert set_parameter(world, "guidance.speed_rate", 20.0).successful
+    assert set_parameter(world, "guidance.speed_rate", 20).successful
     refused = set_parameter(world, "guidance.speed_rate", -1.0)
     assert not refused.successful
     assert "speed_rate" in refused.reason
