@@ -29,6 +29,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.names import Names
 from climber_uk.nodes.driver_graph import is_known, others_commanding
 from climber_uk.nodes.driver_node import DriverNode
+from climber_uk.nodes.transport import use_udp
 
 PATIENCE = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques
@@ -171,6 +172,7 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: caught.append(number))
     try:
+        use_udp()
         options = parse(remove_ros_args(sys.argv)[1:])
         with as_the_controller(sys.argv) as arguments:
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

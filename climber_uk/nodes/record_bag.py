@@ -35,6 +35,7 @@ from rclpy.validate_topic_name import validate_topic_name
 
 from climber_uk.analysis.bag_writer import NEVER, BagWriter
 from climber_uk.analysis.storage import STORAGES, Qos, is_known
+from climber_uk.nodes.transport import use_udp
 
 FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received within this time
 DISCOVERY_PERIOD = 0.2  # [s]
@@ -265,6 +266,7 @@ def record(options: Namespace) -> None:
 def main() -> None:
     """Run the recorder."""
     options = parse(remove_ros_args(sys.argv)[1:])
+    use_udp()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         record(options)

@@ -25,6 +25,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading
 from climber_uk.nodes.running import ClimberNode
+from climber_uk.nodes.transport import use_udp
 
 # One topic of each node that only the recorder subscribes, and does once it has found the node.
 FOUND = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")
@@ -205,6 +206,7 @@ def main() -> None:
         sys.exit(f"run_demo: {options.output} exists already")
     options.output.mkdir(parents=True)
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    use_udp()  # the nodes and the recorder inherit it
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
 
     bag = options.output / "bag"

@@ -23,6 +23,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.messages.names import Names
 from climber_uk.nodes.parameters import Parameters
+from climber_uk.nodes.transport import use_udp
 
 RELIABLE = QoSProfile(depth=10)
 # what is kept for those who are behind: a recorder that the machine held up for half a second
@@ -139,6 +140,7 @@ def run(make_nodes: Callable[[], Sequence[Node]]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: end.set_result(None))
     try:
+        use_udp()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_nodes()
         nodes[0].create_timer(SIGNAL_PERIOD, lambda: None, clock=WALL_CLOCK)
