@@ -29,7 +29,7 @@ setup(
         "cluster": ["distributed"],
         # thousands of closed loops at once, their plants compiled
         "fast": ["numba"],
-        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo"],
+        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo", "coverage"],
     },
     zip_safe=False,
     maintainer="The climber_uk maintainers",

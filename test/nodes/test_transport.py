@@ -71,6 +71,7 @@ def test_those_who_have_shared_memory_hear_a_node_that_has_not(world, published_
 
 
 @pytest.mark.nodes
+@pytest.mark.installed  # and so is the profile
 def test_every_node_leaves_shared_memory_alone_unless_told_to_use_it(world, tmp_path):
     chooses(world, **{RANGE: "LOCALHOST"})
     nodes = {
