@@ -60,7 +60,7 @@ def test_imports_run_downwards(file):
 @pytest.mark.parametrize("file", sorted((PACKAGE / "nodes").glob("*.py")), ids=lambda f: f.stem)
 def test_nodes_do_not_import_nodes(file):
     names = "running", "parameters", "plant_topics", "plant_time", "managed", "margins"
-    names = *names, "plant_parts", "driver_node", "driver_graph"
+    names = *names, "plant_parts", "driver_node", "driver_graph", "transport"
     shared = {f"climber_uk.nodes.{name}" for name in names}
     nodes = {m for m in imported(file) if m.startswith("climber_uk.nodes.")}
     assert {m for m in nodes if m.count(".") == 2} <= shared
