@@ -8,7 +8,7 @@ setup(
     name=package_name,
     version="0.1.0",
     packages=find_packages(include=[package_name, f"{package_name}.*"]),
-    package_data={package_name: ["py.typed"]},
+    package_data={package_name: ["py.typed", "nodes/*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
         (f"share/{package_name}", ["package.xml"]),
@@ -29,7 +29,7 @@ setup(
         "cluster": ["distributed"],
         # thousands of closed loops at once, their plants compiled
         "fast": ["numba"],
-        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo"],
+        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo", "coverage"],
     },
     zip_safe=False,
     maintainer="The climber_uk maintainers",

@@ -354,6 +354,8 @@ def main() -> None:
     # terminal and launch may both send one
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: end.set())
+    # over shared memory a killed process would hold up the odometry
+    os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         driver = Driver(end)

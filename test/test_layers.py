@@ -62,7 +62,7 @@ def test_imports_run_downwards(file):
 def test_nodes_do_not_import_nodes(file):
     names = "running", "parameters", "parameter_files", "plant_topics", "plant_time", "managed"
     names = *names, "margins", "plant_parts", "driver_node", "driver_graph", "parameter_paths"
-    names = *names, "offered_qos"
+    names = *names, "offered_qos", "transport"
     shared = {f"climber_uk.nodes.{name}" for name in names}
     nodes = {m for m in imported(file) if m.startswith("climber_uk.nodes.")}
     assert {m for m in nodes if m.count(".") == 2} <= shared

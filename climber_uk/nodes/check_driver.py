@@ -30,6 +30,7 @@ from climber_uk.nodes.driver_graph import is_known, others_commanding
 from climber_uk.nodes.driver_node import DriverNode
 from climber_uk.nodes.parameter_files import paths
 from climber_uk.nodes.running import in_a_line
+from climber_uk.nodes.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.signals import on_end
 
@@ -194,6 +195,7 @@ def main() -> None:
     caught: list[int] = []
     on_end(lambda number, _: caught.append(number))
     try:
+        use_udp()
         options = parse(remove_ros_args(sys.argv)[1:])
         with as_the_controller(sys.argv) as arguments:
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

@@ -34,6 +34,7 @@ from climber_uk.analysis.bag_writer import NEVER, BagWriter
 from climber_uk.analysis.log_clock import LogClock
 from climber_uk.analysis.storage import STORAGES, is_known
 from climber_uk.nodes.offered_qos import QUEUE_DEPTH, is_compatible, request_for, to_metadata
+from climber_uk.nodes.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.signals import ignore_end, on_end
 
@@ -317,6 +318,7 @@ def record(options: Namespace) -> None:
 def main() -> None:
     """Run the recorder."""
     options = parse(remove_ros_args(sys.argv)[1:])
+    use_udp()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         record(options)

@@ -26,6 +26,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading
 from climber_uk.nodes.running import ClimberNode
+from climber_uk.nodes.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import ignore_end, on_end
@@ -247,6 +248,7 @@ def main() -> None:
     if options.with_parent:
         die_with(os.getppid())
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    use_udp()  # the nodes and the recorder inherit it
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:

@@ -30,6 +30,7 @@ from climber_uk.messages import writing
 from climber_uk.messages.names import Names
 from climber_uk.nodes.parameter_files import ParameterFiles
 from climber_uk.nodes.parameters import QOS, Parameters
+from climber_uk.nodes.transport import use_udp
 from climber_uk.system.signals import ignore_end, on_end
 
 RELIABLE = QoSProfile(depth=10)
@@ -219,6 +220,7 @@ def run(
     try:
         ParameterFiles(sys.argv, "")  # rcl would not say where a file is wrong
         chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})
+        use_udp()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_nodes(**chosen)
         nodes[0].create_timer(SIGNAL_PERIOD, lambda: None, clock=WALL_CLOCK)

@@ -104,7 +104,7 @@ def test_a_bad_torque_is_dropped_with_one_warning(world, kind, said):
 
 
 def test_a_stale_torque_acts_no_more_and_a_new_one_does(world):
-    world.start_node("plant_simulator", "inclination:=0.0")
+    world.start_node("plant_simulator", "inclination:=0.0", "command_timeout:=1.0")
     joints = world.listen(JointState, "joint_states")
     commands = world.speak(JointState, "wheel_torques")
     for _ in range(2):
@@ -117,7 +117,8 @@ def test_a_stale_torque_acts_no_more_and_a_new_one_does(world):
 
 
 def test_torques_beyond_the_limit_are_cut(world):
-    world.start_node("plant_simulator", "inclination:=0.0", "max_wheel_torque:=3.0")
+    patient = "command_timeout:=5.0"
+    world.start_node("plant_simulator", "inclination:=0.0", "max_wheel_torque:=3.0", patient)
     joints = world.listen(JointState, "joint_states")
     commands = world.speak(JointState, "wheel_torques")
     commands.publish(torques(100.0, -100.0))

@@ -36,7 +36,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning"
 
 ROOT = Path(__file__).parents[2]
 STORAGES = ["mcap", "sqlite3"]
-ENVIRONMENT = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_PYTHON_CHECK_FIELDS": "1"}
 TIMEOUT = 30.0  # [s] discovery has a long tail
 # a shell without a terminal lets what it puts into the background ignore SIGINT
 IN_BACKGROUND = ["sh", "-c", 'trap "" INT; exec "$@"', "sh"]
@@ -59,7 +58,7 @@ class Recorder:
         self.bag = directory / "bag"
         self._log = directory / "log"
         command = [sys.executable, "-m", "climber_uk.nodes.record_bag", "--output", str(self.bag)]
-        environment = os.environ | ENVIRONMENT | {"ROS_DOMAIN_ID": str(domain)}
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
         with self._log.open("w") as log:
             self.process = subprocess.Popen(
                 [*through, *command, *options], cwd=ROOT, env=environment, stderr=log
@@ -144,9 +143,7 @@ def wait_for_subscription(*publishers):
 
 
 @pytest.fixture
-def graph(tmp_path, monkeypatch):
-    for name, value in ENVIRONMENT.items():
-        monkeypatch.setenv(name, value)
+def graph(tmp_path):
     graph = Graph(tmp_path)
     yield graph
     graph.close()
@@ -511,7 +508,7 @@ def run_record_bag(*options):
     return subprocess.run(
         command,
         cwd=ROOT,
-        env=os.environ | ENVIRONMENT | {"ROS_DOMAIN_ID": str(new_domain())},
+        env={**os.environ, "ROS_DOMAIN_ID": str(new_domain())},
         capture_output=True,
         text=True,
         timeout=TIMEOUT,
