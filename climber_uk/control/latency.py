@@ -11,7 +11,7 @@ A single disturbance looks like a delay, too, while the observer learns it. So o
 and fro counts. A motor's lag is taken for a delay.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 LONGEST = 0.05  # [s] that is taken for a delay
 FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
@@ -41,8 +41,17 @@ class Oscillation:
         return self.reversals > OSCILLATES
 
 
+class Sample(NamedTuple):
+    """What a period tells, of the drive and of the turn; lengths of a turn are at the wheels."""
+
+    accelerations: tuple[float, float]  # a [m/s²]
+    errors: tuple[float, float]  # ε [m/s]
+    time: float  # [s]
+    slides: bool = True  # whether it moves forwards or back
+
+
 class Latency:
-    """δ of one climber, from the drive and from the turn; lengths of a turn are at the wheels."""
+    """δ of one climber, from its drive and its turn."""
 
     def __init__(self) -> None:
         self.delay = 0.0  # [s]
@@ -59,25 +68,20 @@ class Latency:
         self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
         return self._far_off
 
-    def learn(
-        self,
-        accelerations: tuple[float, float],
-        errors: tuple[float, float],
-        time: float,
-        shares: tuple[Any, Any],
-        told: float = 0.0,
-    ) -> None:
-        """Take in accelerations a [m/s²] and errors ε [m/s] after `time` [s].
+    def learn(self, sample: Sample, shares: tuple[Any, Any], told: float = 0.0) -> None:
+        """Take in a period; `shares` are those of the observer.
 
-        `shares` are those of the observer; a delay that is `told` [s] may be too long.
+        A delay that is `told` [s] may be too long: what is learnt may be as much less than 0.
         """
+        accelerations, errors, time, slides = sample
         new, newer = shares
         left = max(0.0, 1.0 - time / MEMORY)
         product, square = 0.0, 0.0
         for i in (0, 1):
             slope, rate = self._slopes[i]
             phi = accelerations[i] - self._before[i] - time * slope
-            if self.oscillations[i].add(accelerations[i], left):
+            # at rest friction goes to and fro, and holds
+            if (slides or i == 1) and self.oscillations[i].add(accelerations[i], left):
                 product += errors[i] * phi
                 square += phi * phi
             self._slopes[i] = slope + time * rate + new * phi / time, rate + newer * phi / time**2

@@ -11,8 +11,8 @@ from typing import Any
 from climber_uk.control.acting import NONE, Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
-from climber_uk.control.latency import Latency
-from climber_uk.control.model import Learnt, Observer, rolled
+from climber_uk.control.latency import Latency, Sample
+from climber_uk.control.model import SLOW, Learnt, Observer, rolled
 from climber_uk.control.pacing import IN_TIME, Pacing
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
@@ -216,17 +216,17 @@ class Tracker:
 
     def _learn_delay(self, stamp: int, expected: Motion, found: Motion, time: float) -> None:
         """Learn how much later than told torques act, from the `time` [s] that is over."""
-        assert self.motion is not None
         climber = self.controller.climber
         drive, turn = forces(climber, *self._acting.between(self.stamp, stamp)[-1][0])
         lever = climber.half_track
-        self.latency.learn(
+        sample = Sample(
             (drive / climber.mass, lever * turn / climber.yaw_inertia),
             (found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)),
             time,
-            self.observer.shares(time, self._delay),
-            self.timing.transport_delay,
+            abs(found.speed) > SLOW,
         )
+        shares = self.observer.shares(time, self._delay)
+        self.latency.learn(sample, shares, self.timing.transport_delay)
 
     def _constraints(self) -> ConstraintSet:
         """Constraints as they are now, on their way from the gains that were before."""
