@@ -20,6 +20,7 @@ MEMORY = 1.0  # T_f [s]
 LEAST = 0.1  # S₀ [m²/s²] of changes of acceleration
 SWING = 0.3  # [m/s²] by which an acceleration has to go back to count as a reversal
 OSCILLATES = 4.0  # reversals in the memory
+STEADY: tuple[tuple[float, float], ...] = (0.0, 0.0), (0.0, 0.0)
 
 
 class Oscillation:
@@ -60,7 +61,7 @@ class Latency:
         self._energy = 0.0  # S
         self._before = 0.0, 0.0  # [m/s²]
         # ∂/∂δ of the observer's disturbance, as accelerations, and of its rates
-        self._slopes = [(0.0, 0.0), (0.0, 0.0)]
+        self._slopes = STEADY
 
     @property
     def is_far_off(self) -> bool:
@@ -73,20 +74,29 @@ class Latency:
 
         A delay that is `told` [s] may be too long: what is learnt may be as much less than 0.
         """
-        accelerations, errors, time, slides = sample
-        new, newer = shares
+        accelerations, _, time, slides = sample
+        drive, turn = self.oscillations
         left = max(0.0, 1.0 - time / MEMORY)
-        product, square = 0.0, 0.0
-        for i in (0, 1):
-            slope, rate = self._slopes[i]
-            phi = accelerations[i] - self._before[i] - time * slope
-            # at rest friction goes to and fro, and holds
-            if (slides or i == 1) and self.oscillations[i].add(accelerations[i], left):
-                product += errors[i] * phi
-                square += phi * phi
-            self._slopes[i] = slope + time * rate + new * phi / time, rate + newer * phi / time**2
+        # at rest friction goes to and fro, and holds
+        drives = slides and drive.add(accelerations[0], left)
+        turns = turn.add(accelerations[1], left)
+        self._energy *= left
+        if drives or turns:
+            self._learn(sample, (drives, turns), shares, told)
+        else:
+            self._slopes = STEADY
         self._before = accelerations
-        self._energy = self._energy * left + square
+
+    def _learn(
+        self, sample: Sample, oscillates: tuple[bool, bool], shares: tuple[Any, Any], told: float
+    ) -> None:
+        (new, newer), time, product, slopes = shares, sample.time, 0.0, []
+        for i, (slope, rate) in enumerate(self._slopes):
+            phi = sample.accelerations[i] - self._before[i] - time * slope
+            product += sample.errors[i] * phi * oscillates[i]
+            self._energy += phi * phi * oscillates[i]
+            slopes.append((slope + time * rate + new * phi / time, rate + newer * phi / time**2))
+        self._slopes = tuple(slopes)
         most = FASTEST * time
         change = min(max(-product / (self._energy + LEAST), -most), most)
         self.delay = min(max(self.delay + change, -told), LONGEST)
