@@ -73,7 +73,9 @@ def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
     run, tracker = drive(Link(delay=delay), duration=15.0)
     assert run.rms() < 5e-3
     assert run.chatter(10.0) < 0.05
-    assert delay - 0.021 < tracker.latency.delay < 1.3 * delay  # what is beyond the margin, at least
+    assert (
+        delay - 0.021 < tracker.latency.delay < 1.3 * delay
+    )  # what is beyond the margin, at least
     lost, _ = drive(Link(delay=delay), learn_delay=False)
     assert lost.chatter(4.0) > 0.5
 
