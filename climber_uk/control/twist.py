@@ -35,7 +35,6 @@ def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
     x, y, heading, cosine, sine, _, _ = before
     turned = now.heading - heading
     ahead = ((now.x - x) * (cosine + now.cosine) + (now.y - y) * (sine + now.sine)) / 2
-    arc = (
-        1 + turned * turned / 6
-    )  # by what it is longer than the way along the mean of the headings
-    return ahead * arc / time, turned / time
+    # halfway (cosine, sine) is longer by 1 / cos(turned / 2) than the mean of those at the ends
+    ahead = ahead * (1 + turned * turned / 8)
+    return ahead / time, turned / time
