@@ -11,7 +11,7 @@ A single disturbance looks like a delay, too, while the observer learns it. So o
 and fro counts. A motor's lag is taken for a delay.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 LONGEST = 0.05  # [s] that is taken for a delay
 FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
@@ -20,6 +20,7 @@ MEMORY = 1.0  # T_f [s]
 LEAST = 0.1  # S₀ [m²/s²] of changes of acceleration
 SWING = 0.3  # [m/s²] by which an acceleration has to go back to count as a reversal
 OSCILLATES = 4.0  # reversals in the memory
+STEADY: tuple[tuple[float, float], ...] = (0.0, 0.0), (0.0, 0.0)
 
 
 class Oscillation:
@@ -41,8 +42,17 @@ class Oscillation:
         return self.reversals > OSCILLATES
 
 
+class Sample(NamedTuple):
+    """What a period tells, of the drive and of the turn; lengths of a turn are at the wheels."""
+
+    accelerations: tuple[float, float]  # a [m/s²]
+    errors: tuple[float, float]  # ε [m/s]
+    time: float  # [s]
+    slides: bool = True  # whether it moves forwards or back
+
+
 class Latency:
-    """δ of one climber, from the drive and from the turn; lengths of a turn are at the wheels."""
+    """δ of one climber, from its drive and its turn."""
 
     def __init__(self) -> None:
         self.delay = 0.0  # [s]
@@ -51,7 +61,7 @@ class Latency:
         self._energy = 0.0  # S
         self._before = 0.0, 0.0  # [m/s²]
         # ∂/∂δ of the observer's disturbance, as accelerations, and of its rates
-        self._slopes = [(0.0, 0.0), (0.0, 0.0)]
+        self._slopes = STEADY
 
     @property
     def is_far_off(self) -> bool:
@@ -59,30 +69,34 @@ class Latency:
         self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
         return self._far_off
 
-    def learn(
-        self,
-        accelerations: tuple[float, float],
-        errors: tuple[float, float],
-        time: float,
-        shares: tuple[Any, Any],
-        told: float = 0.0,
-    ) -> None:
-        """Take in accelerations a [m/s²] and errors ε [m/s] after `time` [s].
+    def learn(self, sample: Sample, shares: tuple[Any, Any], told: float = 0.0) -> None:
+        """Take in a period; `shares` are those of the observer.
 
-        `shares` are those of the observer; a delay that is `told` [s] may be too long.
+        A delay that is `told` [s] may be too long: what is learnt may be as much less than 0.
         """
-        new, newer = shares
+        accelerations, _, time, slides = sample
+        drive, turn = self.oscillations
         left = max(0.0, 1.0 - time / MEMORY)
-        product, square = 0.0, 0.0
-        for i in (0, 1):
-            slope, rate = self._slopes[i]
-            phi = accelerations[i] - self._before[i] - time * slope
-            if self.oscillations[i].add(accelerations[i], left):
-                product += errors[i] * phi
-                square += phi * phi
-            self._slopes[i] = slope + time * rate + new * phi / time, rate + newer * phi / time**2
+        # at rest friction goes to and fro, and holds
+        drives = slides and drive.add(accelerations[0], left)
+        turns = turn.add(accelerations[1], left)
+        self._energy *= left
+        if drives or turns:
+            self._learn(sample, (drives, turns), shares, told)
+        else:
+            self._slopes = STEADY
         self._before = accelerations
-        self._energy = self._energy * left + square
+
+    def _learn(
+        self, sample: Sample, oscillates: tuple[bool, bool], shares: tuple[Any, Any], told: float
+    ) -> None:
+        (new, newer), time, product, slopes = shares, sample.time, 0.0, []
+        for i, (slope, rate) in enumerate(self._slopes):
+            phi = sample.accelerations[i] - self._before[i] - time * slope
+            product += sample.errors[i] * phi * oscillates[i]
+            self._energy += phi * phi * oscillates[i]
+            slopes.append((slope + time * rate + new * phi / time, rate + newer * phi / time**2))
+        self._slopes = tuple(slopes)
         most = FASTEST * time
         change = min(max(-product / (self._energy + LEAST), -most), most)
         self.delay = min(max(self.delay + change, -told), LONGEST)

@@ -104,11 +104,11 @@ class Observer:
         expected: Motion,
         found: Motion,
         time: float,
-        delay: float = 0.0,
+        shares: tuple[Any, Any],
     ) -> tuple[Motion, Learnt]:
         """Motion and disturbance after `time` [s] in which `expected` became `found`.
 
-        `delay` [s] is that of torques.
+        `shares` are those of the observer for that time.
         """
         if self.velocity_source == "pose":
             return self._from_pose(climber, learnt, expected, found, time)
@@ -116,7 +116,7 @@ class Observer:
             return found, _faded(learnt, time)
         drive, turn, drive_rate, turn_rate = learnt
         mass, inertia, _, _ = climber.inertial
-        new, newer = self.shares(time, delay)
+        new, newer = shares
         faster = (found.speed - expected.speed) / time
         turning = (found.yaw_rate - expected.yaw_rate) / time
         drive, turn = drive + time * drive_rate, turn + time * turn_rate
@@ -130,7 +130,7 @@ class Observer:
     def shares(self, time: float, delay: float) -> tuple[Any, Any]:
         """What of an acceleration that was not expected is put down to the disturbance.
 
-        Of the disturbance, and of its change in `time` [s].
+        And what of it to the disturbance's change in `time` [s]; `delay` [s] is that of torques.
         """
         most = MOST_LEARNT * time / (2.0 * time + delay)
         new = 1.0 - exp(-clipped(self.bandwidth * time, 0.0, most))

@@ -11,8 +11,8 @@ from typing import Any
 from climber_uk.control.acting import NONE, Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
-from climber_uk.control.latency import Latency
-from climber_uk.control.model import Learnt, Observer, rolled
+from climber_uk.control.latency import Latency, Sample
+from climber_uk.control.model import SLOW, Learnt, Observer, rolled
 from climber_uk.control.pacing import Pacing, Progress
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
@@ -128,12 +128,13 @@ class Tracker:
             self._period_is_measured = True
             expected = expected or self.expected_at(stamp)
             is_known = self._acting.are_known_since(self.stamp)
+            shares = self.observer.shares(time, self._delay)
             if self.observer.velocity_source == "odometry" and isinstance(motion.x, float):
                 motion = self._at_its_stamp(expected, motion, time)
                 if self.timing.learn_delay and is_known:
-                    self._learn_delay(stamp, expected, motion, time)
+                    self._learn_delay(stamp, expected, motion, shares)
             motion, learnt = self.observer.corrected(
-                self.controller.climber, self.learnt, expected, motion, time, self._delay
+                self.controller.climber, self.learnt, expected, motion, time, shares
             )
             if is_known:
                 is_learnt = self._learning
@@ -209,13 +210,13 @@ class Tracker:
     def expected_at(self, stamp: int) -> Motion:
         """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.motion is not None
-        motion, climber, disturbance = self.motion, self.controller.climber, self.disturbance
+        motion, climber = self.motion, self.controller.climber
+        r_drive, r_turn, _, _ = self.learnt
         if stamp == self.stamp:
             return motion
         for torques, time in self._acting.between(self.stamp, stamp):
             drive, turn = forces(climber, *torques)
-            drive, turn = drive + disturbance.drive, turn + disturbance.turn
-            motion = rolled(climber, motion, drive, turn, time)
+            motion = rolled(climber, motion, drive + r_drive, turn + r_turn, time)
         return motion
 
     def _at_its_stamp(self, expected: Motion, found: Motion, time: float) -> Motion:
@@ -233,19 +234,18 @@ class Tracker:
             yaw_rate=found.yaw_rate + expected.yaw_rate - rate,
         )
 
-    def _learn_delay(self, stamp: int, expected: Motion, found: Motion, time: float) -> None:
-        """Learn how much later than told torques act, from the `time` [s] that is over."""
-        assert self.motion is not None
+    def _learn_delay(
+        self, stamp: int, expected: Motion, found: Motion, shares: tuple[Any, Any]
+    ) -> None:
+        """Learn how much later than told torques act; `shares` are the observer's."""
         climber = self.controller.climber
         drive, turn = forces(climber, *self._acting.between(self.stamp, stamp)[-1][0])
         lever = climber.half_track
-        self.latency.learn(
-            (drive / climber.mass, lever * turn / climber.yaw_inertia),
-            (found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)),
-            time,
-            self.observer.shares(time, self._delay),
-            self.timing.transport_delay,
-        )
+        accelerations = drive / climber.mass, lever * turn / climber.yaw_inertia
+        errors = found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)
+        time, slides = (stamp - self.stamp) / SECOND, abs(found.speed) > SLOW
+        sample = named(Sample, (accelerations, errors, time, slides))
+        self.latency.learn(sample, shares, self.timing.transport_delay)
 
     def _constraints(self) -> ConstraintSet:
         """Constraints as they are now, on their way from the gains that were before."""

@@ -5,8 +5,6 @@ only together with the one before: (v + v₀)/2. What fits the poses better is t
 the twist is that of its stamp.
 """
 
-import math
-
 from climber_uk.mechanics.motion import Motion
 
 MEMORY = 1.0  # [s]
@@ -34,7 +32,9 @@ class TwistKind:
 
 def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
     """Forward speed [m/s] and yaw rate [rad/s] that lead from one pose to another in `time` [s]."""
-    turned = now.heading - before.heading
-    middle = before.heading + turned / 2
-    ahead = (now.x - before.x) * math.cos(middle) + (now.y - before.y) * math.sin(middle)
+    x, y, heading, cosine, sine, _, _ = before
+    turned = now.heading - heading
+    ahead = ((now.x - x) * (cosine + now.cosine) + (now.y - y) * (sine + now.sine)) / 2
+    # halfway (cosine, sine) is longer by 1 / cos(turned / 2) than the mean of those at the ends
+    ahead = ahead * (1 + turned * turned / 8)
     return ahead / time, turned / time

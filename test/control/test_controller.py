@@ -99,8 +99,8 @@ def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
     for wheels in controller.command(of, PAPER.at(0.0).target).wheels, controller.holding(of, 5.0):
         bounds = climber.torque_bounds(at)
         for torque, before, (low, high) in zip(wheels, held, bounds, strict=True):
-            assert (np.abs(torque) <= limit).all()
-            assert ((low <= torque) & (torque <= high)).all()
+            assert np.all(np.abs(torque) <= limit)
+            assert np.all((low <= torque) & (torque <= high))
             if rate > 0:  # where the motor can hold what it held
                 nearest = np.clip(before, low, high)
                 assert np.all(np.abs(torque - nearest) <= rate * PERIOD * (1 + 1e-12) + 1e-14)

@@ -10,7 +10,7 @@ from climber_uk.analysis.identification_experiments import SCENARIOS
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
-from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation
+from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
@@ -73,7 +73,9 @@ def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
     run, tracker = drive(Link(delay=delay), duration=15.0)
     assert run.rms() < 5e-3
     assert run.chatter(10.0) < 0.05
-    assert 0.5 * delay < tracker.latency.delay < 1.3 * delay
+    assert (
+        delay - 0.021 < tracker.latency.delay < 1.3 * delay
+    )  # what is beyond the margin, at least
     lost, _ = drive(Link(delay=delay), learn_delay=False)
     assert lost.chatter(4.0) > 0.5
 
@@ -110,7 +112,7 @@ def test_a_delay_is_found_from_a_swing_and_changes_no_faster_than_it_may():
     for step in range(2000):
         now, before = (np.sin(20 * (step - late) * time) for late in (0, 1))
         error = -(delay - latency.delay) * (now - before)
-        latency.learn((float(now), 0.0), (float(error), 0.0), time, (0.0, 0.0))
+        latency.learn(Sample((float(now), 0.0), (float(error), 0.0), time), (0.0, 0.0))
         delays.append(latency.delay)
     assert delays[-1] == pytest.approx(delay, rel=0.01)
     assert np.abs(np.diff(delays)).max() <= FASTEST * time * (1 + 1e-9)
@@ -121,6 +123,7 @@ def test_a_delay_stays_within_its_bounds():
         latency = Latency()
         for step in range(2000):
             swing = (-1.0) ** step
-            latency.learn((swing, swing), (-sign * swing, -sign * swing), 0.005, (0.0, 0.0), 0.01)
+            sample = Sample((swing, swing), (-sign * swing, -sign * swing), 0.005)
+            latency.learn(sample, (0.0, 0.0), told=0.01)
         assert latency.delay == (LONGEST if sign > 0 else -0.01)
         assert latency.is_far_off is (sign > 0)

@@ -47,7 +47,8 @@ def learn(observer, true, believed, state, wheels, learnt=NOTHING, steps=200, h=
     for _ in range(steps):
         expected = after(believed, seen, wheels, learnt, h)
         state = plant.advance(state, np.array(wheels), steps=2)
-        seen, learnt = observer.corrected(believed, learnt, expected, state.motion, h)
+        shares = observer.shares(h, delay=0.0)
+        seen, learnt = observer.corrected(believed, learnt, expected, state.motion, h, shares)
     return state, seen, learnt
 
 
