@@ -7,9 +7,11 @@ import pytest
 
 from climber_uk.analysis.closed_loop import Link, simulate
 from climber_uk.analysis.identification_experiments import SCENARIOS
+from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
+from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
@@ -23,7 +25,8 @@ ENCODERS = Link(encoder_counts=4096, delay=0.005, torque_lag=0.005)
 def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, **timing):
     """Run of climber.yaml's climber, and the controller after it."""
     controller = Controller(BUILT.believed, guidance, Law())
-    follower = Follower(Tracker(controller, Observer(), Timing(**timing), Pacing()), Safety())
+    tracker = Tracker(controller, Observer(), Timing(**timing), Pacing())
+    follower = Follower(tracker, Safety(), ANYWHERE, UNGUARDED)
     run = simulate(BUILT.trajectory, BUILT.start, duration, follower, climber, link)
     assert follower.mode is Mode.FOLLOWING
     return run, follower.tracker
