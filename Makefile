@@ -13,10 +13,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 
-.PHONY: demo paper campaign docs bench test lint unit soak colcon clean
+.PHONY: demo paper campaign docs bench test lint unit coverage soak colcon clean
 
 demo: $(SET_UP)
-	@$(BIN)/run_demo --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
+	@exec $(BIN)/run_demo --with-parent --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
 		$(if $(CLIMBERS),--climbers $(CLIMBERS))
 	@$(BIN)/analyze_bag $(OUTPUT)/bag --params $(CONFIG) --output $(OUTPUT)
 
@@ -47,16 +47,24 @@ lint: $(SET_UP)
 	$(BIN)/ruff check
 	$(BIN)/mypy
 
+# Each file's tests in one process, two files at a time; nodes have a ROS domain for each test
+TESTS := -m pytest --numprocesses 2 --dist loadfile
+
 unit: $(SET_UP)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not (nodes or soak)"
-	$(BIN)/python -m pytest -m "nodes and not soak"
+	$(BIN)/python $(TESTS)
+
+# Which lines of the package the same tests go through, in all processes that they start
+coverage: $(SET_UP)
+	rm -f .coverage .coverage.*
+	$(BIN)/coverage run $(TESTS)
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report --sort cover --fail-under 95
 
 # Longer tests than CI has time for
 soak: $(SET_UP)
 	$(BIN)/python -m pytest -m soak
 
-# As in a ROS workspace: both ways to build, without a warning, and the tests of the mathematics and
-# of what was installed
+# As in a ROS workspace: both ways to build, without a warning, and the tests of what was installed
 colcon: $(SET_UP)
 	rm -rf build install log
 	. $(BIN)/activate && for how in "--symlink-install" ""; do rm -rf build install log && \
@@ -65,7 +73,7 @@ colcon: $(SET_UP)
 		|| exit 1; done
 	. $(BIN)/activate && . install/setup.sh && colcon test --packages-select climber_uk \
 		--event-handlers console_cohesion+ --return-code-on-test-failure \
-		--pytest-args -n 2 --dist loadfile -m "installed or not (nodes or slow or soak)"
+		--pytest-args -m installed
 	. $(BIN)/activate && colcon test-result --all
 	rm -rf build install log
 

@@ -8,7 +8,7 @@ setup(
     name=package_name,
     version="0.1.0",
     packages=find_packages(include=[package_name, f"{package_name}.*"]),
-    package_data={package_name: ["py.typed"]},
+    package_data={package_name: ["py.typed", "nodes/*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{package_name}"]),
         (f"share/{package_name}", ["package.xml"]),
@@ -23,13 +23,13 @@ setup(
         # rclpy and the messages, where no ROS installation brings them
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],
         # bags and figures; never needed by the three nodes
-        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard"],
+        "analysis": ["rosbags>=0.11", "mcap>=1.6", "matplotlib", "tqdm", "zstandard", "lz4"],
         # campaigns of many runs, and to have them run on a Dask cluster
         "campaign": ["pyarrow", "matplotlib", "tqdm"],
         "cluster": ["distributed"],
         # thousands of closed loops at once, their plants compiled
         "fast": ["numba"],
-        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo"],
+        "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo", "coverage"],
     },
     zip_safe=False,
     maintainer="The climber_uk maintainers",

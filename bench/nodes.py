@@ -37,7 +37,9 @@ import rclpy.lifecycle, diagnostic_msgs.msg, geometry_msgs.msg, nav_msgs.msg, ro
 import sensor_msgs.msg, std_msgs.msg, std_srvs.srv, trajectory_msgs.msg
 others = time.time()
 from climber_uk.nodes.{module} import {name}
+from climber_uk.nodes.transport import use_udp
 ours = time.time()
+use_udp()
 rclpy.init(args=["--ros-args", "--params-file", sys.argv[1]])
 {name}()
 print(others, ours, time.time())
@@ -59,7 +61,7 @@ def at_rate(rate: int, directory: Path) -> Path:
 def used(process: int) -> dict[str, float]:
     """CPU time [s] of each child of a process so far, by its executable's name."""
     listed = subprocess.run(
-        ["ps", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True
+        ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True
     ).stdout
     times = {}
     for line in listed.splitlines():

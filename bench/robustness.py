@@ -6,6 +6,7 @@ Lock-step at 200 Hz, controller and plant in one process: the classes that the n
 import argparse
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from rivals import AdaptiveGains, AdaptiveRobust, Kanayama, KanayamaGains
@@ -14,9 +15,11 @@ from scipy.spatial import cKDTree
 
 from climber_uk.analysis.closed_loop import Controlling, Link, Run, as_commanded, simulate
 from climber_uk.analysis.identification_experiments import SCENARIOS
+from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import ConstraintSet, Exact, Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
+from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
@@ -50,7 +53,7 @@ def ours(
     """The controller as the node runs it."""
     controller = Controller(climber, gains, Law())
     timing = Timing(transport_delay=delay)
-    return Follower(tracker(controller, observer, timing, Pacing()), Safety())
+    return Follower(tracker(controller, observer, timing, Pacing()), Safety(), ANYWHERE, UNGUARDED)
 
 
 def without_observer(
@@ -218,6 +221,25 @@ def interrupted(make: Make, duration: float = 20.0) -> tuple[float, int]:
     return run.rms() / MILLIMETRE, stops
 
 
+def untold(make: Make, link: Link, gains: Guidance = SLOW_GUIDANCE) -> tuple[float, float]:
+    """RMS [mm], and RMS change of a torque in a tick [N m], of what nobody told the controller."""
+    run = run_of(EIGHT, AT_REST, 57.0, make(BUILT, gains), BUILT, link)
+    return run.rms() / MILLIMETRE, run.chatter()
+
+
+def links() -> dict[str, Link]:
+    """Delays and lags as robots have them."""
+    encoders = Link(encoder_counts=4096, delay=0.005, torque_lag=0.005)
+    return {
+        "a delay of 20 ms": Link(delay=0.02),
+        "a lag of 35 ms": Link(torque_lag=0.035),
+        **{
+            f"encoders at {1 / period:.0f} Hz, 5 + 5 ms": replace(encoders, period=period)
+            for period in (0.005, 0.01, 0.02, 0.05)
+        },
+    }
+
+
 ROWS: dict[str, tuple[str, Callable[[Make], object]]] = {
     "paper's ellipse": ("mm", lap),
     "seal friction ±50 %, after 2 s": ("mm", friction),
@@ -231,6 +253,11 @@ ROWS: dict[str, tuple[str, Callable[[Make], object]]] = {
     "30 % lost, 20 ms jitter": ("mm, stops", interrupted),
     "100 starts: last time off, turned": ("s, deg", from_anywhere),
     "limit at 70 %: off, lag, overshoot": ("m", too_weak),
+    **{
+        f"{name}, {whose}": ("mm, N m", partial(untold, link=link, gains=gains))
+        for whose, gains in (("climber.yaml", SLOW_GUIDANCE), ("default gains", GUIDANCE))
+        for name, link in links().items()
+    },
 }
 
 
@@ -308,10 +335,10 @@ def main() -> None:
     if options.tune:
         tune(options.tune)
         return
-    print(f"{'':<36}{'':<10}" + "".join(f"{name:>22}" for name in KINDS))
+    print(f"{'':<46}{'':<10}" + "".join(f"{name:>22}" for name in KINDS))
     for name, (unit, row) in ROWS.items():
         if options.only in name:
-            print(f"{name:<36}{unit:<10}", end="", flush=True)
+            print(f"{name:<46}{unit:<10}", end="", flush=True)
             for make in KINDS.values():
                 print(f"{said(row(make)):>22}", end="", flush=True)
             print()

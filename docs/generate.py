@@ -31,6 +31,8 @@ EVERY_NODE = ("/rosout", "/parameter_events", "_type_description", "_parameters"
 
 CONTENTS = {
     "odom": "pose in `odom`, twist in `base_link`: forward, to the left (0), about z",
+    "reference_time": "where on the reference the climber is (`time_ref`) at an odometry's stamp; "
+    "`source`: the controller's mode",
     "reference": "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
     "reference_path": "the whole path, for display",

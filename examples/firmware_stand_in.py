@@ -31,6 +31,7 @@ from climber_uk.messages import writing
 from climber_uk.nodes import plant_parts
 from climber_uk.nodes.plant_time import ASK_AGAIN, TICK
 from climber_uk.nodes.running import ClimberNode, Rhythm
+from climber_uk.nodes.transport import use_udp
 from climber_uk.simulation.inputs import FellOff
 from climber_uk.simulation.machine import Machine
 from climber_uk.simulation.options import Options
@@ -156,11 +157,12 @@ class FirmwareStandIn(ClimberNode):
 
 
 def main() -> None:
-    """Run the board until SIGINT or SIGTERM."""
+    """Run the board until a signal to end."""
     end = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: end.set())
     try:
+        use_udp()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         FirmwareStandIn().run(end)
     except (ValueError, OSError, RCLError) as error:

@@ -139,14 +139,20 @@ def difference(later: float, earlier: float) -> float:
 
 
 class BoardClock:
-    """Turns the board's time into ROS time: the frame that was least late tells the offset."""
+    """Turns the board's time into ROS time: the frame that was least late tells the offset.
+
+    A frame may be late, but not all of them: where they are, the computer's clock was set forward.
+    """
 
     DRIFT = 1e-4  # of a quartz
     JUMP = SECOND  # [ns] by which only a clock that was set, or a new start, changes the offset
+    LATE = SECOND // 100  # [ns] by which a frame is later than the line explains
+    PATIENCE = SECOND // 4  # [ns] for which all of them may be
 
     def __init__(self, simulated: bool) -> None:
         self.simulated = simulated  # then the board's time is ROS time
         self.last, self.time, self.offset = 0, 0, 0  # [µs], [ns] without overflow, [ns]
+        self.punctual, self.least = 0, 0  # [ns] last time that one was, least offset after it
 
     def stamp(self, time: int, now: int) -> int:
         """ROS time [ns] at which the board's was `time` [µs]; it is `now` [ns] by now."""
@@ -155,7 +161,13 @@ class BoardClock:
         if self.simulated:
             return self.time
         offset = now - self.time
-        if abs(offset - self.offset) < self.JUMP:
+        if offset - self.offset < self.LATE:
+            self.punctual, self.least = self.time, offset + self.JUMP
+        else:
+            self.least = min(self.least, offset)
+        if self.time - self.punctual > self.PATIENCE:
+            offset, self.punctual = self.least, self.time
+        elif abs(offset - self.offset) < self.JUMP:
             offset = min(offset, self.offset + round(self.DRIFT * passed))
         self.offset = offset
         return self.time + offset
@@ -337,10 +349,13 @@ class Driver(Node):
 
 
 def main() -> None:
-    """Run the driver until SIGINT, SIGTERM, or the loss of the board."""
+    """Run the driver until a signal to end, or the loss of the board."""
     end = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):  # terminal and launch may both send one
+    # terminal and launch may both send one
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: end.set())
+    # over shared memory a killed process would hold up the odometry
+    os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         driver = Driver(end)

@@ -12,3 +12,15 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 with suppress(ImportError):
     import rclpy  # noqa: F401
+
+    from climber_uk.nodes.transport import use_udp
+
+    use_udp()
+
+from hypothesis import HealthCheck, settings
+
+# how long an example takes is the machine's matter
+settings.register_profile(
+    "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("any machine")

@@ -10,7 +10,7 @@ def main() -> None:
     """Print the table of a bag, and write its page, CSV and JSON."""
     parser = reporting.parser("analyze_bag", __doc__)
     parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
-    options = parser.parse_args()
+    options = parser.arguments()
     title = f"Run {'/'.join(options.bag.absolute().parts[-2:])}"
     sys.exit(reporting.report("analyze_bag", title, [options.bag], options))
 

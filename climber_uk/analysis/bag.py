@@ -1,25 +1,28 @@
-"""Read rosbag2 directories, damaged ones and those of killed recorders included, without ROS."""
+"""Read rosbag2 directories, damaged and hostile ones and those of killed recorders included.
+
+Nothing is written but copies in a temporary directory, and nothing is believed: see the readers of
+the two kinds of files.
+"""
 
 from collections.abc import Collection, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from heapq import merge
 from itertools import chain, pairwise
+from operator import attrgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import yaml
-import zstandard
-from rosbags.interfaces import Connection, MessageDefinitionFormat
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from climber_uk.analysis.mending import MENDERS, is_torn
-from climber_uk.analysis.storage import TYPESTORE
+from climber_uk.analysis.bag_files import open_file, other_files, storage_files
+from climber_uk.analysis.connection import Connection, Logged, StorageFile, one_line
+from climber_uk.analysis.definitions import LONGEST, defined, known
+from climber_uk.analysis.unpacking import LARGEST_MESSAGE, ZSTD_MAGIC, Allowance, unpack
 
-ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # with which no serialised message begins
+MOST_LOSSES = 20  # that are told
+MOST_DEFINITIONS = 4  # of the longest that are read
 
 
 @dataclass
@@ -27,16 +30,17 @@ class Bag:
     """An open bag: its topics, its messages, and what of it could not be read."""
 
     path: Path
-    readers: list[Reader]
+    files: list[StorageFile]
     losses: list[str] = field(default_factory=list)  # in words, more while messages are read
 
     def __post_init__(self) -> None:
         self._stores: dict[str, Typestore | None] = {}
+        self._defined = 0
 
     @property
     def connections(self) -> list[Connection]:
         """Topic, type and number of messages, of each topic in each file."""
-        return [connection for reader in self.readers for connection in reader.connections]
+        return [connection for file in self.files for connection in file.connections]
 
     @property
     def types(self) -> dict[str, str]:
@@ -47,77 +51,116 @@ class Bag:
         """Return how many messages of some topics there should be."""
         return sum(c.msgcount for c in self.connections if c.topic in topics)
 
-    def raw_messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, bytes]]:
-        """Yield connection, log time [ns] and serialised message in the order of the log times."""
-        parts = [self._of(reader, topics) for reader in self.readers]
-        ends = [(reader.start_time, reader.end_time) for reader in self.readers]
+    def recorded(self, topics: Collection[str]) -> Iterator[Logged]:
+        """Yield the serialised messages of some topics in the order of the log times."""
+        parts = [self._of(file, topics) for file in self.files]
+        ends = [(file.start, file.end) for file in self.files]
         is_split = all(end <= start for (_, end), (start, _) in pairwise(ends))
         yield from chain(*parts) if is_split else merge(*parts, key=lambda message: message[1])
 
-    def messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, Any]]:
-        """Yield the same with deserialised messages."""
-        for connection, log_time, data in self.raw_messages(topics):
+    def raw_messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, bytes]]:
+        """Yield connection, log time [ns] and serialised message in the order of the log times."""
+        for connection, log_time, _, data in self.recorded(topics):
+            yield connection, log_time, data
+
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, int, Any]]:
+        """Yield connection, log time, publishing time (0: not told) [ns] and message."""
+        for connection, log_time, publish_time, data in self.recorded(topics):
             store = self.store(connection)
             assert store is not None
             try:
                 message = store.deserialize_cdr(data, connection.msgtype)
-            except Exception as error:  # as below
-                self.lose(f"{connection.topic}: a message cannot be read ({_line(error)})")
+            except Exception as error:  # there is no telling what damaged bytes do to it
+                self.lose_message(connection.topic, _said(error))
                 continue
-            yield connection, log_time, message
+            yield connection, log_time, publish_time, message
 
     def lose(self, what: str) -> None:
         """Note something that could not be read, once."""
-        if what not in self.losses:
-            self.losses.append(what)
+        tell_loss(self.losses, what)
+
+    def lose_message(self, topic: str, why: str) -> None:
+        """Note that a message could not be read, once by topic."""
+        said = f"{topic}: a message cannot be read"
+        if not any(loss.startswith(said) for loss in self.losses):
+            self.lose(f"{said} ({why})")
 
     def store(self, connection: Connection) -> Typestore | None:
         """Definition of a topic's type, as the bag gives it or as Jazzy has it; None if unknown."""
         name = connection.msgtype
         if name not in self._stores:
-            self._stores[name] = _store(connection)
+            self._stores[name] = self._read_definition(connection)
             if self._stores[name] is None:
                 self.lose(f"{connection.topic}: type {name} is unknown")
         return self._stores[name]
 
-    def _of(self, reader: Reader, topics: Collection[str]) -> Iterator[Any]:
-        wanted = [c for c in reader.connections if c.topic in topics and self.store(c)]
-        if not wanted:
-            return  # to rosbags, none means all
+    def _read_definition(self, connection: Connection) -> Typestore | None:
+        name, definition = connection.msgtype, connection.definition
+        if not definition:
+            return known(name)
+        self._defined += len(definition)
         try:
-            for connection, log_time, data in reader.messages(wanted):
-                if data[:4] == ZSTD_MAGIC:
-                    data = zstandard.decompress(data)
-                yield connection, log_time, data
-        except Exception as error:  # there is no telling what damaged bytes do to their readers
-            self.lose(f"{Path(str(reader.path)).name}: damaged, read in part ({_line(error)})")
+            if max(len(definition), self._defined / MOST_DEFINITIONS) > LONGEST:
+                raise ValueError("too long")
+            return defined(name, definition)
+        except ValueError as error:
+            self.lose(f"{connection.topic}: definition of {name} is not used: {error}")
+            return known(name)
+
+    def _of(self, file: StorageFile, topics: Collection[str]) -> Iterator[Logged]:
+        wanted = [c for c in file.connections if c.topic in topics and self.store(c)]
+        allowance = Allowance(file.size)
+        for connection, log_time, publish_time, data in file.messages(wanted):
+            if data[:4] == ZSTD_MAGIC:
+                try:
+                    data = unpack(data, "zstd", min(LARGEST_MESSAGE, allowance.left))
+                    allowance.take(len(data))
+                except ValueError as error:
+                    self.lose_message(connection.topic, str(error))
+                    continue
+            yield connection, log_time, publish_time, data
 
 
 @contextmanager
 def open_bag(path: str | Path) -> Iterator[Bag]:
     """Open a rosbag2 directory or one storage file, with or without its metadata.
 
-    Torn files are read up to their last whole message, from mended copies. Raises
-    `FileNotFoundError` if there is nothing at `path`, `ValueError` if that is no readable bag.
+    Damaged files are read as far as they are sound. Raises `FileNotFoundError` if there is nothing
+    at `path`, `ValueError` if that is no readable bag.
     """
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"there is no bag {path}")
     losses: list[str] = []
     failures: list[str] = []
+
+    def lose(what: str) -> None:
+        tell_loss(losses, what)
+
     with ExitStack() as stack:
         scratch = Path(stack.enter_context(TemporaryDirectory(prefix="climber_bag_")))
-        readers = []
-        for file in _files(path, losses):
+        files: list[StorageFile] = []
+        for number, file in enumerate(storage_files(path, lose)):
+            own = scratch / str(number)
+            own.mkdir()
             try:
-                readers.append(stack.enter_context(Reader(_readable(file, scratch, losses))))
-            except Exception as error:  # as above
-                failures.append(f"{file.name}: {_line(error)}")
-        if not readers:
+                files.append(stack.enter_context(closing(open_file(file, own, lose))))
+            except (ValueError, OSError) as error:
+                tell_loss(failures, f"{file.name}: {_said(error)}")
+        if not files:
             why = "; ".join(failures) or "neither metadata.yaml nor an .mcap or .db3 file in it"
-            raise ValueError(f"{path} is no readable bag: {why}")
-        losses += [f"{failure}: not read" for failure in failures]
-        yield Bag(path, sorted(readers, key=lambda reader: reader.start_time), losses)
+            raise ValueError(f"{path} is no readable bag: {why}{one_line(other_files(path))}")
+        for failure in failures:
+            lose(f"{failure}: not read")
+        yield Bag(path, sorted(files, key=attrgetter("start")), losses)
+
+
+def tell_loss(losses: list[str], what: str) -> None:
+    """Add a loss, unless it was told, or too many were."""
+    what = one_line(what)
+    if what in losses or len(losses) > MOST_LOSSES:
+        return
+    losses.append(what if len(losses) < MOST_LOSSES else "and more, which are not told")
 
 
 def read_messages(
@@ -129,56 +172,11 @@ def read_messages(
     or is of an unknown type, is left out.
     """
     with open_bag(path) as bag:
-        for connection, log_time, message in bag.messages(bag.types if topics is None else topics):
+        for connection, log_time, _, message in bag.messages(
+            bag.types if topics is None else topics
+        ):
             yield connection.topic, log_time, message
 
 
-def _files(bag: Path, losses: list[str]) -> list[Path]:
-    """Storage files of a bag: those that metadata.yaml names, else those that are there."""
-    if not bag.is_dir():
-        return [bag]
-    present = [file for file in sorted(bag.iterdir()) if _storage_suffix(file) in MENDERS]
-    try:
-        metadata = yaml.safe_load((bag / "metadata.yaml").read_text())
-        named = metadata["rosbag2_bagfile_information"]["relative_file_paths"]
-        listed = [bag / Path(name).name for name in named]
-    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError):
-        losses.append("metadata.yaml: missing or damaged, not needed")
-        return present
-    losses += [f"{file.name}: not there" for file in listed if not file.exists()]
-    return [file for file in listed if file.exists()]
-
-
-def _readable(file: Path, scratch: Path, losses: list[str]) -> Path:
-    """Return what rosbags can open: the file, or an unpacked or mended copy of it in `scratch`."""
-    if file.suffix == ".zstd":
-        packed, file = file, scratch / file.stem
-        with packed.open("rb") as source, file.open("wb") as target:
-            zstandard.ZstdDecompressor().copy_stream(source, target)
-    if not is_torn(file):
-        return file
-    losses.append(f"{file.name}: cut off, read up to the last whole message")
-    mended = scratch / f"mended_{file.name}"
-    MENDERS[file.suffix](file, mended)
-    return mended
-
-
-def _storage_suffix(file: Path) -> str:
-    return Path(file.stem).suffix if file.suffix == ".zstd" else file.suffix
-
-
-def _store(connection: Connection) -> Typestore | None:
-    name, definition = connection.msgtype, connection.msgdef
-    if definition.format == MessageDefinitionFormat.MSG:
-        try:
-            store = get_typestore(Stores.EMPTY)
-            store.register(get_types_from_msg(definition.data, name))
-            store.get_msgdef(name)
-            return store
-        except Exception:  # as above
-            pass
-    return TYPESTORE if name in TYPESTORE.fielddefs else None
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+def _said(error: Exception) -> str:
+    return str(error) or type(error).__name__

@@ -5,7 +5,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Self
 
-from climber_uk.analysis.storage import ROS_DISTRO, STORAGES, Message, Qos, Topic, to_yaml
+from climber_uk.analysis.storage import STORAGES, Message, Qos, Topic, to_yaml
 
 NEVER = 2**63 - 1  # [ns] what rosbag2 writes as the start of a bag without messages
 
@@ -13,10 +13,11 @@ NEVER = 2**63 - 1  # [ns] what rosbag2 writes as the start of a bag without mess
 class BagWriter:
     """A new rosbag2 directory (version 9, as on Jazzy), which opens as of its last `flush`.
 
-    Raises `ValueError` for an unknown storage and `FileExistsError` if the directory exists.
+    `distro` is the distribution of ROS whose messages it takes. Raises `ValueError` for an unknown
+    storage, and `FileExistsError` if the directory exists.
     """
 
-    def __init__(self, path: Path, storage: str = "mcap") -> None:
+    def __init__(self, path: Path, storage: str = "mcap", distro: str = "unknown") -> None:
         if storage not in STORAGES:
             raise ValueError(f"storage={storage!r} must be one of {', '.join(STORAGES)}")
         if path.exists():
@@ -26,7 +27,9 @@ class BagWriter:
         self._topics: dict[str, Topic] = {}
         self._counts: dict[int, int] = {}
         self._identifier = storage
-        self._storage = STORAGES[storage](path / f"{path.absolute().name}_0")
+        self._distro = distro
+        self._storage = STORAGES[storage](path / f"{path.absolute().name}_0", distro)
+        self.custom_data: dict[str, str] = {}  # that the metadata are to tell besides
         self._pending: list[Message] = []
         self._start, self._end = NEVER, 0
         self.flush()
@@ -115,6 +118,6 @@ class BagWriter:
             "compression_format": "",
             "compression_mode": "",
             "files": [{"path": file_name, **extent}],
-            "custom_data": None,
-            "ros_distro": ROS_DISTRO,
+            "custom_data": dict(self.custom_data) or None,
+            "ros_distro": self._distro,
         }

@@ -17,7 +17,8 @@ from climber_uk.analysis.layout import Layout
 from climber_uk.mechanics import SECOND, Array
 
 LATEST = 2**63 - 1  # [ns]
-CHUNK = 4096  # messages of a topic that are decoded at a time
+CHUNK, CHUNK_SIZE = 4096, 2**24  # messages, and bytes, of a topic that are decoded at a time
+MOST_ALONE = 32  # messages in a row that are like no other, after which no others are looked for
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ class Batch:
 def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
     """Yield topic and batch; the messages of a topic are nearly in the order of their log times."""
     waiting: dict[Any, list[tuple[int, bytes]]] = defaultdict(list)
+    sizes: dict[Any, int] = defaultdict(int)
     connections: dict[Any, Any] = {}
 
     def decoded(key: tuple[str, str]) -> Iterator[tuple[str, Batch]]:
@@ -66,8 +68,9 @@ def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch
         store = bag.store(connections[key])
         assert store is not None
         batches, spoilt = decode(waiting.pop(key), type_name, store)
+        sizes[key] = 0
         if spoilt:
-            bag.lose(f"{topic}: a message cannot be read ({spoilt})")
+            bag.lose_message(topic, spoilt)
         for batch in batches:
             yield topic, batch
 
@@ -75,7 +78,8 @@ def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch
         key = connection.topic, connection.msgtype
         connections[key] = connection
         waiting[key].append((log_time, data))
-        if len(waiting[key]) == CHUNK:
+        sizes[key] += len(data)
+        if len(waiting[key]) == CHUNK or sizes[key] > CHUNK_SIZE:
             yield from decoded(key)
     for key in list(waiting):
         yield from decoded(key)
@@ -94,15 +98,20 @@ def decode(
     for size, alike in by_size.items():
         times = np.array([min(log_time, LATEST) for log_time, _ in alike], np.int64)
         rows = np.frombuffer(b"".join(data for _, data in alike), np.uint8).reshape(-1, size)
+        alone = 0  # in a row, that have no others like them
         while len(rows):
             layout = Layout(rows[0].tobytes(), store)
+            same = np.arange(len(rows)) == 0
             try:
                 layout.walk(type_name)
                 numbers = rows.view(layout.numbers)[:, 0]
-                same = layout.fits(rows)
+                if alone < MOST_ALONE:
+                    same = layout.fits(rows)
                 batches.append(Batch(times[same], layout.strings, layout.lengths, numbers[same]))
-            except (ValueError, IndexError, UnicodeDecodeError) as error:
+            except (ValueError, LookupError, TypeError, OverflowError, RecursionError) as error:
                 spoilt = str(error)
-                same = np.arange(len(rows)) == 0
-            times, rows = times[~same], rows[~same]
+            is_one = not same[1:].any()
+            alone = alone + 1 if is_one else 0
+            others = slice(1, None) if is_one else ~same
+            times, rows = times[others], rows[others]
     return batches, spoilt

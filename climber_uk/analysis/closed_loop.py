@@ -1,7 +1,7 @@
 """Controller and plant in one process, with what lies between them: lock-step without messages.
 
-The same `Follower` and `Plant` that the nodes run, on a grid of the plant's step. Everything random
-comes from one seed.
+The same `Follower` and `Machine` that the nodes run, on a grid of the plant's step. Everything
+random comes from one seed.
 """
 
 from collections import deque
@@ -17,7 +17,10 @@ from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.simulation.machine import Machine, Parts, Physics
+from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.sensors import Sensors
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,16 @@ class Link:
     heading_noise: float = 0.0  # [rad]
     speed_noise: float = 0.0  # [m/s] forward, and of each wheel in turning
     with_twist: bool = True
+    torque_lag: float = 0.0  # [s] of the motors, of first order
+    encoder_counts: int = 0  # a turn, of the wheels that odometry is counted from; 0: it is exact
+
+    def parts(self, plant: Plant) -> Parts:
+        """The plant with such motors and sensors."""
+        sensors = Sensors()
+        if self.encoder_counts > 0:
+            resolution = 2 * np.pi / self.encoder_counts
+            sensors = Sensors(odometry_source="wheels", encoder_resolution=resolution)
+        return Parts(plant, Motors(torque_lag=self.torque_lag), sensors, Physics())
 
 
 class Controlling(Protocol):
@@ -70,6 +83,10 @@ class Run:
         """Root mean square of the distance from the reference, `after` [s] [m]."""
         return float(np.sqrt(np.mean(self.distance[self.time >= after] ** 2)))
 
+    def chatter(self, after: float = 0.0) -> float:
+        """Root mean square of the torques' changes from one odometry to the next [N m]."""
+        return float(np.sqrt(np.mean(np.diff(self.torques[self.time >= after], axis=0) ** 2)))
+
 
 def simulate(
     trajectory: Trajectory,
@@ -94,18 +111,22 @@ def simulate(
     arriving: deque[tuple[int, int, State]] = deque()  # step of arrival, stamp, odometry
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
-    state, torques, rows = start, np.zeros(2), []
-    plant = plant_of(climber_at(0.0), link.step)
+    rows, now_it_is = [], climber_at(0.0)
+    machine = Machine(link.parts(plant_of(now_it_is, link.step)), start, link.period)
     every, late = round(link.period / link.step), round(link.delay / link.step)
     for step in range(round(duration / link.step) + 1):
         now = SECOND + round(step * link.step * SECOND)
         if step % every == 0:
+            state = machine.state
             error = np.array(tracking_error(state.pose, trajectory.at(step * link.step)))
-            rows.append([step * link.step, *state.pose, *state.velocity, *error, *torques])
+            rows.append([step * link.step, *state.pose, *state.velocity, *error, *machine.torques])
+            if step > 0:
+                machine.measure()
             if random.random() >= link.loss:
                 arrival = step + round(random.uniform(0, link.jitter) / link.step)
                 arrival = max(arrival, arriving[-1][0]) if arriving else arrival
-                arriving.append((arrival, now, measured(state, link, random)))
+                _, seen = machine.odometer.latest()
+                arriving.append((arrival, now, measured(seen, link, random)))
         while arriving and arriving[0][0] <= step:
             _, stamp, odometry = arriving.popleft()
             answer = controlling.on_odometry(now, stamp, odometry)
@@ -114,12 +135,10 @@ def simulate(
                 commanded.append((step + late, answer.torques))
         while commanded and commanded[0][0] <= step:
             _, acting = commanded.popleft()
-        now_it_is = climber_at(step * link.step)
-        plant = plant if now_it_is is plant.climber else plant_of(now_it_is, link.step)
-        limit = plant.climber.max_wheel_torque
-        if acting is not None:
-            torques = np.clip(motors(state, acting), -limit, limit)
-        state = plant.advance(state, torques, steps=1)
+        before, now_it_is = now_it_is, climber_at(step * link.step)
+        if now_it_is is not before:
+            machine.take(link.parts(plant_of(now_it_is, link.step)))
+        machine.advance(np.zeros(2) if acting is None else motors(machine.state, acting))
     table = np.array(rows)
     return Run(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10:12])
 

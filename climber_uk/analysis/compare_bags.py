@@ -11,7 +11,7 @@ def main() -> None:
     parser = reporting.parser("compare_bags", __doc__)
     parser.add_argument("first", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
     parser.add_argument("others", type=Path, nargs="+", help="what is compared with it")
-    options = parser.parse_args()
+    options = parser.arguments()
     bags = [options.first, *options.others]
     sys.exit(reporting.report("compare_bags", "Comparison of runs", bags, options))
 

@@ -37,9 +37,12 @@ class Condition:
         if name not in METRICS:
             raise ValueError(f"{text!r}: {name} is none of {', '.join(METRICS)}")
         try:
-            return cls(name, comparison, float(bound))
+            number = float(bound)
         except ValueError:
-            raise ValueError(f"{text!r}: {bound} must be a number") from None
+            number = math.nan
+        if math.isnan(number):  # with which every comparison fails, so that nothing would
+            raise ValueError(f"{text!r}: {bound} must be a number")
+        return cls(name, comparison, number)
 
     def failure(self, column: Column) -> str:
         """What failed, or ''; a metric that is not known has failed."""

@@ -1,5 +1,6 @@
 """Runs in pictures, one over the other."""
 
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from io import BytesIO
@@ -14,8 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.analysis import topics
+from climber_uk.analysis.connection import one_line
 from climber_uk.analysis.events import ERROR, OK
-from climber_uk.analysis.recorded_run import RecordedRun
+from climber_uk.analysis.run import RecordedRun
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 
@@ -33,14 +35,17 @@ STYLE = {
     "axes.spines.right": False,
     "lines.linewidth": 1.0,
     "legend.frameon": False,
+    "text.parse_math": False,  # names of bags are no formulas
 }
 Runs = Sequence[tuple[str, RecordedRun]]
 
 
 def draw(runs: Runs) -> dict[str, bytes]:
     """Figures of some named runs as PNG, by name; without those for which nothing is known."""
-    with plt.rc_context(STYLE):
-        return {name: _png(figure) for name, figure in _figures(runs)}
+    with plt.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=UserWarning)  # letters without a glyph, no room
+        shown = [(one_line(name), run) for name, run in runs]
+        return {name: _png(figure) for name, figure in _figures(shown)}
 
 
 def _figures(runs: Runs) -> Iterable[tuple[str, Figure]]:
@@ -65,10 +70,14 @@ def _path(runs: Runs) -> Figure:
     for label, run in runs:
         step = max(1, len(run.time) // MOST_POSES)
         (line,) = axes.plot(*run.pose[::step, :2].T, label=label, linewidth=1.5, zorder=3)
+        truth = run.recorded[topics.TRUTH].values[::step, :2].T
+        axes.plot(*truth, ":", color=line.get_color(), linewidth=1.5, zorder=2)
         axes.plot(*run.reference[::step, :2].T, color="0.75", linewidth=4, zorder=1)
         for pose, marker in ((run.pose[0], "o"), (run.pose[-1], "s")):
             axes.plot(*pose[:2], marker, color=line.get_color(), zorder=4)
     axes.plot([], [], color="0.75", linewidth=4, label="reference")
+    if any(len(run.recorded[topics.TRUTH]) for _, run in runs):
+        axes.plot([], [], ":", color="0.4", label="truth")
     for marker, meaning in (("o", "start"), ("s", "end")):
         axes.plot([], [], marker, color="0.4", label=meaning)
     axes.set(xlabel="x [m]", ylabel="y [m]", title="Path on the wall")

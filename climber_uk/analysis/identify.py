@@ -36,6 +36,7 @@ from climber_uk.analysis.recorded_site import (
 )
 from climber_uk.analysis.topics import PARAMETERS
 from climber_uk.mechanics.climber import Climber
+from climber_uk.system.command_line import Parser
 
 PUBLISHER = "trajectory_publisher"
 SIDES = "right", "left"
@@ -123,7 +124,7 @@ def plant_of(options: argparse.Namespace) -> dict[str, Any]:
 
 def main() -> None:
     """Tell, or plan."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser("identify", __doc__)
     parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
@@ -131,7 +132,7 @@ def main() -> None:
     parser.add_argument(
         "--delay", type=float, help="[s] of torques, unless joint_states tells them"
     )
-    parser.add_argument("--output", type=Path, help="write a parameter file for the nodes")
+    parser.add_argument("--output", "-o", type=Path, help="write a parameter file for the nodes")
     parser.add_argument("--json", type=Path, help="write the table as JSON")
     parser.add_argument("--figure", type=Path, help="write a picture of the fit, PNG")
     parser.add_argument(
@@ -142,7 +143,7 @@ def main() -> None:
             rule, name = field.metadata, "--" + field.name.replace("_", "-")
             said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
             parser.add_argument(name, type=float, default=field.default, help=said)
-    options = parser.parse_args()
+    options = parser.arguments()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
     try:

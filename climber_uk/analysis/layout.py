@@ -13,6 +13,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.store import Typestore
 
 HEADER = 4  # bytes before the fields: how they are encoded
+MOST_PARTS = 100_000  # fields, and elements that are no numbers
 FORMATS = {
     **dict.fromkeys(("bool", "byte", "char", "uint8"), "u1"),
     **{"int8": "i1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
@@ -28,9 +29,11 @@ class Layout:
     store: Typestore
     place: int = HEADER
     fields: dict[str, tuple[Any, int]] = field(default_factory=dict)  # format and place by path
-    fixed: list[int] = field(default_factory=lambda: list(range(HEADER)))  # places of all else
+    # begins and ends of all else
+    fixed: list[tuple[int, int]] = field(default_factory=lambda: [(0, HEADER)])
     strings: dict[str, str] = field(default_factory=dict)
     lengths: dict[str, int] = field(default_factory=dict)
+    parts: int = 0
 
     @property
     def order(self) -> str:
@@ -54,7 +57,10 @@ class Layout:
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool]:
         """Which of some messages (n, size) have the same strings and lengths."""
-        fits: NDArray[np.bool] = (rows[:, self.fixed] == rows[0, self.fixed]).all(axis=1)
+        fits = np.ones(len(rows), bool)
+        if len(rows) > 1:
+            places = np.concatenate([np.arange(*span) for span in self.fixed])
+            fits = (rows[:, places] == rows[0, places]).all(axis=1)
         return fits
 
     def walk(self, type_name: str, path: str = "") -> None:
@@ -64,6 +70,9 @@ class Layout:
 
     def _find(self, description: Any, path: str) -> None:
         kind, what = description
+        self.parts += 1
+        if self.parts > MOST_PARTS:
+            raise ValueError(f"it has more than {MOST_PARTS} fields")
         if kind == Nodetype.NAME:
             self.walk(what, path)
         elif kind == Nodetype.BASE and what[0] == "string":
@@ -91,7 +100,7 @@ class Layout:
         code = self.order + FORMATS[kind]
         start = self._aligned(int(code[2:]))
         self.fields[path] = code if length is None else (code, (length,)), start
-        self.place = start + int(code[2:]) * (1 if length is None else length)
+        self._go_to(start + int(code[2:]) * (1 if length is None else length))
 
     def _length(self) -> tuple[int, int]:
         """Place behind a length, and the length."""
@@ -103,8 +112,13 @@ class Layout:
         return self.place, length
 
     def _keep(self, start: int, size: int) -> None:
-        self.fixed += range(start, start + size)
-        self.place = start + size
+        self.fixed.append((start, start + size))
+        self._go_to(start + size)
+
+    def _go_to(self, place: int) -> None:
+        if place > len(self.data):
+            raise ValueError("it ends too early")
+        self.place = place
 
     def _aligned(self, size: int) -> int:
         return self.place + (HEADER - self.place) % size

@@ -58,11 +58,13 @@ def _tiles(column: Column) -> Iterable[tuple[str, str, str, str, int]]:
     values, shown = column.values, column.shown
     is_settled = math.isfinite(values["settling_time"])
     settled = f"settled after {shown('settling_time')}" if is_settled else "not settled"
+    by_odometry = f"{shown('rms_distance')} RMS", f"at most {shown('max_distance')}"
+    main, note = by_odometry
+    if math.isfinite(values["truth_rms_distance"]):
+        main = f"{shown('truth_rms_distance')} RMS, truly"
+        note = f"at most {shown('truth_max_distance')}; by the odometry {', '.join(by_odometry)}"
     yield (
-        "Tracking",
-        "rms_distance",
-        f"{shown('rms_distance')} RMS",
-        f"at most {shown('max_distance')}; {settled}",
+        *("Tracking", "rms_distance", main, f"{note}; {settled}"),
         OK if is_settled else WARNING,
     )
     yield (
@@ -76,8 +78,12 @@ def _tiles(column: Column) -> Iterable[tuple[str, str, str, str, int]]:
         "Hold on the wall",
         "lowest_slip_margin",
         f"{shown('lowest_slip_margin')} slip margin",
-        f"{shown('lowest_tip_margin')} tip margin; below 1 it slips, it tips",
-        Alarm().level(min(values["lowest_slip_margin"], values["lowest_tip_margin"])),
+        f"{shown('lowest_tip_margin')} tip margin; below 1 it slips, it tips: it slipped "
+        f"{shown('slip_share')} of the time",
+        max(
+            Alarm().level(min(values["lowest_slip_margin"], values["lowest_tip_margin"])),
+            WARNING if values["slip_share"] > 0 else OK,
+        ),
     )
     stops = values["safety_stops"]
     yield (
@@ -101,7 +107,7 @@ def _losses(column: Column) -> str:
     if not column.losses:
         return ""
     items = "".join(f"<li>{escape(loss)}</li>" for loss in column.losses)
-    return f'<div class="losses"><h3>Not read of {escape(column.bag)}</h3><ul>{items}</ul></div>'
+    return f'<div class="losses"><h3>To know of {escape(column.bag)}</h3><ul>{items}</ul></div>'
 
 
 def _figure(name: str, image: bytes) -> str:

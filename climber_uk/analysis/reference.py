@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,19 +32,18 @@ class Points:
         motion = np.stack([_motion(batch, place) for place in places], axis=1)
         fit = np.isfinite(motion).all(axis=(1, 2, 3)) & (np.diff(since) > 0).all(axis=1)
         times = batch.stamps[:, None] + since
-        return cls(batch.log_times[fit], times[fit], motion[fit])
+        return cls(batch.log_times, times, motion).where(fit)
+
+    def where(self, chosen: Any) -> "Points":
+        """Those of the previews that a mask chooses."""
+        return Points(self.arrivals[chosen], self.times[chosen], self.motion[chosen])
 
 
 def _motion(batch: Batch, place: str) -> Array:
     pose = f"{place}.transforms.0"
-    rows = [
-        np.column_stack(
-            [
-                batch.columns(f"{pose}.translation.x", f"{pose}.translation.y"),
-                heading(batch, f"{pose}.rotation"),
-            ]
-        )
-    ]
+    turn, faults = heading(batch, f"{pose}.rotation")
+    position = batch.columns(f"{pose}.translation.x", f"{pose}.translation.y")
+    rows = [np.column_stack([position, np.where(faults == 0, turn, np.nan)])]
     for of in ("velocities", "accelerations"):
         planar = f"{place}.{of}.0"
         rows.append(

@@ -115,6 +115,7 @@ class Replay:
         """Keep a reference, unless it is one that the node refuses."""
         try:
             preview = reading_reference.preview(message, self.names.odom_frame)
+            preview.check_heading()
         except ValueError:
             return
         self.keep(self.follower.on_reference(self.clock, preview))

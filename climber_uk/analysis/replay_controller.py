@@ -15,9 +15,12 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
+from climber_uk.analysis.outputs import output, printable
 from climber_uk.analysis.parameter_file import read_argument, read_file
+from climber_uk.analysis.publishing_order import are_known
 from climber_uk.analysis.recorded_controller import NODE, PARAMETERS, RecordedController
 from climber_uk.analysis.replay import DEFAULTS, Replay
+from climber_uk.analysis.topics import TORQUES
 from climber_uk.analysis.torque_comparison import (
     WHEELS,
     Comparison,
@@ -26,6 +29,7 @@ from climber_uk.analysis.torque_comparison import (
     table,
     write_csv,
 )
+from climber_uk.system.command_line import Parser
 
 
 def replayed(options: argparse.Namespace) -> Comparison:
@@ -40,10 +44,16 @@ def replayed(options: argparse.Namespace) -> Comparison:
     def choose(told: Mapping[str, Any]) -> dict[str, Any]:
         return {**(told if file is None else file), **given}
 
-    recorded = RecordedController(options.bag, namespace)
+    recorded = RecordedController(options.bag, namespace, file)
     if recorded.parameters is None and file is None:
         raise ValueError(
             f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
+        )
+    if not are_known(options.bag, [f"{namespace}/{TORQUES}"]):
+        print(
+            f"replay_controller: {options.bag} does not tell when messages were published: they "
+            "are taken in the order of their arrival at the recorder",
+            file=sys.stderr,
         )
     replay = Replay(recorded, namespace, choose)
     replay.run(options.bag, namespace)
@@ -69,8 +79,8 @@ def draw(found: Comparison, path: Path) -> None:
 
 def main() -> None:
     """Print the comparison and write its files."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("bag", type=Path, help="rosbag2 directory, MCAP or sqlite3")
+    parser = Parser("replay_controller", __doc__)
+    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument("--params", type=Path, help="parameter file (default: as recorded)")
     parser.add_argument(
@@ -80,21 +90,24 @@ def main() -> None:
         metavar="NAME:=VALUE",
         help="change one",
     )
-    parser.add_argument("--output", type=Path, help="directory (default: replay in the bag)")
+    parser.add_argument(
+        *("--output", "-o"),
+        type=Path,
+        help="directory (default: a new one, replay, in the bag or beside it)",
+    )
     parser.add_argument(
         "--fail-above", type=float, metavar="TORQUE", help="status 1 if a torque differs more [N m]"
     )
-    options = parser.parse_args()
-    directory = options.output or options.bag / "replay"
+    options = parser.arguments()
     try:
-        found = replayed(options)
-        numbers = summary(found)
-        directory.mkdir(parents=True, exist_ok=True)
-        (directory / "replay.json").write_text(json.dumps(numbers, indent=2) + "\n")
-        write_csv(found, directory / "torques.csv")
-        draw(found, directory / "torques.png")
+        with output(options.bag, "replay", options.output) as directory:
+            found = replayed(options)
+            numbers = summary(found)
+            (directory / "replay.json").write_text(json.dumps(numbers, indent=2) + "\n")
+            write_csv(found, directory / "torques.csv")
+            draw(found, directory / "torques.png")
     except (ValueError, OSError) as error:
-        sys.exit(f"replay_controller: {error}")
+        sys.exit(f"replay_controller: {printable(str(error))}")
     print(table(numbers))
     print(f"written: {directory}/replay.json, torques.csv, torques.png")
     if options.fail_above is not None and found.largest > options.fail_above:

@@ -1,32 +1,40 @@
 """What `analyze_bag` and `compare_bags` share: their options, what they read, what they write."""
 
 import sys
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from climber_uk.analysis import figures
 from climber_uk.analysis.condition import Condition
 from climber_uk.analysis.metrics import Case
+from climber_uk.analysis.outputs import check_writable, output, printable
 from climber_uk.analysis.page import page
 from climber_uk.analysis.parameter_file import Values, read_file
-from climber_uk.analysis.recorded_run import RecordedRun, read_runs
+from climber_uk.analysis.recorded_run import read_runs
 from climber_uk.analysis.tables import Column, text, to_csv, to_json
 from climber_uk.analysis.topics import Topics
 from climber_uk.mechanics.climber import Climber
+from climber_uk.system.command_line import Parser
 
 NODE = "uk_torque_controller"
+OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
 FAILED, UNREADABLE = 1, 2
+OUTPUT_HELP = (
+    "directory for report.html and metrics.* (default: a new one in the first bag, or beside it)"
+)
 EPILOG = (
     "exit status: 0, also if a part could not be read (a line says which); 1 if a --fail-if holds, "
     "or its metric is not known; 2 if a bag cannot be read or an argument is wrong"
 )
 
 
-def parser(name: str, description: str | None) -> ArgumentParser:
+def parser(name: str, description: str | None) -> Parser:
     """Parser of the options that both commands have."""
-    made = ArgumentParser(name, description=description, epilog=EPILOG)
-    made.add_argument("--output", "-o", type=Path, help="directory for report.html and metrics.*")
+    made = Parser(name, description, EPILOG)
+    made.add_argument("--output", "-o", type=Path, help=OUTPUT_HELP)
     made.add_argument(
         "--figures", type=Path, help="directory for the figures, as PNG (default: no)"
     )
@@ -74,18 +82,21 @@ def _condition(said: str) -> Condition:
 def report(command: str, title: str, bags: Sequence[Path], options: Namespace) -> int:
     """Print and write all that is to be told of some bags; return the exit status."""
     try:
-        columns = _read(bags, options)
-        for loss in dict.fromkeys(f"{c.bag}: {loss}" for c in columns for loss in c.losses):
-            print(f"{command}: {loss}", file=sys.stderr)
-        print(text(columns))
-        for path in _write(title, columns, options.output or _beside(bags[0]), options.figures):
-            print(path)
+        with output(bags[0], OUTPUTS[command], options.output) as directory:
+            if options.figures:
+                check_writable(options.figures)
+            columns = _read(bags, options)
+            for loss in dict.fromkeys(f"{c.bag}: {loss}" for c in columns for loss in c.losses):
+                print(f"{command}: {printable(loss)}", file=sys.stderr)
+            print(printable(text(columns)))
+            for path in _write(title, columns, directory, options.figures):
+                print(path)
     except (ValueError, OSError) as error:
-        print(f"{command}: {error}", file=sys.stderr)
+        print(f"{command}: {printable(str(error))}", file=sys.stderr)
         return UNREADABLE
     failures = [condition.failure(c) for condition in options.fail_if for c in columns]
     for failure in filter(None, failures):
-        print(f"{command}: failed: {failure}", file=sys.stderr)
+        print(f"{command}: failed: {printable(failure)}", file=sys.stderr)
     return FAILED if any(failures) else 0
 
 
@@ -93,20 +104,25 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
     names = Topics.parse(options.remap)
     columns: list[Column] = []
     for bag, said in zip(bags, _short(bags), strict=True):
-        runs, losses = read_runs(bag, names, options.namespace)
+        runs, losses = read_runs(
+            bag,
+            names,
+            options.namespace,
+            parameters=partial(_parameters, options.params) if options.params else None,
+            all_of_them=bool(options.fail_if),
+        )
         for run in runs:
-            parts = [part for part in (said, run.name) if part] or ["climber"]
-            case = Case(run, _climber(options.params, run), options.settled)
+            parts = [part for part in (said, run.name, run.part) if part] or ["climber"]
+            case = Case(run, settled=options.settled)
             base = columns[0] if columns and len(bags) > 1 else None
             columns.append(Column("/".join(parts), str(bag), case, losses, base))
     return columns
 
 
-def _climber(file: Path | None, run: RecordedRun) -> Climber | None:
-    if file is None:
-        return None
-    node = f"/{run.name}/{NODE}".replace("//", "/")
-    return Values(read_file(file, node)).read(Climber)
+def _parameters(file: Path, namespace: str) -> dict[str, Any]:
+    found = read_file(file, f"/{namespace}/{NODE}".replace("//", "/"))
+    Values(found).read(Climber)  # which says what is wrong with them
+    return found
 
 
 def _short(bags: Sequence[Path]) -> list[str]:
@@ -121,10 +137,6 @@ def _short(bags: Sequence[Path]) -> list[str]:
     return [f"{number}: {bag}" for number, bag in enumerate(bags, start=1)]
 
 
-def _beside(bag: Path) -> Path:
-    return bag / "analysis" if bag.is_dir() else bag.with_name(f"{bag.stem}_analysis")
-
-
 def _write(
     title: str, columns: Sequence[Column], directory: Path, pictures: Path | None
 ) -> list[Path]:
@@ -134,10 +146,10 @@ def _write(
         "metrics.csv": to_csv(columns),
         "metrics.json": to_json(columns),
     }
-    written = {directory / name: text.encode() for name, text in texts.items()}
+    coded = {name: text.encode("utf-8", "backslashreplace") for name, text in texts.items()}
+    written = {directory / name: data for name, data in coded.items()}
     if pictures is not None:
         written |= {pictures / f"{name}.png": image for name, image in images.items()}
     for path, data in written.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     return list(written)

@@ -4,12 +4,12 @@ Writes the figures as printed and consistent, comparison.md, attempts.md and dri
 CSV), drift.png and off_constraint.png. All that takes long runs in processes of its own.
 """
 
-import argparse
-import multiprocessing
 import os
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from climber_uk.analysis.outputs import check_writable
 from climber_uk.analysis.paper import attempts, figures, motion, table
 from climber_uk.analysis.paper.study import (
     BOTH,
@@ -23,6 +23,8 @@ from climber_uk.analysis.paper.study import (
     compute,
     jobs,
 )
+from climber_uk.system.command_line import Parser
+from climber_uk.system.workers import workers
 
 DRIFT_COLUMNS = (
     *("method", "integrator", "0 to end [m]", "first tenth [m]", "last tenth [m]"),
@@ -113,18 +115,23 @@ def write(
 
 def main() -> None:
     """Compute, print and write everything."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=Path("paper_output"), help="directory")
+    parser = Parser("reproduce_paper", __doc__)
+    parser.add_argument("--output", "-o", type=Path, default=Path("paper_output"), help="directory")
     parser.add_argument("--quick", action="store_true", help="coarser and shorter, without nodes")
-    options = parser.parse_args()
+    options = parser.arguments()
     extent = QUICK if options.quick else FULL
-    options.output.mkdir(parents=True, exist_ok=True)
+    try:
+        check_writable(options.output)
+    except OSError as error:
+        sys.exit(f"reproduce_paper: {error}")
     # matrices of 3 by 3 gain nothing from threads, which would only be in each other's way
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=spawn) as pool:
-        results = compute(pool, jobs(extent))
-        paths = write(pool, results, extent, options.output)
+    try:
+        with workers(os.cpu_count()) as pool:
+            results = compute(pool, jobs(extent))
+            paths = write(pool, results, extent, options.output)
+    except KeyboardInterrupt:
+        sys.exit("reproduce_paper: interrupted")
     print(f"{len(paths)} files in {options.output}")
 
 

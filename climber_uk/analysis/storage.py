@@ -20,7 +20,6 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
-ROS_DISTRO = "jazzy"
 
 # log time [ns], publish time [ns], id of the topic, serialised message
 Message = tuple[int, int, int, bytes]
@@ -66,8 +65,8 @@ class Topic:
 class Storage(Protocol):
     """The file of a bag that holds the messages."""
 
-    def __init__(self, stem: Path) -> None:
-        """Create the file, whose path without suffix is `stem`."""
+    def __init__(self, stem: Path, distro: str) -> None:
+        """Create the file, whose path without suffix is `stem`, of a distribution of ROS."""
 
     @property
     def path(self) -> Path:
@@ -86,7 +85,7 @@ class Storage(Protocol):
 class Mcap:
     """An MCAP file of uncompressed chunks, with all its indexes once it is closed."""
 
-    def __init__(self, stem: Path) -> None:
+    def __init__(self, stem: Path, _: str) -> None:
         self.path = stem.with_name(f"{stem.name}.mcap")
         self._stream = _EndedStream(self.path)
         self._writer = Writer(cast(IO[bytes], self._stream), compression=CompressionType.NONE)
@@ -172,7 +171,7 @@ class _EndedStream:
 class Sqlite3:
     """A SQLite database with version 4 of rosbag2's schema."""
 
-    SCHEMA = f"""
+    SCHEMA = """
         CREATE TABLE schema (schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
         CREATE TABLE metadata (
             id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);
@@ -187,10 +186,9 @@ class Sqlite3:
             id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
             data BLOB NOT NULL);
         CREATE INDEX timestamp_idx ON messages (timestamp ASC);
-        INSERT INTO schema VALUES (4, '{ROS_DISTRO}');
     """
 
-    def __init__(self, stem: Path) -> None:
+    def __init__(self, stem: Path, distro: str) -> None:
         self.path = stem.with_name(f"{stem.name}.db3")
         self._types: set[str] = set()
         self._database = sqlite3.connect(self.path)
@@ -200,6 +198,7 @@ class Sqlite3:
             # would guard against power cuts, not against a kill.
             database.executescript("PRAGMA journal_mode = DELETE; PRAGMA synchronous = OFF;")
             database.executescript(f"BEGIN; {self.SCHEMA} COMMIT;")
+            database.execute("INSERT INTO schema VALUES (4, ?)", (distro,))
 
     def add_topic(self, topic: Topic) -> None:
         """Store the topic, and its type where that is new."""

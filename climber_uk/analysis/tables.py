@@ -12,6 +12,7 @@ from typing import Any
 from climber_uk.analysis.metrics import GROUPS, METRICS, Case, Metric, evaluate, prefix
 
 UNKNOWN = "–"
+FORMULA = tuple("=+-@\t\r\n")  # with which a cell begins that spreadsheets would compute
 
 
 @dataclass(frozen=True)
@@ -100,18 +101,28 @@ def _aligned(line: Sequence[str], widths: Sequence[int], left: Sequence[int]) ->
 
 
 def unknown(columns: Sequence[Column]) -> list[str]:
-    """Names of the metrics that no run has."""
-    return [name for name in METRICS if all(math.isnan(c.values[name]) for c in columns)]
+    """Names of the metrics that no run has, though some climber has what they are of."""
+    return [
+        name
+        for name, metric in METRICS.items()
+        if all(math.isnan(c.values[name]) for c in columns)
+        and any(metric.concerns(c.case) for c in columns)
+    ]
 
 
 def to_csv(columns: Sequence[Column]) -> str:
     """All metrics in SI units, nan where they are not known."""
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["metric", "unit", *(column.label for column in columns)])
+    writer.writerow(["metric", "unit", *(plain(column.label) for column in columns)])
     for name, metric in METRICS.items():
         writer.writerow([name, metric.unit, *(repr(column.values[name]) for column in columns)])
     return stream.getvalue()
+
+
+def plain(said: str) -> str:
+    """Text that no spreadsheet takes for a formula."""
+    return f"'{said}" if said.startswith(FORMULA) else said
 
 
 def to_json(columns: Sequence[Column]) -> str:
@@ -121,6 +132,7 @@ def to_json(columns: Sequence[Column]) -> str:
             "label": column.label,
             "bag": column.bag,
             "namespace": column.case.run.name,
+            "part": column.case.run.part,
             "metrics": {n: v if math.isfinite(v) else None for n, v in column.values.items()},
             "events": [_event(time, event) for time, event in column.case.run.events],
             "losses": list(column.losses),

@@ -1,69 +1,70 @@
-"""The numbers that are taken from the messages of each topic."""
+"""The numbers that are taken from the messages of each topic, and what is wrong with them."""
 
 from collections.abc import Callable
+from math import asin, degrees
 
 import numpy as np
+from numpy.typing import NDArray
 
 from climber_uk.analysis.batches import Batch
-from climber_uk.analysis.topics import FORCE, JOINTS, MARGINS, ODOMETRY, PRESSURE, TORQUES
+from climber_uk.analysis.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, TRUTH
 from climber_uk.mechanics import Array
+from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE
+
+Faults = NDArray[np.intp]  # (n,) places in FAULTS
+FAULTS = (
+    "",  # fit
+    f"not finite, or above {LARGEST:g} in SI units",
+    f"position not finite, or above {LARGEST:g} m",
+    "orientation not finite",
+    f"norm of the quaternion off 1 by more than {NORM_TOLERANCE:.0%}",
+    f"not a turn about z: tilted by more than {degrees(2 * asin(MOST_TILT)):.1f}°",
+)
 
 
-def heading(batch: Batch, path: str) -> Array:
-    """Headings (n,) [rad] of orientations at `path`; nan unless they are unit turns about z."""
+def heading(batch: Batch, path: str) -> tuple[Array, Faults]:
+    """Headings (n,) [rad] of orientations at `path`, and what is wrong with them."""
     x, y, z, w = batch.columns(*(f"{path}.{axis}" for axis in "xyzw")).T
-    is_planar = (np.abs(np.hypot(z, w) - 1) < 1e-3) & (np.hypot(x, y) < 0.1)
-    return np.where(is_planar, np.arctan2(2 * w * z, w * w - z * z), np.nan)
+    with np.errstate(over="ignore", invalid="ignore"):
+        tilted = np.hypot(x, y)
+        norm = np.hypot(tilted, np.hypot(z, w))
+        is_finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z) & np.isfinite(w)
+        wrong = ~is_finite, ~(np.abs(norm - 1) <= NORM_TOLERANCE), ~(tilted < MOST_TILT * norm)
+        return np.arctan2(2 * w * z, w * w - z * z), np.select(wrong, [3, 4, 5])
 
 
-def _odometry(batch: Batch) -> Array:
-    """Pose x, y, θ and twist forwards, to the left, about z, (n, 6)."""
+def are_sound(values: Array) -> NDArray[np.bool]:
+    """Which of (n, …) numbers are finite, and not absurd."""
+    return np.abs(values) <= LARGEST
+
+
+def _odometry(batch: Batch) -> tuple[Array, Faults]:
+    """Pose x, y, θ and twist forwards, to the left, about z, (n, 6).
+
+    A twist that is not finite is none, and what says nothing about a climber on its wall (z, the
+    other rates, covariances) may be anything.
+    """
     position, twist = "pose.pose.position", "twist.twist"
-    return np.column_stack(
-        [
-            batch.columns(f"{position}.x", f"{position}.y"),
-            heading(batch, "pose.pose.orientation"),
-            batch.columns(f"{twist}.linear.x", f"{twist}.linear.y", f"{twist}.angular.z"),
-        ]
-    )
+    place = batch.columns(f"{position}.x", f"{position}.y")
+    turn, faults = heading(batch, "pose.pose.orientation")
+    rates = batch.columns(f"{twist}.linear.x", f"{twist}.linear.y", f"{twist}.angular.z")
+    faults = np.where(are_sound(place).all(axis=1), faults, 2)
+    return np.column_stack([place, turn, np.where(are_sound(rates), rates, np.nan)]), faults
 
 
-def _torques(batch: Batch) -> Array:
-    """Torques right, left (n, 2) [N m]."""
-    return batch["effort"][:, _wheels(batch)]
+def _columns(*paths: str) -> Callable[[Batch], tuple[Array, Faults]]:
+    def take(batch: Batch) -> tuple[Array, Faults]:
+        values = batch.columns(*paths)
+        return values, np.where(are_sound(values).all(axis=1), 0, 1)
 
-
-def _joints(batch: Batch) -> Array:
-    """Rates right, left [rad/s] and torques right, left [N m], (n, 4)."""
-    wheels = _wheels(batch)
-    return np.column_stack([batch["velocity"][:, wheels], batch["effort"][:, wheels]])
-
-
-def _wheels(batch: Batch) -> list[int]:
-    """Places of the right and the left wheel: by their names, else left comes first."""
-    names = [batch.strings[f"name.{i}"] for i in range(batch.lengths["name"])]
-    wheels = [i for side in ("right", "left") for i, name in enumerate(names) if side in name]
-    return wheels if len(wheels) == 2 else [1, 0]
-
-
-def _vector(batch: Batch) -> Array:
-    return batch.columns("vector.x", "vector.y", "vector.z")
-
-
-def _wrench(batch: Batch) -> Array:
-    return batch.columns("wrench.force.x", "wrench.force.y", "wrench.torque.z")
-
-
-def _pressure(batch: Batch) -> Array:
-    return batch.columns("fluid_pressure")
+    return take
 
 
 WIDEST = 6  # values of a message
-TAKEN: dict[str, Callable[[Batch], Array]] = {
+TAKEN: dict[str, Callable[[Batch], tuple[Array, Faults]]] = {
     ODOMETRY: _odometry,
-    TORQUES: _torques,
-    JOINTS: _joints,
-    PRESSURE: _pressure,
-    FORCE: _wrench,
-    **dict.fromkeys(MARGINS, _vector),
+    TRUTH: _odometry,
+    PRESSURE: _columns("fluid_pressure"),
+    FORCE: _columns("wrench.force.x", "wrench.force.y", "wrench.torque.z"),
+    **dict.fromkeys(MARGINS, _columns("vector.x", "vector.y", "vector.z")),
 }

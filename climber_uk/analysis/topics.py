@@ -4,12 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
+TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PARAMETERS = "joint_states", "suction_pressure", "uk_torque_controller/parameters"
 FORCE = "uk_torque_controller/constraint_force"
 MARGINS = "plant_simulator/margins", "uk_torque_controller/margins"  # the plant knows better
 DIAGNOSTICS, LOG = "/diagnostics", "/rosout"
-NAMES = (ODOMETRY, REFERENCE, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE, *MARGINS)
+NAMES = (ODOMETRY, TRUTH, REFERENCE, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE, *MARGINS)
 KNOWN = {*NAMES, DIAGNOSTICS, LOG}
+MOST_CLIMBERS = 100  # that are told of, unless they were chosen
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,20 @@ class Topics:
             yield self.full(name, namespace), name
 
     def namespaces(self, types: Mapping[str, str]) -> list[str]:
-        """Those of the climbers that have odometry in a bag with topics of some types."""
+        """Those of the climbers that have odometry in a bag with topics of some types.
+
+        Raises `ValueError` if there are too many.
+        """
         name = self.full(ODOMETRY, "")
         if name in types and ODOMETRY in self.remapped and self.remapped[ODOMETRY][0] == "/":
             return [""]
-        return sorted(
+        found = sorted(
             topic.removesuffix(name).strip("/")
             for topic, kind in types.items()
             if kind == "nav_msgs/msg/Odometry" and topic.endswith(name)
         )
+        if len(found) > MOST_CLIMBERS:
+            raise ValueError(
+                f"odometry of {len(found)} climbers, more than {MOST_CLIMBERS}: choose by namespace"
+            )
+        return found

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from climber_uk.analysis.connection import one_line
 from climber_uk.analysis.recorded_controller import Modes, RecordedController
 from climber_uk.analysis.replay import Replay
 from climber_uk.mechanics import SECOND, Array
@@ -105,7 +106,7 @@ def table(numbers: dict[str, Any]) -> str:
         (since, whose, mode) for whose, modes in numbers["modes"].items() for since, mode in modes
     ]
     lines += [
-        f"{since:>10.3f} s  {whose}: {mode}"
+        f"{since:>10.3f} s  {whose}: {one_line(mode)}"
         for since, whose, mode in sorted(changes, key=itemgetter(0))
     ]
     return "\n".join(lines)

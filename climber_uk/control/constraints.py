@@ -5,6 +5,7 @@ A q̈ = b these are [cosθ sinθ 0] q̈ = v̇ and [0 0 1] q̈ = θ̈; the wheels
 A new set is one class with `track` and `demand`, and one entry in `CONSTRAINTS`.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,6 +19,7 @@ from climber_uk.mechanics.motion import Demand, Motion, Target
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.reference import Reference
 
+REACH = 0.2  # [m] from the path, within which the exact set is expected to stay
 REST_SPEED = 1e-3  # [m/s] below which a heading cannot be told from the way a climber moves
 
 
@@ -29,6 +31,9 @@ class ConstraintSet(Protocol):
 
     def demand(self, track: Any, motion: Motion) -> Demand:
         """What is asked of a climber that moves like that."""
+
+    def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
+        """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""
 
 
 def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> Demand:
@@ -62,9 +67,10 @@ class Guidance:
     g = k_y v_d / √(v_d² + v_s²) fades where steering cannot help and changes sign in reverse gear.
     With the no-slip row, A is orthonormal.
 
-    L = v_s/2 + v_c |v_d| / √(v_d² + v_s²) bounds what is added to the speed of who is behind, and
-    L = √(v_d² + v_s²/4) what is taken from who is ahead: he waits, for driving backwards he would
-    steer away.
+    L bounds how much the speed differs from the reference's. Behind it, L = √(v_s²/4 + (c v_d)²),
+    where c v_d is at most v_c. Ahead of it, L = √(v_d² + v_s²/4): a climber slows down and waits
+    for its reference, for driving backwards it would steer away. R = √(v_d² + v_s²) / ρ, at most
+    `turn_rate`.
     """
 
     along_track_gain: float = parameter(5.0, "1/s", "k_x", above=0, runtime=True)
@@ -72,15 +78,30 @@ class Guidance:
     speed_rate: float = parameter(10.0, "1/s", "λ of the speed", above=0, runtime=True)
     heading_frequency: float = parameter(12.0, "rad/s", "ω_n of the heading", above=0, runtime=True)
     fade_speed: float = parameter(1.0, "m/s", "v_s, below which k_y fades", above=0, runtime=True)
+    catch_up_share: float = parameter(
+        0.25, "", "c, share of its speed that is added behind the reference", above=0, runtime=True
+    )
     catch_up_speed: float = parameter(
-        2.0, "m/s", "v_c, most that is added to the reference's speed", above=0, runtime=True
+        2.0, "m/s", "v_c, most that this share adds to the reference's speed", above=0, runtime=True
+    )
+    turn_radius: float = parameter(
+        0.3, "m", "ρ, of the turn back to the heading wanted", above=0, runtime=True
     )
     turn_rate: float = parameter(
-        4.0, "rad/s", "R, fastest turn back to the heading wanted", above=0, runtime=True
+        4.0, "rad/s", "fastest turn back to the heading wanted", above=0, runtime=True
     )
 
     def __post_init__(self) -> None:
         check(self)
+
+    def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
+        """See `ConstraintSet`; steering along atan(g e_y) turns by g v at most."""
+        v_s = self.fade_speed
+        hurry = math.hypot(v_s / 2, min(self.catch_up_share * speed, self.catch_up_speed))
+        root = math.hypot(speed, v_s)
+        steering = self.cross_track_gain * speed / root * (speed + hurry)
+        turning = min(root / self.turn_radius, self.turn_rate)
+        return speed + hurry, yaw_rate + turning + steering
 
     track = on_track  # see `ConstraintSet`
     demand = guided
@@ -102,6 +123,11 @@ class Exact:
 
     def __post_init__(self) -> None:
         check(self)
+
+    def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
+        """See `ConstraintSet`; offsets of up to `REACH` are expected to be corrected."""
+        correction = self.natural_frequency * REACH
+        return 2 * speed + correction, 2 * yaw_rate + self.natural_frequency
 
     def track(self, target: Target) -> Target:
         """See `ConstraintSet`."""

@@ -41,7 +41,7 @@ class Law:
         True, "", "aim at the middle of the period in which the torque acts", runtime=True
     )
     friction_speed: float = parameter(
-        0.002, "m/s", "wanted speed below which friction's share fades", above=0, runtime=True
+        0.001, "m/s", "wanted speed below which friction's share fades", above=0, runtime=True
     )
     max_torque_rate: float = parameter(
         0.0, "N m/s", "fastest change of a torque; 0: none too fast", at_least=0, runtime=True

@@ -5,7 +5,7 @@ v = v_d - L tanh(k_x e_x / L),   ψ = θ - θ_d + atan(g e_y),   g = k_y v_d / �
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from climber_uk.mechanics.elementary import arctan, cos, either, sign, sin, sqrt, tanh, wrapped
+from climber_uk.mechanics.elementary import arctan, cos, either, select, sin, sqrt, tanh, wrapped
 from climber_uk.mechanics.motion import Demand, Motion, Target, named
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ class Track(NamedTuple):
     yaw_acceleration: Any
     waiting: tuple[Any, Any]  # L of who is ahead [m/s], and its rate
     hurrying: tuple[Any, Any]  # L of who is behind
+    turn_rate: tuple[Any, Any]  # R [rad/s], and its rate
     gain: tuple[Any, Any, Any]  # g [1/m] and its first two derivatives by time
 
 
@@ -36,7 +37,7 @@ def on_track(gains: "Guidance", target: Target) -> Track:
     v, v_1 = v_x * cosine + v_y * sine, a_x * cosine + a_y * sine
     v_2 = j_x * cosine + j_y * sine + omega * omega * v
 
-    v_s, k_y, v_c = gains.fade_speed, gains.cross_track_gain, gains.catch_up_speed
+    v_s, k_y, c = gains.fade_speed, gains.cross_track_gain, gains.catch_up_share
     v_s2, v2 = v_s * v_s, v * v
     root2 = v2 + v_s2
     root = sqrt(root2)
@@ -45,18 +46,39 @@ def on_track(gains: "Guidance", target: Target) -> Track:
     share_2 = slope * v_2 - 3.0 * share_1 * v * v_1 / root2
     wait = sqrt(v2 + 0.25 * v_s2)
     waiting = wait, v * v_1 / wait
-    hurrying = 0.5 * v_s + v_c * abs(share), v_c * sign(v) * share_1
+    is_shared = c * abs(v) < gains.catch_up_speed  # the ceiling of what is added is not reached
+    hurry = sqrt(0.25 * v_s2 + select(is_shared, c * c * v2, gains.catch_up_speed**2))
+    hurrying = hurry, select(is_shared, c * c * v * v_1 / hurry, 0.0)
+    turn = root / gains.turn_radius
+    is_slower = turn < gains.turn_rate
+    turn_rate = (
+        select(is_slower, turn, gains.turn_rate),
+        select(is_slower, v * v_1 / (root * gains.turn_radius), 0.0),
+    )
     gain = k_y * share, k_y * share_1, k_y * share_2
-    numbers = x, y, heading, cosine, sine, v, v_1, omega, omega_1, waiting, hurrying, gain
+    numbers = (
+        x,
+        y,
+        heading,
+        cosine,
+        sine,
+        v,
+        v_1,
+        omega,
+        omega_1,
+        waiting,
+        hurrying,
+        turn_rate,
+        gain,
+    )
     return named(Track, numbers)
 
 
 def guided(gains: "Guidance", track: Track, motion: Motion) -> Demand:
     """Speed and heading that lead back, and the accelerations with which they are reached."""
     x, y, heading, cosine, sine, v, omega = motion
-    x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, waiting, hurrying, gain = (
-        track
-    )
+    x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, *others = track
+    waiting, hurrying, (fastest, fastest_1), gain = others
     offset_x, offset_y, turned = x - x_d, y - y_d, wrapped(heading - heading_d)
     e_x, e_y = offset_x * cosine_d + offset_y * sine_d, offset_y * cosine_d - offset_x * sine_d
     v_x = v * (cosine * cosine_d + sine * sine_d)
@@ -85,8 +107,11 @@ def guided(gains: "Guidance", track: Track, motion: Motion) -> Demand:
     led_1 = turning + steered_1
     led_2 = slope * w_2 - 2.0 * w * steered_1 * steered_1
 
-    omega_n, fastest = gains.heading_frequency, gains.turn_rate
-    part = tanh(omega_n * led / fastest)
+    omega_n = gains.heading_frequency
+    u = omega_n * led / fastest
+    part = tanh(u)
+    inside = 1.0 - part * part
     turning_back = led_1 + fastest * part  # 0 when it turns back as fast as it should
-    theta_2 = omega_d1 - led_2 - omega_n * ((1.0 - part * part) * led_1 + turning_back)
+    theta_2 = omega_d1 - led_2 - omega_n * (inside * led_1 + turning_back)
+    theta_2 = theta_2 - fastest_1 * (part - u * inside)
     return v_1, theta_2, wanted

@@ -7,7 +7,7 @@ other friction, mass or suction, a payload, a push.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import (
@@ -20,11 +20,13 @@ from climber_uk.mechanics.elementary import (
     with_sign_of,
     wrapped,
 )
-from climber_uk.mechanics.motion import Motion, Wrench, named
+from climber_uk.mechanics.motion import Motion, named
 from climber_uk.mechanics.parameter import check, parameter
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
+REST = 1e-3  # [m/s] of an expected speed that is none
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
+MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 
 
 def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float) -> Motion:
@@ -48,23 +50,45 @@ def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float)
     return named(Motion, (x + way * c, y + way * s, heading, cosine, sine, v, omega))
 
 
+class Learnt(NamedTuple):
+    """What is known of the disturbance: itself, and how it changes."""
+
+    drive: Any = 0.0  # r_F [N]
+    turn: Any = 0.0  # r_N [N m]
+    drive_rate: Any = 0.0  # [N/s]
+    turn_rate: Any = 0.0  # [N m/s]
+
+    @property
+    def held(self) -> "Learnt":
+        """The same while nothing can be learnt."""
+        return named(Learnt, (self.drive, self.turn, 0.0, 0.0))
+
+
 @dataclass(frozen=True, slots=True)
 class Observer:
     """Learns the disturbance, and the speeds if need be, from what comes out other than expected.
 
-    With measured speeds it is the momentum observer ṙ = K (M q̈ - what the model and r say).
-    Without them it is a critically damped filter of poses (fading memory of third order, or of
-    second order if K = 0). What friction holds teaches nothing: the model expects no motion.
+    With measured speeds it is a momentum observer of second order: a disturbance that grows
+    steadily leaves no error. Both poles are at K, or lower: K (2 T + δ) <= `MOST_LEARNT`, with T
+    the period and δ the delay that is known. Without measured speeds it is a critically damped
+    filter of poses (fading memory of third order, or of second order if K = 0). What friction
+    holds teaches nothing: the model expects no motion.
     """
 
     bandwidth: float = parameter(
-        100.0, "1/s", "K of the disturbance observer; 0 switches it off", at_least=0, runtime=True
+        14.0, "1/s", "K of the disturbance observer; 0 switches it off", at_least=0, runtime=True
     )
     velocity_source: str = parameter(
         "odometry",
         "",
         "where speeds are taken from; pose: for odometry without a twist",
         choices=("odometry", "pose"),
+    )
+    twist: str = parameter(
+        "auto",
+        "",
+        "speeds of odometry: those of its stamp, or means of the period before, as of encoders",
+        choices=("auto", "instantaneous", "mean"),
     )
     pose_bandwidth: float = parameter(
         60.0, "1/s", "of the filter that takes speeds from poses", above=0, runtime=True
@@ -74,20 +98,47 @@ class Observer:
         check(self)
 
     def corrected(
-        self, climber: Climber, disturbance: Wrench, expected: Motion, found: Motion, time: float
-    ) -> tuple[Motion, Wrench]:
-        """Motion and disturbance after `time` [s] in which `expected` became `found`."""
+        self,
+        climber: Climber,
+        learnt: Learnt,
+        expected: Motion,
+        found: Motion,
+        time: float,
+        shares: tuple[Any, Any],
+    ) -> tuple[Motion, Learnt]:
+        """Motion and disturbance after `time` [s] in which `expected` became `found`.
+
+        `shares` are those of the observer for that time.
+        """
         if self.velocity_source == "pose":
-            return self._from_pose(climber, disturbance, expected, found, time)
+            return self._from_pose(climber, learnt, expected, found, time)
         if everywhere(self.bandwidth == 0):
-            return found, _faded(disturbance, time)
-        share = (1.0 - exp(-self.bandwidth * time)) / time
-        faster, turning = found.speed - expected.speed, found.yaw_rate - expected.yaw_rate
-        return found, _more(climber, disturbance, share * faster, share * turning)
+            return found, _faded(learnt, time)
+        drive, turn, drive_rate, turn_rate = learnt
+        mass, inertia, _, _ = climber.inertial
+        new, newer = shares
+        faster = (found.speed - expected.speed) / time
+        turning = (found.yaw_rate - expected.yaw_rate) / time
+        drive, turn = drive + time * drive_rate, turn + time * turn_rate
+        drive, turn = drive + new * mass * faster, turn + new * inertia * turning
+        # at rest, where friction holds whatever it is, nothing tells of a change
+        slides = abs(expected.speed) > REST
+        drive_rate = select(slides, drive_rate + newer / time * mass * faster, 0.0)
+        turn_rate = turn_rate + newer / time * inertia * turning
+        return found, named(Learnt, (drive, turn, drive_rate, turn_rate))
+
+    def shares(self, time: float, delay: float) -> tuple[Any, Any]:
+        """What of an acceleration that was not expected is put down to the disturbance.
+
+        And what of it to the disturbance's change in `time` [s]; `delay` [s] is that of torques.
+        """
+        most = MOST_LEARNT * time / (2.0 * time + delay)
+        new = 1.0 - exp(-clipped(self.bandwidth * time, 0.0, most))
+        return 2.0 * new, new * new
 
     def _from_pose(
-        self, climber: Climber, disturbance: Wrench, expected: Motion, found: Motion, time: float
-    ) -> tuple[Motion, Wrench]:
+        self, climber: Climber, learnt: Learnt, expected: Motion, found: Motion, time: float
+    ) -> tuple[Motion, Learnt]:
         x, y, heading, cosine, sine, v, omega = expected
         ahead = (found.x - x) * cosine + (found.y - y) * sine
         beside = (found.y - y) * cosine - (found.x - x) * sine
@@ -99,20 +150,15 @@ class Observer:
             g, h, k = 1 - memory**3, 1.5 * (1 - memory**2) * new, new**3
         else:
             g, h, k = 1 - memory**2, new**2, 0.0
-            disturbance = _faded(disturbance, time)
+            learnt = _faded(learnt, time)
         x, y = x + g * (ahead * cosine - beside * sine), y + g * (ahead * sine + beside * cosine)
         v, omega = v + h / time * ahead, omega + h / time * turned
         motion = Motion(x, y, *rotated(heading, cosine, sine, g * turned), v, omega)
-        return motion, _more(climber, disturbance, k / time**2 * ahead, k / time**2 * turned)
+        mass, inertia, _, _ = climber.inertial
+        drive = learnt.drive + k / time**2 * mass * ahead
+        return motion, Learnt(drive, learnt.turn + k / time**2 * inertia * turned)
 
 
-def _more(climber: Climber, disturbance: Wrench, v_1: Any, omega_1: Any) -> Wrench:
-    r_drive, r_turn = disturbance
-    mass, inertia, _, _ = climber.inertial
-    return named(Wrench, (r_drive + mass * v_1, r_turn + inertia * omega_1))
-
-
-def _faded(disturbance: Wrench, time: float) -> Wrench:
-    r_drive, r_turn = disturbance
+def _faded(learnt: Learnt, time: float) -> Learnt:
     left = exp(-time / FORGETTING_TIME)
-    return Wrench(r_drive * left, r_turn * left)
+    return Learnt(learnt.drive * left, learnt.turn * left)

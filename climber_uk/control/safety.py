@@ -25,16 +25,42 @@ class Mode(Enum):
     NO_CLOCK = "use_sim_time is true, but there is no clock"
     NO_ODOMETRY = "no odometry"
     BAD_ODOMETRY = "bad odometry"
+    SELDOM = "odometry comes too seldom"
     JUMPED = "odometry jumped"
     NO_TWIST = "the pose moves while the twist is zero"
     LOW_PRESSURE = "suction pressure too low"
     NO_REFERENCE = "no reference"
     NO_SOLUTION = "no torque can be computed"
+    TWIST_WRONG = "twist and pose contradict each other"
+    SIGN_WRONG = "twist and pose have opposite signs"
+    TOO_FAR = "too far from the reference"
+    OFF_PATH = "off the path"
+    APPROACHING = "approaching the reference"
+    TOO_FAST = "faster than the reference allows"
+    STALLED = "torque at its limit without effect"
+    DISTURBED = "a disturbance that nothing explains"
+    DEAD_WHEEL = "a wheel does not answer its torque"
 
     @property
     def is_fault(self) -> bool:
         """Whether it is an error, not something that was asked for."""
-        return self not in (Mode.FOLLOWING, Mode.WAITING, Mode.NOT_BEGUN, Mode.DISABLED)
+        return self not in NO_FAULTS
+
+    @property
+    def doubts_odometry(self) -> bool:
+        """Whether the speeds that odometry tells must not be braked by."""
+        return self in (
+            Mode.BAD_ODOMETRY,
+            Mode.JUMPED,
+            Mode.NO_TWIST,
+            Mode.TWIST_WRONG,
+            Mode.SIGN_WRONG,
+        )
+
+
+NO_FAULTS = frozenset(
+    {Mode.FOLLOWING, Mode.APPROACHING, Mode.WAITING, Mode.NOT_BEGUN, Mode.DISABLED}
+)
 
 
 @dataclass(frozen=True)
@@ -48,16 +74,32 @@ class Safety:
         choices=("zero", "hold"),
     )
     braking_rate: float = parameter(5.0, "1/s", "of the safe output 'hold'", at_least=0)
-    odometry_timeout: float = parameter(0.1, "s", "age at which odometry is stale", above=0)
-    reference_timeout: float = parameter(0.1, "s", "how long a reference is waited for", above=0)
+    odometry_timeout: float = parameter(
+        0.1, "s", "age at which odometry is stale", above=0, plausible=(0.002, 5)
+    )
+    reference_timeout: float = parameter(
+        0.1, "s", "how long a reference is waited for", above=0, plausible=(0.002, 5)
+    )
     least_pressure: float = parameter(
-        0.0, "Pa", "suction below which the climber is stopped; 0: never", at_least=0
+        0.0,
+        "Pa",
+        "suction below which the climber is stopped; 0: never",
+        at_least=0,
+        plausible=(100, 1e5),
     )
     max_jump: float = parameter(
-        0.2, "m", "by which a wheel may be elsewhere than the model expects", above=0
+        0.2,
+        "m",
+        "by which a wheel may be elsewhere than the model expects",
+        above=0,
+        plausible=(0.005, 5),
     )
     settling_messages: int = parameter(
         5, "", "odometry messages without a jump until it is followed again", at_least=1
+    )
+
+    max_twist_error: float = parameter(
+        0.05, "m", "of the way in half a second, between twist and pose, beside 30 %", above=0
     )
 
     def __post_init__(self) -> None:

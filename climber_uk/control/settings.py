@@ -3,14 +3,17 @@
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
-from climber_uk.control.constraints import CONSTRAINTS
+from climber_uk.control.approach import Approach
+from climber_uk.control.constraints import CONSTRAINTS, Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
+from climber_uk.control.guard import GuardOptions
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
 from climber_uk.control.tracker import Timing, Tracker
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.hold import ADHESION, with_its_seal
 from climber_uk.mechanics.parameter import check, parameter
 
 T = TypeVar("T")
@@ -25,19 +28,21 @@ class Parameters(Protocol):
 
 @dataclass(frozen=True)
 class Choice:
-    """Which constraints are followed."""
+    """Which constraints are followed, and what kind of climber follows them."""
 
     constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
+    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
 
     def __post_init__(self) -> None:
         check(self)
 
 
 KINDS: list[tuple[type, str]] = [
-    *((kind, "") for kind in (Choice, Climber, Law, Timing, Safety)),
+    *((kind, "") for kind in (Choice, Climber, Law, Timing, Safety, Approach)),
     *((kind, f"{name}.") for name, kind in CONSTRAINTS.items()),
     (Observer, "observer."),
     (Pacing, "pacing."),
+    (GuardOptions, "guard."),
 ]
 """All that is read, with the prefix of its parameters."""
 
@@ -47,7 +52,8 @@ def settings(
 ) -> tuple[Controller, Observer, Timing, Pacing]:
     """What the parameters, and the measured pressure [Pa], say now."""
     read = parameters.read
-    climber, name = read(Climber), read(Choice).constraints
+    choice = read(Choice)
+    name, climber = choice.constraints, with_its_seal(read(Climber), choice.adhesion)
     if pressure is not None:
         climber = replace(climber, suction_pressure=pressure)
     controller = Controller(climber, read(CONSTRAINTS[name], f"{name}."), read(Law))
@@ -56,4 +62,7 @@ def settings(
 
 def new_follower(parameters: Parameters, pressure: float | None) -> Follower:
     """Follower as the parameters say, that has seen nothing yet."""
-    return Follower(Tracker(*settings(parameters, pressure)), parameters.read(Safety))
+    read, tracker = parameters.read, Tracker(*settings(parameters, pressure))
+    follower = Follower(tracker, read(Safety), read(Approach), read(GuardOptions, "guard."))
+    follower.course.approach_constraints = read(Guidance, "guidance.")
+    return follower

@@ -11,8 +11,10 @@ from typing import Any
 from climber_uk.control.acting import NONE, Acting
 from climber_uk.control.constraints import ConstraintSet
 from climber_uk.control.controller import Command, Controller, Situation
-from climber_uk.control.model import Observer, rolled
-from climber_uk.control.pacing import IN_TIME, Pacing
+from climber_uk.control.latency import Latency, Sample
+from climber_uk.control.model import SLOW, Learnt, Observer, rolled
+from climber_uk.control.pacing import Pacing, Progress
+from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, named
@@ -44,8 +46,19 @@ class Timing:
         at_most=LONGEST_STEP,
         runtime=True,
     )
+    max_latency: float = parameter(
+        0.02,
+        "s",
+        "age of an odometry that is believed: what is always older is the clocks' offset",
+        at_least=0,
+        at_most=LONGEST_STEP,
+    )
     measure_delay: bool = parameter(
         True, "", "add the odometry's age to the transport delay", runtime=True
+    )
+
+    learn_delay: bool = parameter(
+        True, "", "learn what is missing in the transport delay while it runs", runtime=True
     )
 
     def __post_init__(self) -> None:
@@ -63,26 +76,39 @@ class Tracker:
         self.period = timing.control_period  # [s] from one odometry to the next
         self._period_is_measured = False
         self._acting = Acting()
+        self.latency, self.twist = Latency(), TwistKind()
+        self._delay = 0.0  # [s] of the last answer
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
+        self.progress = Progress()  # along the reference that is followed
         self.reset()
 
     def reset(self) -> None:
         """Start anew, from an unknown state at an unknown time."""
         self.stamp = 0  # [ns]
-        self._acting.restart()
         self.motion: Motion | None = None
+        self._told: Motion | None = None  # the last odometry, as it was told
+        self.restart()
         self.forget()
 
-    def forget(self) -> None:
-        """Forget what was learnt, and that the reference waited."""
-        self.disturbance = Wrench(0.0, 0.0)
-        self._learning: Any = False
-        self.start_pace()
+    def restart(self) -> None:
+        """Go on at an unknown time, from an unknown state: the clock was set back."""
+        self.stamp = 0
+        self._acting.restart()
+        self.motion = self._told = None
 
-    def start_pace(self) -> None:
-        """Follow the reference in its own time."""
-        self.pace = IN_TIME
-        self._paced_at: int | None = None
+    def forget(self) -> None:
+        """Forget what was learnt of the disturbance."""
+        self.learnt = Learnt()
+        self._learning: Any = False
+
+    @property
+    def disturbance(self) -> Wrench:
+        """What pushes and turns the climber besides what the model knows."""
+        return named(Wrench, self.learnt[:2])
+
+    @disturbance.setter
+    def disturbance(self, disturbance: Wrench) -> None:
+        self.learnt = Learnt(*disturbance)
 
     def retune(
         self, controller: Controller, observer: Observer, timing: Timing, pacing: Pacing
@@ -101,43 +127,52 @@ class Tracker:
             self.period += share * (time - self.period)
             self._period_is_measured = True
             expected = expected or self.expected_at(stamp)
+            is_known = self._acting.are_known_since(self.stamp)
+            shares = self.observer.shares(time, self._delay)
+            if self.observer.velocity_source == "odometry" and isinstance(motion.x, float):
+                motion = self._at_its_stamp(expected, motion, time)
+                if self.timing.learn_delay and is_known:
+                    self._learn_delay(stamp, expected, motion, shares)
             motion, learnt = self.observer.corrected(
-                self.controller.climber, self.disturbance, expected, motion, time
+                self.controller.climber, self.learnt, expected, motion, time, shares
             )
-            if self._acting.are_known_since(self.stamp):
+            if is_known:
                 is_learnt = self._learning
-                self.disturbance = (
-                    learnt if is_learnt is True else chosen(is_learnt, learnt, self.disturbance)
+                self.learnt = (
+                    learnt if is_learnt is True else chosen(is_learnt, learnt, self.learnt.held)
                 )
         elif self.observer.velocity_source == "pose":
             motion = motion._replace(speed=0.0, yaw_rate=0.0)
         self.stamp, self.motion = stamp, motion
 
-    def answer(self, preview: Preview, age: float) -> Command | None:
+    def answer(
+        self, preview: Preview, age: float, constraints: ConstraintSet | None = None
+    ) -> Command | None:
         """Torques for the last odometry, of `age` [s]; None where the preview does not reach.
 
+        `constraints` are followed in the place of the controller's own.
         Raises `ValueError` or `ArithmeticError` if they are not finite.
         """
         begins, situation = self._situation(age)
-        controller, pace = self.controller, self.pace
-        if self._retuned is not None:
+        controller = self.controller
+        if constraints is not None:
+            controller = replace(controller, constraints=constraints)
+        elif self._retuned is not None:
             controller = replace(controller, constraints=self._constraints())
         aim = begins + round(controller.law.lookahead(self.period) * SECOND)
-        if pace is not IN_TIME and self.pacing.catch_up > 0:
-            since = begins if self._paced_at is None else self._paced_at
-            pace = pace.after((begins - since) / SECOND, self.pacing)
-        target = preview.target(aim) if pace is IN_TIME else pace.target(preview, aim)
+        progress = self.progress.advanced(begins, self.pacing)
+        target = progress.target(preview, aim)
         if target is None:
             return None
         command = controller.command(situation, target)
         if self.pacing.catch_up > 0 and abs(command.lost.drive) > CUT:
-            pace = pace.slowed(
+            progress = progress.slowed(
                 command.lost.drive / controller.climber.mass, preview, aim, self.period
             )
-            command = controller.command(situation, pace.target(preview, aim) or target)
+            command = controller.command(situation, progress.target(preview, aim) or target)
         wheels, _, _, (drive, turn) = command
         _check(wheels)
-        self.pace, self._paced_at = pace, begins
+        self.progress = progress
         self._learning = (abs(drive) <= CUT) & (abs(turn) <= CUT)
         self._send(begins, wheels)
         return command
@@ -157,24 +192,60 @@ class Tracker:
     def let_go(self, age: float) -> Torques:
         """No torques."""
         self._learning = False
-        self._send(self._begin(age), NONE)
+        self._send(self.begin(age), NONE)
         return NONE
 
     def correct(self, torques: Torques) -> None:
         """Believe that other torques were sent than it answered last."""
         self._acting.correct(torques)
 
+    def mean_torques(self, stamp: int) -> Torques:
+        """Mean of the torques that act from the last odometry to `stamp` [ns]."""
+        spans = self._acting.between(self.stamp, stamp)
+        whole = sum(time for _, time in spans) or 1.0
+        right = sum(torques.right * time for torques, time in spans) / whole
+        left = sum(torques.left * time for torques, time in spans) / whole
+        return Torques(right, left)
+
     def expected_at(self, stamp: int) -> Motion:
         """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.motion is not None
-        motion, climber, disturbance = self.motion, self.controller.climber, self.disturbance
+        motion, climber = self.motion, self.controller.climber
+        r_drive, r_turn, _, _ = self.learnt
         if stamp == self.stamp:
             return motion
         for torques, time in self._acting.between(self.stamp, stamp):
             drive, turn = forces(climber, *torques)
-            drive, turn = drive + disturbance.drive, turn + disturbance.turn
-            motion = rolled(climber, motion, drive, turn, time)
+            motion = rolled(climber, motion, drive + r_drive, turn + r_turn, time)
         return motion
+
+    def _at_its_stamp(self, expected: Motion, found: Motion, time: float) -> Motion:
+        """Motion whose speeds are those of its stamp, not the mean of the `time` [s] before."""
+        assert self.motion is not None
+        kind = self.observer.twist
+        if kind == "auto" and self._told is not None:
+            self.twist.learn(self._told, found, time)
+        self._told = found
+        if kind == "instantaneous" or (kind == "auto" and not self.twist.is_mean):
+            return found
+        speed, rate = mean_twist(self.motion, expected, time)
+        return found._replace(
+            speed=found.speed + expected.speed - speed,
+            yaw_rate=found.yaw_rate + expected.yaw_rate - rate,
+        )
+
+    def _learn_delay(
+        self, stamp: int, expected: Motion, found: Motion, shares: tuple[Any, Any]
+    ) -> None:
+        """Learn how much later than told torques act; `shares` are the observer's."""
+        climber = self.controller.climber
+        drive, turn = forces(climber, *self._acting.between(self.stamp, stamp)[-1][0])
+        lever = climber.half_track
+        accelerations = drive / climber.mass, lever * turn / climber.yaw_inertia
+        errors = found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)
+        time, slides = (stamp - self.stamp) / SECOND, abs(found.speed) > SLOW
+        sample = named(Sample, (accelerations, errors, time, slides))
+        self.latency.learn(sample, shares, self.timing.transport_delay)
 
     def _constraints(self) -> ConstraintSet:
         """Constraints as they are now, on their way from the gains that were before."""
@@ -193,14 +264,16 @@ class Tracker:
         }
         return type(after)(**gains)
 
-    def _begin(self, age: float) -> int:
+    def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
         timing = self.timing
         delay = timing.transport_delay + (age if timing.measure_delay else 0.0)
+        delay += self.latency.delay if timing.learn_delay else 0.0
+        self._delay = delay
         return self._acting.begin(self.stamp + round(delay * SECOND))
 
     def _situation(self, age: float) -> tuple[int, Situation]:
-        begins = self._begin(age)
+        begins = self.begin(age)
         motion = self.expected_at(begins)
         situation = motion, self._acting.last, self.disturbance, self.period
         return begins, named(Situation, situation)

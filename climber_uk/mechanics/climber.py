@@ -76,26 +76,47 @@ class Climber:
     Raises `ValueError` naming field, value and bound.
     """
 
-    mass: float = parameter(5.0, "kg", "mass m", above=0)
-    yaw_inertia: float = parameter(0.33, "kg m²", "inertia J about the centre of mass", above=0)
-    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0)
-    half_track: float = parameter(0.3, "m", "distance d of a wheel from the centre", above=0)
+    mass: float = parameter(5.0, "kg", "mass m", above=0, plausible=(0.1, 300))
+    yaw_inertia: float = parameter(
+        0.33, "kg m²", "inertia J about the centre of mass", above=0, plausible=(1e-4, 100)
+    )
+    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0, plausible=(0.005, 0.5))
+    half_track: float = parameter(
+        0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
+    )
     seal_friction_coefficient: float = parameter(
-        0.8, "", "friction coefficient μ of the seal ring on the wall", at_least=0
+        0.8,
+        "",
+        "friction coefficient μ of the seal ring on the wall",
+        at_least=0,
+        plausible=(0.01, 3),
     )
     wheel_load_share: float = parameter(
         0.53, "", "share k of the suction force that the wheels carry", at_least=0, at_most=1
     )
     suction_pressure: float = parameter(
-        2500.0, "Pa", "pressure difference P", at_least=0, runtime=True
+        2500.0, "Pa", "pressure difference P", at_least=0, runtime=True, plausible=(1000, 1e5)
     )
-    suction_area: float = parameter(0.06, "m²", "effective suction area S", at_least=0)
+    suction_area: float = parameter(
+        0.06, "m²", "effective suction area S", at_least=0, plausible=(1e-4, 1)
+    )
     inclination: float = parameter(
-        90.0, "deg", "of the wall: 0 floor, 90 vertical, 180 ceiling", at_least=0, at_most=180
+        90.0,
+        "deg",
+        "of the wall: 0 floor, 90 vertical, 180 ceiling",
+        at_least=0,
+        at_most=180,
+        plausible=(3.2, 180),
     )
-    max_wheel_torque: float = parameter(20.0, "N m", "limit of each wheel's torque", above=0)
+    max_wheel_torque: float = parameter(
+        20.0, "N m", "limit of each wheel's torque", above=0, plausible=(0.02, 300)
+    )
     no_load_wheel_rate: float = parameter(
-        0.0, "rad/s", "wheel rate at which a motor has no torque left; 0: none falls", at_least=0
+        0.0,
+        "rad/s",
+        "wheel rate at which a motor has no torque left; 0: none falls",
+        at_least=0,
+        plausible=(1, 1000),
     )
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ F_a is the adhesion, N_w the load on the wheels, g_n and g_t gravity into the wa
 new kind of adhesion is one class and one entry. Everything broadcasts.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from climber_uk.mechanics.climber import Climber
@@ -65,9 +65,15 @@ class Suction:
 class Magnetic:
     """F₀ / (1 + gap/g₀)², as of a magnet whose flux crosses the gap twice; nothing slides."""
 
-    force_at_contact: float = parameter(300.0, "N", "F₀, of the magnets on bare steel", at_least=0)
-    gap: float = parameter(0.0, "m", "of air or paint", at_least=0, runtime=True)
-    gap_of_a_quarter: float = parameter(2e-3, "m", "g₀, which leaves a quarter of F₀", above=0)
+    force_at_contact: float = parameter(
+        300.0, "N", "F₀, of the magnets on bare steel", at_least=0, plausible=(1, 1e5)
+    )
+    gap: float = parameter(
+        0.0, "m", "of air or paint", at_least=0, runtime=True, plausible=(1e-6, 0.1)
+    )
+    gap_of_a_quarter: float = parameter(
+        2e-3, "m", "g₀, which leaves a quarter of F₀", above=0, plausible=(1e-6, 0.1)
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -102,22 +108,40 @@ ADHESION: dict[str, type[Adhesion]] = {
 }
 
 
+def with_its_seal(climber: Climber, adhesion: str) -> Climber:
+    """The climber with the friction that its kind of `ADHESION` has: without suction, no seal rubs.
+
+    For models that know no more of what holds a climber than its own parameters.
+    """
+    return climber if adhesion == "suction" else replace(climber, seal_friction_coefficient=0.0)
+
+
 @dataclass(frozen=True)
 class Grip:
     """How a climber stands on its wall."""
 
     wheel_friction_coefficient: float = parameter(
-        0.8, "", "μ_w of the wheels (or tracks) on the wall", at_least=0
+        0.8, "", "μ_w of the wheels (or tracks) on the wall", at_least=0, plausible=(0.01, 3)
     )
     wheel_inertia: float = parameter(
-        2e-5, "kg m²", "of a wheel about its axle, counted in mass and yaw inertia", above=0
+        2e-5,
+        "kg m²",
+        "of a wheel about its axle, counted in mass and yaw inertia",
+        above=0,
+        plausible=(1e-8, 1),
     )
     centre_height: float = parameter(
-        0.05, "m", "h of the centre of mass above the wall", at_least=0
+        0.05, "m", "h of the centre of mass above the wall", at_least=0, plausible=(0.001, 1)
     )
-    wheelbase: float = parameter(0.25, "m", "l between the edges it would tip about", above=0)
+    wheelbase: float = parameter(
+        0.25, "m", "l between the edges it would tip about", above=0, plausible=(0.02, 3)
+    )
     seal_radius: float = parameter(
-        0.0, "m", "of the ring that resists turning; 0: it does not", at_least=0
+        0.0,
+        "m",
+        "of the ring that resists turning; 0: it does not",
+        at_least=0,
+        plausible=(0.01, 1),
     )
 
     def __post_init__(self) -> None:

@@ -118,9 +118,10 @@ def limited(
     lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
     highest = highest - clipped(highest - (left_high + twist), 0.0, float("inf"))
     mean = clipped(mean, lowest, highest)
+    # once more, as sums are rounded: no torque is beyond its bound by as little as that
     return (
         select(fits, drive, mean / to_mean),
         select(fits, turn, twist / to_twist),
-        select(fits, one, mean + twist),
-        select(fits, other, mean - twist),
+        select(fits, one, clipped(mean + twist, right_low, right_high)),
+        select(fits, other, clipped(mean - twist, left_low, left_high)),
     )

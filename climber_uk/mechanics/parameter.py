@@ -18,12 +18,17 @@ def parameter(
     at_least: float | None = None,
     at_most: float | None = None,
     choices: Sequence[str] | None = None,
+    plausible: tuple[float, float] | None = None,
+    formerly: str = "",
     runtime: bool = False,
+    is_path: bool = False,
 ) -> Any:
     """Declare a dataclass field together with all that a user may ask about it.
 
-    `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; `runtime` marks
-    what a running node may change. Pass the dataclass's instance to `check` in `__post_init__`.
+    `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
+    range `plausible` is doubted, not refused; a name that it had `formerly` is still taken;
+    `runtime` marks what a running node may change, `is_path` the name of a file, which in a
+    parameter file is relative to that. Pass the dataclass's instance to `check` in `__post_init__`.
     """
     return dataclasses.field(
         default=default,
@@ -34,7 +39,10 @@ def parameter(
             "at_least": at_least,
             "at_most": at_most,
             "choices": choices,
+            "plausible": plausible,
+            "formerly": formerly,
             "runtime": runtime,
+            "is_path": is_path,
         },
     )
 

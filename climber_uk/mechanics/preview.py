@@ -13,9 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array, Stamps
+from climber_uk.mechanics.climber import across, along
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.motion import Target, named
 from climber_uk.mechanics.reference import Reference
+
+MOST_SIDEWAYS = 0.1  # [rad] between heading and velocity, forwards or backwards
+REST = 0.005  # [m/s] sideways, below which a heading has no direction to agree with
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,26 @@ class Preview:
         for name in ("pose", "velocity", "acceleration"):
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} of a point is not finite")
+
+    def check_heading(self) -> None:
+        """Raise `ValueError` unless every point moves along its heading, forwards or backwards.
+
+        Wheels do not roll sideways (17). Angles of less than `MOST_SIDEWAYS` pass, which finite
+        differences may give, and any heading passes at rest.
+        """
+        heading = self.pose[:, 2]
+        forwards = np.abs(along(heading, self.velocity))
+        sideways = np.abs(across(heading, self.velocity))
+        angle = np.arctan2(sideways, forwards)
+        is_wrong = (angle > MOST_SIDEWAYS) & (sideways > REST)
+        if is_wrong.any():
+            i = int(np.argmax(is_wrong))
+            raise ValueError(
+                f"point {i + 1} moves sideways: its velocity of "
+                f"{np.hypot(forwards[i], sideways[i]):.3g} m/s is {np.degrees(angle[i]):.3g}° off "
+                f"its heading of {heading[i]:.3g} rad, at most {np.degrees(MOST_SIDEWAYS):.2g}° "
+                "can be followed"
+            )
 
     @cached_property
     def _pieces(self) -> tuple[list[int], list[list[list[float]]]]:
@@ -70,6 +94,27 @@ class Preview:
         y, v_y, a_y, j_y = _derivatives(along_y, t)
         heading, omega, omega_1, _ = _derivatives(turning, t)
         return named(Target, (x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y))
+
+    def fastest(self, begin: int, end: int) -> tuple[float, float]:
+        """Fastest speed [m/s] and yaw rate [rad/s] at its points from `begin` to `end` [ns].
+
+        Of the nearest one, if there is none.
+        """
+        first = min(int(np.searchsorted(self.times, begin)), len(self.times) - 1)
+        last = max(int(np.searchsorted(self.times, end, "right")), first + 1)
+        v_x, v_y, yaw_rate = self.velocity[first:last].T
+        return float(np.hypot(v_x, v_y).max()), float(np.abs(yaw_rate).max())
+
+    def last(self, points: int) -> "Preview":
+        """The same, with its last `points` at most."""
+        if len(self.times) <= points:
+            return self
+        return Preview(
+            self.times[-points:],
+            self.pose[-points:],
+            self.velocity[-points:],
+            self.acceleration[-points:],
+        )
 
     def goes_on_with(self, newer: "Preview", tolerance: float) -> bool:
         """Whether `newer` begins within `tolerance` [m, rad] of where this one is by then."""

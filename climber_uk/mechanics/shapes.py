@@ -1,19 +1,18 @@
 """Shapes: curves p(s) in the wall's frame with three derivatives by their path parameter s.
 
-A new shape is one class with `length`, `closed` and `derivatives`, and one entry in `SHAPES`.
+A new shape is one class, a `Shape` with `length`, `closed` and `derivatives`, and one entry in
+`SHAPES`.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.waypoints import Waypoints
 
 
 class Shape(Protocol):
@@ -30,9 +29,29 @@ class Shape(Protocol):
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """p, p', p'', p''' at s (...), each (..., 2); p' is never zero."""
 
+    # What most shapes need not say:
+
+    def at_rate(self, rate: float) -> "Shape":
+        """Return the same path for a law of this `rate`: slow where the shape has limits."""
+        return self
+
+    @property
+    def reversals(self) -> Array:
+        """Places s (k,), in order, where the climber must rest and then go back the way it came."""
+        return np.empty(0)
+
+    def gear(self, s: Array) -> Any:
+        """1, or -1 between an odd number of reversals and the next, where the tail goes first."""
+        return 1.0
+
+    @property
+    def stations(self) -> Array:
+        """Places s (n,), in order, so dense that no extreme of the path is missed."""
+        return np.linspace(0.0, self.length, 4001)
+
 
 @dataclass(frozen=True)
-class Ellipse:
+class Ellipse(Shape):
     """p = (a sin s, b cos s): from the top, clockwise; the paper's path (21)."""
 
     semi_axis_x: float = parameter(10.0, "m", "semi-axis a along x", above=0)
@@ -53,7 +72,7 @@ class Ellipse:
 
 
 @dataclass(frozen=True)
-class Circle:
+class Circle(Shape):
     """p = r (cos s, sin s): anticlockwise."""
 
     radius: float = parameter(1.0, "m", "radius", above=0)
@@ -72,7 +91,7 @@ class Circle:
 
 
 @dataclass(frozen=True)
-class Lemniscate:
+class Lemniscate(Shape):
     """p = (a sin s, b sin 2s): a figure of eight through its centre."""
 
     half_width: float = parameter(1.0, "m", "extent a along x", above=0)
@@ -96,7 +115,7 @@ class Lemniscate:
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(Shape):
     """p = s (cos α, sin α): straight on."""
 
     length: float = parameter(1.0, "m", "length", above=0)
@@ -115,7 +134,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class SineWave:
+class SineWave(Shape):
     """p = (s, A sin(2π s/λ)): along x, swinging in y."""
 
     length: float = parameter(2.0, "m", "extent along x", above=0)
@@ -136,72 +155,6 @@ class SineWave:
             _points(0 * s, -A * n**2 * np.sin(n * s)),
             _points(0 * s, -A * n**3 * np.cos(n * s)),
         )
-
-
-@dataclass(frozen=True)
-class Waypoints:
-    """Quintic spline through the points of a text file, C⁴, s along the chords between them.
-
-    Each line of the file holds x and y [m]. If the last point repeats the first, the path is
-    closed; else its curvature is 0 at both ends. Raises `ValueError` naming the file and what
-    is wrong in it.
-    """
-
-    file: str = parameter("", "", "text file with x and y of a point a line, in m")
-
-    def __post_init__(self) -> None:
-        check(self)
-        _ = self._splines  # a bad file is found now, not when the climber starts
-
-    @cached_property
-    def _points(self) -> Array:
-        try:
-            points = np.loadtxt(Path(self.file).expanduser(), ndmin=2)
-        except (OSError, ValueError) as error:
-            raise ValueError(f"file={self.file!r}: {error}") from None
-        if points.ndim != 2 or points.shape[1] != 2:
-            raise ValueError(f"file={self.file!r}: want two columns, x and y")
-        if len(points) < 2:
-            raise ValueError(f"file={self.file!r}: {len(points)} point(s), want >= 2")
-        if not np.isfinite(points).all():
-            line = int(np.argwhere(~np.isfinite(points))[0, 0])
-            raise ValueError(f"file={self.file!r}: point {line + 1} is not finite")
-        return points
-
-    @cached_property
-    def _splines(self) -> tuple[Callable[[Array], Array], ...]:
-        """The spline and its first three derivatives."""
-        from scipy.interpolate import make_interp_spline  # slow to import: for this shape only
-
-        points = self._points
-        chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        if not chords.all():
-            number = int(np.argmin(chords)) + 2
-            raise ValueError(f"file={self.file!r}: point {number} repeats the one before")
-        straight = [(2, np.zeros(2)), (3, np.zeros(2))]
-        spline = make_interp_spline(
-            np.concatenate([[0.0], np.cumsum(chords)]),
-            points,
-            k=5,
-            bc_type="periodic" if self.closed else (straight, straight),
-        )
-        return spline, spline.derivative(1), spline.derivative(2), spline.derivative(3)
-
-    @property
-    def closed(self) -> bool:
-        """See `Shape`."""
-        return len(self._points) > 2 and bool((self._points[0] == self._points[-1]).all())
-
-    @cached_property
-    def length(self) -> float:
-        """See `Shape`."""
-        return float(np.linalg.norm(np.diff(self._points, axis=0), axis=1).sum())
-
-    def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
-        """See `Shape`."""
-        s = np.mod(s, self.length) if self.closed else s
-        p, p_1, p_2, p_3 = (spline(s) for spline in self._splines)
-        return p, p_1, p_2, p_3
 
 
 SHAPES = {

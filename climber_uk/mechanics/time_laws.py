@@ -4,7 +4,7 @@ A new law is one class with `duration` and `progress`, and one entry in `TIME_LA
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -18,8 +18,15 @@ from climber_uk.mechanics.shapes import Shape
 class TimeLaw(Protocol):
     """Progress along a shape."""
 
+    @property
+    def rate(self) -> float:
+        """Highest rate of the path parameter."""
+
     def duration(self, shape: Shape) -> float:
         """Time after which the climber rests for good [s]; infinite if it never does."""
+
+    def horizon(self, shape: Shape) -> float:
+        """Time by which all has been seen that the law does [s]: at most two rounds or one way."""
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """s, ṡ, s̈, s⃛ at `time` (...) [s], in the units of the shape's path parameter."""
@@ -45,6 +52,10 @@ class ConstantRate:
         """See `TimeLaw`."""
         return math.inf
 
+    def horizon(self, shape: Shape) -> float:
+        """See `TimeLaw`."""
+        return shape.length / self.rate
+
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """See `TimeLaw`."""
         zero = np.zeros_like(time)
@@ -55,8 +66,9 @@ class ConstantRate:
 class RestToRest:
     """From rest up to `rate`, along, and back to rest, smooth to the jerk; once or repeatedly.
 
-    A run goes `laps` times around a closed shape or once along an open one. The next run goes on
-    around the closed shape, or back along the open one with the heading kept: in reverse gear.
+    A run goes `laps` times around a closed shape or once along an open one, from rest to rest
+    between the places where the shape turns back. The next run goes on around the closed shape,
+    or back along the open one with the heading kept: in reverse gear.
     """
 
     rate: float = _rate()
@@ -70,29 +82,51 @@ class RestToRest:
 
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
-        _, _, run_time = self._run(shape)
+        run_time = float(self._legs(shape)[1][-1])
         return self.runs * (run_time + self.pause) - self.pause if self.runs else math.inf
+
+    def horizon(self, shape: Shape) -> float:
+        """See `TimeLaw`."""
+        few = replace(self, laps=min(self.laps, 2))
+        return float(few._legs(shape)[1][-1])
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """See `TimeLaw`."""
-        rate, brake_start, run_time = self._run(shape)
+        places, times = self._legs(shape)
+        run_time = times[-1]
         last_run = self.runs - 1 if self.runs else math.inf
         run = np.clip(np.floor(time / (run_time + self.pause)), 0, last_run)
         since = np.clip(time - run * (run_time + self.pause), 0, run_time)
-        faster = smooth_start(since, self.ramp_time)
-        slower = smooth_start(since - brake_start, self.ramp_time)
-        s, s_1, s_2, s_3 = (rate * (up - down) for up, down in zip(faster, slower, strict=True))
         if shape.closed:
-            return s + run * rate * brake_start, s_1, s_2, s_3
-        back = np.mod(run, 2)
+            s, *rates = self._along(since, places, times)
+            return s + run * places[-1], *rates
+        back = np.mod(run, 2)  # the way there, backwards
         sign = 1 - 2 * back
-        return back * shape.length + sign * s, sign * s_1, sign * s_2, sign * s_3
+        s, s_1, s_2, s_3 = self._along(back * run_time + sign * since, places, times)
+        return s, sign * s_1, s_2, sign * s_3
 
-    def _run(self, shape: Shape) -> tuple[float, float, float]:
-        """Highest rate, start of the braking and end of a run [s]."""
-        span = shape.length * (self.laps if shape.closed else 1)
-        rate = min(self.rate, span / self.ramp_time)
-        return rate, span / rate, span / rate + self.ramp_time
+    def _legs(self, shape: Shape) -> tuple[Array, Array]:
+        """Where a run starts, reverses and ends (n,), and when it is there [s]."""
+        laps = self.laps if shape.closed else 1
+        span = shape.length * laps
+        places = np.array([0.0, span])
+        if len(shape.reversals):
+            rests = (shape.reversals + shape.length * np.arange(laps)[:, None]).ravel()
+            is_within = (rests > 1e-9 * shape.length) & (rests < span - 1e-9 * shape.length)
+            places = np.insert(places, 1, rests[is_within])
+        ways = np.diff(places)
+        times = ways / np.minimum(self.rate, ways / self.ramp_time) + self.ramp_time
+        return places, np.concatenate([[0.0], np.cumsum(times)])
+
+    def _along(self, since: Array, places: Array, times: Array) -> Derivatives:
+        """s and its derivatives at `since` (...) of a run, from rest to rest on each leg."""
+        leg = np.clip(np.searchsorted(times, since, "right") - 1, 0, len(times) - 2)
+        way, since = places[leg + 1] - places[leg], since - times[leg]
+        rate = np.minimum(self.rate, way / self.ramp_time)
+        faster = smooth_start(since, self.ramp_time)
+        slower = smooth_start(since - way / rate, self.ramp_time)
+        s, s_1, s_2, s_3 = (rate * (up - down) for up, down in zip(faster, slower, strict=True))
+        return places[leg] + s, s_1, s_2, s_3
 
 
 @dataclass(frozen=True)
@@ -103,9 +137,18 @@ class Stopping:
     start: float  # [s]
     ramp_time: float  # [s]
 
+    @property
+    def rate(self) -> float:
+        """See `TimeLaw`."""
+        return self.law.rate
+
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
         return self.start + self.ramp_time
+
+    def horizon(self, shape: Shape) -> float:
+        """See `TimeLaw`."""
+        return self.duration(shape)
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """See `TimeLaw`."""

@@ -4,6 +4,7 @@
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from climber_uk.mechanics.time_laws import ConstantRate, TimeLaw
 class Trajectory:
     """A shape travelled by a time law; in reverse gear the climber's tail goes first.
 
-    Raises `ValueError` if the law would leave a path that ends.
+    Raises `ValueError` if the law would leave a path that ends, or not stop where it turns back.
     """
 
     shape: Shape
@@ -29,28 +30,40 @@ class Trajectory:
     def __post_init__(self) -> None:
         if not self.shape.closed and isinstance(self.law, ConstantRate):
             raise ValueError("time_law='constant_rate' runs off an open shape: use 'rest_to_rest'")
+        if isinstance(self.law, ConstantRate) and len(self.course.reversals):
+            x, y = self.course.derivatives(self.course.reversals[0])[0] + self.origin
+            raise ValueError(
+                "time_law='constant_rate' does not stop where the path turns back, "
+                f"at ({x:.4g}, {y:.4g}) m: use 'rest_to_rest'"
+            )
+
+    @cached_property
+    def course(self) -> Shape:
+        """The shape as it is travelled at the law's rate."""
+        return self.shape.at_rate(self.law.rate)
 
     @property
     def duration(self) -> float:
         """Time after which the climber rests for good [s]; infinite if it never does."""
-        return self.law.duration(self.shape)
+        return self.law.duration(self.course)
 
     def at(self, time: Array | float) -> Reference:
         """Reference at `time` (...) [s] since the start."""
-        return self._travelled(self.law.progress(np.asarray(time, dtype=float), self.shape))
+        return self._travelled(self.law.progress(np.asarray(time, dtype=float), self.course))
 
     def path(self, points: int) -> Array:
         """Poses (points, 3) evenly spaced in the path parameter, along the shape once."""
-        s = np.linspace(0, self.shape.length, points)
+        s = np.linspace(0, self.course.length, points)
         return self._travelled((s, np.ones_like(s), 0 * s, 0 * s)).pose
 
     def _travelled(self, progress: Derivatives) -> Reference:
         s, *rates = progress
         s_1, s_2, s_3 = (rate[..., None] for rate in rates)
-        _, p_1, p_2, p_3 = path = self.shape.derivatives(s)
+        _, p_1, p_2, p_3 = path = self.course.derivatives(s)
         position, velocity, acceleration, jerk = compose(path, (s_1, s_2, s_3))
 
-        heading = np.arctan2(p_1[..., 1], p_1[..., 0])[..., None] + np.pi * self.reverse_gear
+        forwards = p_1 * np.asarray(self.course.gear(s))[..., None]
+        heading = np.arctan2(forwards[..., 1:], forwards[..., :1]) + np.pi * self.reverse_gear
         square = np.sum(p_1**2, axis=-1, keepdims=True)
         turning = _cross(p_1, p_2) / square  # dθ/ds
         turning_rate = (

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 
 LARGEST = 1e6  # in SI units, of whatever a climber or its wall can be said to do
+NORM_TOLERANCE = 0.01  # by which a quaternion's norm may be off 1, as tf2 takes it
+MOST_TILT = 0.1  # of a unit quaternion's hypot(x, y): 11.5° from a turn about z
 
 
 def nanoseconds(time: "Time | Duration") -> int:
@@ -95,6 +97,11 @@ def check_size(**vectors: "Array | list[list[float]]") -> None:
 def heading_of(orientation: "Quaternion") -> float:
     """Heading, in (-π, π]; climbers turn about z only, so x and y must be (nearly) zero."""
     x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
-    if not (abs(math.hypot(z, w) - 1) < 1e-3 and math.hypot(x, y) < 0.1):
-        raise ValueError(f"orientation ({x}, {y}, {z}, {w}) must be a unit turn about z")
+    norm, tilted = math.hypot(x, y, z, w), math.hypot(x, y)
+    if not (abs(norm - 1) <= NORM_TOLERANCE and tilted < MOST_TILT * norm):
+        raise ValueError(
+            f"orientation ({x}, {y}, {z}, {w}) must be a unit turn about z: "
+            f"norm {norm:.4g} from {1 - NORM_TOLERANCE} to {1 + NORM_TOLERANCE}, "
+            f"hypot(x, y) {tilted:.4g} < {MOST_TILT}"
+        )
     return math.atan2(2 * w * z, w * w - z * z)

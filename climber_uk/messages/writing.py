@@ -20,7 +20,7 @@ from geometry_msgs.msg import (
 from nav_msgs.msg import Odometry, Path
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, TimeReference
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics import SECOND, Array
@@ -90,6 +90,13 @@ def reference(
     message = MultiDOFJointTrajectory(joint_names=[base_frame], points=list(points))
     message.header.stamp = time(start)
     message.header.frame_id = odom_frame
+    return message
+
+
+def time_reference(reference: int, stamp: int, source: str) -> TimeReference:
+    """Time of a reference [ns] that is followed, or waits, at `stamp` [ns]."""
+    message = TimeReference(time_ref=time(reference), source=source)
+    message.header.stamp = time(stamp)
     return message
 
 

@@ -4,32 +4,37 @@ Parameters are those of the controller: its sections of the parameter files hold
 """
 
 import argparse
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
-from itertools import pairwise
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import Any
 
 import rclpy
-import yaml
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from climber_uk.analysis.changed_parameters import write_sections
 from climber_uk.analysis.driver import checks, report
 from climber_uk.analysis.driver.evidence import Expected
 from climber_uk.analysis.driver.trial import Bounds
+from climber_uk.analysis.parameter_file import Section, nothing_for, read_sections
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.names import Names
 from climber_uk.nodes.driver_graph import is_known, others_commanding
 from climber_uk.nodes.driver_node import DriverNode
+from climber_uk.nodes.parameter_files import paths
+from climber_uk.nodes.running import in_a_line
+from climber_uk.nodes.transport import use_udp
+from climber_uk.system.command_line import Parser
+from climber_uk.system.signals import on_end
 
+NODE, CONTROLLER = "check_driver", "uk_torque_controller"
 PATIENCE = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques
 CATCH_UP = 0.2  # [s] to hear what came while the first report was made, and is old
@@ -41,22 +46,38 @@ class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
 
 @contextmanager
 def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
-    """Arguments of ROS before which those parameters come that the controller's sections give."""
+    """Arguments of ROS, with a file of this node's own in the place of the controller's files.
+
+    Raises `OSError`, or `ValueError` if a file has nothing for either.
+    """
     known = {field.name for kind in (Names, Climber, Expected) for field in fields(kind)}
-    sections: dict[str, Any] = {}
-    for option, path in pairwise(arguments):
-        if option == "--params-file":
-            for name, section in (yaml.safe_load(Path(path).read_text()) or {}).items():
-                where, _, node = name.rpartition("/")
-                if node == "uk_torque_controller":
-                    mine = sections.setdefault(f"{where}/check_driver", {"ros__parameters": {}})
-                    given = section["ros__parameters"].items()
-                    mine["ros__parameters"].update({k: v for k, v in given if k in known})
+    as_controller: list[Section] = []
+    own: list[Section] = []
+    files = list(paths(arguments))
+    for path in files:
+        sections = read_sections(path)
+        for section in sections:
+            where, _, node = section.name.rpartition("/")
+            if node == CONTROLLER:
+                given = {name: value for name, value in section.values.items() if name in known}
+                as_controller.append(Section(f"{where}/{NODE}", given))
+            elif node == NODE or section.is_shared:
+                own.append(section)
+        if not (as_controller or own):
+            raise ValueError(nothing_for(CONTROLLER, path, sections))
     with NamedTemporaryFile("w", suffix=".yaml") as file:
-        yaml.safe_dump(sections, file)
-        file.flush()
-        first = ["--ros-args", "--params-file", file.name, "--"] if sections else []
-        yield [*first, *arguments]
+        write_sections([*as_controller, *own], Path(file.name))
+        first = ["--ros-args", "--params-file", file.name, "--"] if files else []
+        yield [*first, *without_files(arguments)]
+
+
+def without_files(arguments: Sequence[str]) -> Iterator[str]:
+    """Arguments but for parameter files."""
+    skipped = False
+    for word in arguments:
+        if not skipped and word != "--params-file":
+            yield word
+        skipped = word == "--params-file"
 
 
 class Spinner:
@@ -79,9 +100,13 @@ class Spinner:
             self.once()
 
 
-def check(options: argparse.Namespace, ended: Callable[[], bool]) -> report.Report:
+def check(
+    options: argparse.Namespace, arguments: Sequence[str], ended: Callable[[], bool]
+) -> report.Report:
     """Listen, move if wanted, and look at what was seen; raises `Interrupted`."""
-    node = DriverNode()
+    node = DriverNode(arguments)
+    for remark in node.parameters.remarks:
+        say(remark)
     spin = Spinner(node, ended)
     try:
         if options.move:
@@ -152,34 +177,34 @@ def positive(text: str) -> float:
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the options of the command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         "check_driver",
-        description=__doc__,
-        epilog="Exit status: 0 nothing failed, 1 something did, 2 it could not be checked.",
+        __doc__,
+        "Exit status: 0 nothing failed, 1 something did, 2 it could not be checked.",
     )
     parser.add_argument("--move", action="store_true", help="try small torques: the climber moves")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument(
         "--duration", type=positive, default=3.0, metavar="SECONDS", help="to listen (default: 3)"
     )
-    return parser.parse_args(arguments)
+    return parser.arguments(arguments)
 
 
 def main() -> None:
     """Print the report and exit with its status."""
     caught: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, _: caught.append(number))
+    on_end(lambda number, _: caught.append(number))
     try:
+        use_udp()
         options = parse(remove_ros_args(sys.argv)[1:])
         with as_the_controller(sys.argv) as arguments:
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-        found = check(options, lambda: bool(caught))
+            found = check(options, arguments, lambda: bool(caught))
     except Interrupted:
         say("interrupted")
         sys.exit(2)
-    except (ValueError, OSError, yaml.YAMLError, RCLError) as error:
-        say(str(error))
+    except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
+        say(in_a_line(error))
         sys.exit(2)
     finally:
         rclpy.try_shutdown()

@@ -2,6 +2,7 @@
 
 import time
 from bisect import bisect_right
+from collections.abc import Sequence
 
 import numpy as np
 from nav_msgs.msg import Odometry
@@ -27,8 +28,8 @@ RECENT = 100  # messages that tell the period
 class DriverNode(ClimberNode):
     """Listens to odometry and, where it is on it to do so, answers."""
 
-    def __init__(self) -> None:
-        super().__init__("check_driver")
+    def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        super().__init__("check_driver", arguments=arguments)
         for kind in (Climber, Expected, Bounds):
             self.parameters.declare(kind)
         self.parameters.refuse_unknown()

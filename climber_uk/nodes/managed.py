@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.subscription import Subscription
@@ -33,13 +34,20 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         ClimberNode.__init__(self, name)
         self.parameters.declare(Life)
         self.inputs: list[Subscription] = []
+        self.failure = ""  # why it could not be configured
 
     def start_life(self) -> None:
-        """Offer the services of a managed node, and become active unless another is to say so."""
+        """Offer the services of a managed node, and become active unless another is to say so.
+
+        Raises `ValueError` if it cannot listen.
+        """
         LifecycleNodeMixin.__init__(self)
+        self._change_state = self._service_change_state.callback
+        self._service_change_state.callback = self.on_change_state
         self.create_service(SetBool, "~/enable", self.on_enable)
         if self.parameters.read(Life).autostart:
-            self.trigger_configure()
+            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                raise ValueError(self.failure)
             self.trigger_activate()
 
     def listen(self) -> list[Subscription]:
@@ -55,9 +63,33 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         """State: unconfigured, inactive, active or finalized."""
         return str(self._state_machine.current_state[1])
 
+    def on_change_state(
+        self, request: ChangeState.Request, response: ChangeState.Response
+    ) -> ChangeState.Response:
+        """Change the state, if it has the transition that is asked for.
+
+        The mixin of rclpy would raise, and end the node, if it has not.
+        """
+        asked = request.transition
+        there = {label: number for number, label, *_ in self._state_machine.available_transitions}
+        if asked.label in there if asked.label else asked.id in there.values():
+            response = self._change_state(request, response)
+            if not response.success:
+                self.get_logger().error(f"still {self.life}: {self.failure}")
+            return response
+        wanted = repr(asked.label) if asked.label else f"of id {asked.id}"
+        has = ", ".join(f"{label} ({number})" for label, number in there.items()) or "none"
+        self.get_logger().warning(f"no transition {wanted}: {self.life}, from where it has {has}")
+        response.success = False
+        return response
+
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to listen."""
-        self.inputs = self.listen()
+        try:
+            self.inputs = self.listen()
+        except ValueError as error:
+            self.failure = str(error)
+            return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -41,8 +41,10 @@ GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
 class Options:
     """How large it is drawn."""
 
-    half_track: float = parameter(0.3, "m", "distance d of a wheel from the centre", above=0)
-    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0)
+    half_track: float = parameter(
+        0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
+    )
+    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0, plausible=(0.005, 0.5))
     torque_scale: float = parameter(0.3, "m/(N m)", "length of a torque's arrow", above=0)
     force_scale: float = parameter(0.005, "m/N", "length of a force's arrow", above=0)
     way_spacing: float = parameter(0.05, "m", "between two points of the way", above=0)
@@ -67,6 +69,11 @@ class Markers(ClimberNode):
         self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
         for topic, kind in SEEN.items():
             self.subscription(kind, topic, partial(self.latest.__setitem__, topic), BEST_EFFORT)
+
+    def summary(self) -> str:
+        """What is drawn."""
+        radius, half_track = self.options.wheel_radius, self.options.half_track
+        return f"wheels of radius {radius:g} m, {2 * half_track:g} m apart"
 
     def on_odometry(self, message: Odometry) -> None:
         """Draw, if it is time to."""
@@ -146,4 +153,4 @@ class Markers(ClimberNode):
 
 def main() -> None:
     """Run the node."""
-    run(lambda: [Markers()])
+    run(lambda: [Markers()], __doc__)

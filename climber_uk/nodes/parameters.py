@@ -2,7 +2,7 @@
 
 import dataclasses
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
@@ -16,9 +16,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from climber_uk.mechanics.parameter import check_value
+from climber_uk.mechanics.plausibility import doubt
+from climber_uk.nodes.parameter_files import ParameterFiles
+from climber_uk.nodes.parameter_paths import located
 
 T = TypeVar("T")
 Field = dataclasses.Field[Any]
+QOS = "qos_overrides."
 
 
 class Parameters:
@@ -28,11 +32,17 @@ class Parameters:
     are set, all of a request or none, and `on_change` is called with nothing left half set.
     """
 
-    def __init__(self, node: Node, on_change: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self, node: Node, arguments: Sequence[str], on_change: Callable[[], None] = lambda: None
+    ) -> None:
         self._node = node
+        self._arguments = arguments
         self._on_change = on_change
+        self.remarks: list[str] = []  # what is not refused, but can hardly be meant
+        self.origin = ""  # of those that are given, to be read
         self._kept: dict[tuple[str, type], Any] = {}
         self._fields: dict[str, tuple[str, type, Field]] = {}
+        node.add_pre_set_parameters_callback(self._as_declared)
         node.add_on_set_parameters_callback(self._change)
 
     @property
@@ -55,18 +65,29 @@ class Parameters:
         """
         for field in dataclasses.fields(kind):  # type: ignore[arg-type]
             name = prefix + field.name
-            override = self._node._parameter_overrides.get(name)
             try:
-                if override is not None:
-                    check_value(field, override.value)
+                if (given := self._given(name, prefix, field)) is not None:
+                    check_value(field, given)
+                    self.remarks += [prefix + said for said in [doubt(field, given)] if said]
                 self._node.declare_parameter(name, field.default, _descriptor(field))
             except ValueError as error:
                 raise ValueError(f"{prefix}{error}") from None
             except ParameterException:
                 wanted = type(field.default).__name__
-                hint = f" (write {float(override.value)})" if wanted == "float" else ""
-                raise ValueError(f"{name}={override.value!r} must be a {wanted}{hint}") from None
+                raise ValueError(f"{name}={given!r} must be of type {wanted}") from None
             self._fields[name] = (prefix, kind, field)
+
+    def _given(self, name: str, prefix: str, field: Field) -> Any:
+        """Value that is given for a parameter, if one is; an integer will do for a float."""
+        overrides = self._node._parameter_overrides
+        old = prefix + field.metadata["formerly"]
+        if field.metadata["formerly"] and old in overrides:
+            overrides.setdefault(name, Parameter(name, value=overrides.pop(old).value))
+            self.remarks.append(f"{old} is called {name} now")
+        if name not in overrides:
+            return None
+        overrides[name] = _as_float(overrides[name], field)
+        return overrides[name].value
 
     def read(self, kind: type[T], prefix: str = "") -> T:
         """Instance of `kind`, of fields declared before, as it is now.
@@ -76,6 +97,10 @@ class Parameters:
         if (prefix, kind) not in self._kept:
             names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
             values = {name: self._node.get_parameter(prefix + name).value for name in names}
+            for field in dataclasses.fields(kind):  # type: ignore[arg-type]
+                if field.metadata.get("is_path") and values[field.name]:
+                    path, owner = values[field.name], self._node.get_fully_qualified_name()
+                    values[field.name] = located(path, prefix + field.name, owner, sys.argv)
             try:
                 self._kept[prefix, kind] = kind(**values)
             except ValueError as error:
@@ -83,11 +108,43 @@ class Parameters:
         kept: T = self._kept[prefix, kind]
         return kept
 
-    def refuse_unknown(self) -> None:
-        """Raise `ValueError` if a parameter was given that no one declared: it is misspelt."""
-        for name in self._node._parameter_overrides:
-            if not (self._node.has_parameter(name) or name.startswith("qos_overrides.")):
-                raise ValueError(f"{name} is not a parameter of {self._node.get_name()}")
+    def refuse_unknown(self, defaults: str = "") -> None:
+        """Raise `ValueError` if a parameter was given that no one declared: it is misspelt.
+
+        One that is given to nodes of any name is only remarked on. So is a file that has nothing
+        for this node, unless that leaves it with `defaults`, which nobody is to get by accident.
+        """
+        node, given = self._node, self._node._parameter_overrides
+        files = ParameterFiles(self._arguments, node.get_fully_qualified_name())
+        ours = [name for name in self._fields if name in given]
+        unknown = [n for n in given if not (node.has_parameter(n) or n.startswith(QOS))]
+        for name in unknown:
+            if not files.is_shared(name):
+                raise ValueError(f"{name} is not a parameter of {node.get_name()}{self.like(name)}")
+        if unknown:
+            said = ", ".join(unknown)
+            self.remarks.append(f"given to all nodes, but no parameter of this one: {said}")
+        if defaults and files.has_nothing_of(ours):
+            raise ValueError(files.emptiness)
+        self.remarks += files.idle
+        self.origin = f"defaults: {defaults}" if defaults else "defaults"
+        if ours:
+            count = f"{len(ours)} of {len(self._fields)}"
+            self.origin = f"{count} parameters given ({files.named(ours)})"
+
+    def like(self, name: str) -> str:
+        """Question whether another of this node's parameters was meant."""
+        from climber_uk.analysis.parameter_file import similar  # only where something is wrong
+
+        return similar(name, self._node._parameters)
+
+    def _as_declared(self, changes: list[Parameter]) -> list[Parameter]:
+        return [
+            _as_float(change, self._fields[change.name][2])
+            if change.name in self._fields
+            else change
+            for change in changes
+        ]
 
     def _change(self, changes: list[Parameter]) -> SetParametersResult:
         kept = dict(self._kept)
@@ -105,6 +162,14 @@ class Parameters:
             self._kept = kept
             self._on_change()
         return SetParametersResult(successful=True)
+
+
+def _as_float(given: Parameter, field: Field) -> Parameter:
+    """The same, of an integer as a float where one is wanted and has the same value."""
+    value = given.value
+    if isinstance(field.default, float) and type(value) is int and float(value) == value:
+        return Parameter(given.name, value=float(value))
+    return given
 
 
 def _descriptor(field: Field) -> ParameterDescriptor:

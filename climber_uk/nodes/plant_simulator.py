@@ -1,11 +1,9 @@
 """A climber on its wall in a robot's place: wheel torques in, odometry out."""
 
-import sys
 from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
-from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
@@ -18,10 +16,12 @@ from climber_uk.nodes.plant_time import PlantTime
 from climber_uk.nodes.plant_topics import PlantTopics
 from climber_uk.nodes.running import ClimberNode, run
 from climber_uk.simulation.inputs import FellOff, NotFinite
-from climber_uk.simulation.machine import NONE, Machine, Push
+from climber_uk.simulation.machine import NONE, Machine, Physics, Push
 from climber_uk.simulation.options import Options
 from climber_uk.simulation.schedule import Schedule
 from climber_uk.simulation.sensors import Sensors
+
+HEARD = "odom", "joint_states", "wheel_torques", "reference"  # of plant, controller and planner
 
 
 class PlantSimulator(ClimberNode):
@@ -33,7 +33,7 @@ class PlantSimulator(ClimberNode):
     def __init__(self, namespace: str = "", time: PlantTime | None = None) -> None:
         super().__init__("plant_simulator", namespace)
         plant_parts.declare(self.parameters)
-        self.parameters.refuse_unknown()
+        self.parameters.refuse_unknown("the paper's climber, at rest")
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
         self.time = time or PlantTime(self, self.options)
@@ -53,6 +53,17 @@ class PlantSimulator(ClimberNode):
         """Take up what was changed: the pump's pressure, a magnet's gap, levels of alarm."""
         self.machine.take(plant_parts.parts(self.parameters))
         self.margins.alarm = self.parameters.read(Alarm)
+
+    def summary(self) -> str:
+        """What is simulated, in which time."""
+        climber, physics = self.machine.plant.climber, self.parameters.read(Physics)
+        pull = self.machine.plant.contact.adhesion.force(climber)
+        rate = 1 / self.options.control_period
+        return (
+            f"{climber.mass:g} kg, {physics.locomotion}, {physics.friction} friction, "
+            f"{physics.adhesion} of {pull:.4g} N, wall {physics.wall}, {rate:g} Hz in "
+            + ("lock-step" if self.options.simulated_time else "the wall clock's time")
+        )
 
     # Commands
 
@@ -149,6 +160,13 @@ class PlantSimulator(ClimberNode):
         """Time, to be read."""
         return f"{self.time.stamp / SECOND:.3f} s"
 
+    def is_heard_by(self, node: str) -> bool:
+        """Whether a node of that name has subscribed a topic of each node of the climber."""
+        return all(
+            node in (info.node_name for info in self.get_subscriptions_info_by_topic(topic))
+            for topic in map(self.resolve_topic_name, HEARD)
+        )
+
     def advance(self) -> None:
         """Go on by a control period; a climber that falls is heard of no more."""
         try:
@@ -193,28 +211,18 @@ class PlantSimulator(ClimberNode):
         }
 
 
-def in_one_time(namespaces: Sequence[str]) -> list[PlantSimulator]:
+def in_one_time(climbers: Sequence[str] = ("",)) -> list[PlantSimulator]:
     """Climbers of some namespaces, whose time is the first one's."""
-    first, *others = namespaces
+    first, *others = climbers
     leader = PlantSimulator(first)
     return [leader, *(PlantSimulator(namespace, leader.time) for namespace in others)]
 
 
-def namespaces(arguments: Sequence[str]) -> list[str]:
-    """Namespaces of the climbers that the command line asks for: one in none if it is empty."""
-    if not arguments:
-        return [""]
-    import argparse  # here, as most starts have nothing to parse and it is slow to import
-
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--climbers", nargs="+", default=[""], metavar="NAMESPACE", help="of each (default: one)"
-    )
-    chosen: list[str] = parser.parse_args(arguments).climbers
-    return chosen
-
-
 def main() -> None:
     """Run a climber, or one in each of some namespaces."""
-    # what is wrong with the arguments of ROS is said by `run`
-    run(lambda: in_one_time(namespaces(remove_ros_args(sys.argv)[1:])))
+    climbers = {
+        "nargs": "+",
+        "metavar": "NAMESPACE",
+        "help": "of each climber (default: one, in none)",
+    }
+    run(in_one_time, __doc__, {"--climbers": climbers})

@@ -15,9 +15,16 @@ from climber_uk.simulation.options import Options
 
 ASK_AGAIN = 0.2  # [s] of wall-clock time, for a torque that does not come
 FALLEN_BEHIND = 1.0  # [s] from which lost wall-clock time is not made up for
+LOOK_PERIOD = 0.1  # [s] of the wall clock, to look for the one that is waited for
+LOOKS = 10  # that must have found it: all who publish have to have found it, too
 CATCH_UP = 0.1  # [s] of the wall clock that simulated time may make up for
 TICK = SECOND // 100  # [ns] of simulated time between two messages on /clock, at least
-SHARED = ("simulated_time", "control_period", "real_time_factor")  # options of all or none
+SHARED = (
+    "simulated_time",
+    "control_period",
+    "real_time_factor",
+    "wait_for",
+)  # options of all or none
 
 
 class Simulated(Protocol):
@@ -27,6 +34,9 @@ class Simulated(Protocol):
     origin: int  # stamp of its first odometry
     fallen: bool  # it takes no further part
     answered: bool  # its last odometry, by a torque
+
+    def is_heard_by(self, node: str) -> bool:
+        """Whether a node of that name has subscribed what there is to hear."""
 
     def advance(self) -> None:
         """Go on by a control period."""
@@ -53,6 +63,10 @@ class PlantTime:
         self.stamp: int = SECOND if options.simulated_time else self.clock.now().nanoseconds
         self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
         self.topic, self.is_due = None, Rhythm(TICK)
+        self.waits, self.looks = bool(options.wait_for), 0
+        if self.waits:
+            self.log.info(f"time does not run until {options.wait_for} listens")
+            node.create_timer(LOOK_PERIOD, self.look_out, clock=WALL_CLOCK)
         if options.simulated_time:
             self.topic = node.publisher(ClockMessage, "/clock")
             node.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
@@ -79,6 +93,17 @@ class PlantTime:
                 raise ValueError(f"{name}={theirs} must be {ours}, as the first climber has it")
         self.climbers.append(climber)
 
+    def look_out(self) -> None:
+        """Begin, once the one that is waited for listens."""
+        node = self.options.wait_for
+        listens = all(climber.is_heard_by(node) for climber in self.climbers)
+        self.looks = self.looks + 1 if listens else 0
+        if self.waits and self.looks > LOOKS:
+            self.log.info(f"{node} listens")
+            self.waits = False
+            self.catch_up()
+            self.publish(self.standing)
+
     def pause(self, paused: bool) -> None:
         """Stop time, or let it go on."""
         if self.paused and not paused:
@@ -101,6 +126,8 @@ class PlantTime:
     def ask_again(self) -> None:
         """Publish the odometry once more to whom missed it; report who does not answer."""
         waited = WALL_CLOCK.now().nanoseconds - self.stepped_at
+        if self.waits:
+            return
         silent = [climber for climber in self.standing if not climber.answered]
         if waited > ASK_AGAIN * SECOND:
             self.publish(silent)
@@ -129,7 +156,7 @@ class PlantTime:
     def keep_up(self) -> None:
         """Step until the clock's time is reached."""
         now = self.clock.now().nanoseconds
-        if self.paused or not self.standing:
+        if self.paused or self.waits or not self.standing:
             return
         if now - self.stamp > FALLEN_BEHIND * SECOND:
             self.log.warning(f"{(now - self.stamp) * 1e-9:.1f} s behind: left out")
@@ -161,6 +188,8 @@ class PlantTime:
 
     def publish(self, climbers: Sequence[Simulated]) -> None:
         """Publish what is waited for first, and after it the time and what nobody waits for."""
+        if self.waits:
+            return
         for climber in climbers:
             climber.publish_odometry()
         if self.is_due(self.stamp):

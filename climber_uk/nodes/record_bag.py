@@ -2,39 +2,41 @@
 
     record_bag [--output DIR] [--storage mcap|sqlite3] [--topics A B …] [--exclude C …]
 
-Log times are those of reception on the system clock, in simulated time too, as in rosbag2.
+Log times are those of reception on the system clock, in simulated time too, as in rosbag2; but they
+never go back, if that is set back.
 """
 
-import signal
+import os
 import sys
 import time
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import rclpy
-from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
-from rclpy.qos import (
-    DurabilityPolicy,
-    QoSCompatibility,
-    QoSProfile,
-    ReliabilityPolicy,
-    qos_check_compatible,
-)
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.utilities import remove_ros_args
 from rclpy.validate_topic_name import validate_topic_name
 
 from climber_uk.analysis.bag_writer import NEVER, BagWriter
-from climber_uk.analysis.storage import STORAGES, Qos, is_known
+from climber_uk.analysis.log_clock import LogClock
+from climber_uk.analysis.storage import STORAGES, is_known
+from climber_uk.nodes.offered_qos import QUEUE_DEPTH, is_compatible, request_for, to_metadata
+from climber_uk.nodes.transport import use_udp
+from climber_uk.system.command_line import Parser
+from climber_uk.system.signals import ignore_end, on_end
 
 FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received within this time
 DISCOVERY_PERIOD = 0.2  # [s]
@@ -42,7 +44,18 @@ TAKE_PERIOD = 0.01  # [s]
 GRACE = 0.1  # [s] for what was on its way when the stop came
 REPAIR = 3.5  # [s] in which what was lost is sent again: Fast DDS offers it every 3 s
 A_FEW = 5  # messages of a topic that is not published all the time
-QUEUE_DEPTH = 5000  # messages of one topic that may wait: seconds, even at 1 kHz
+RCLPY = {"3": "humble", "4": "iron", "7": "jazzy", "9": "kilted"}  # distributions by its version
+
+
+@dataclass
+class Recorded:
+    """A topic that is recorded, as one of the types that it may have."""
+
+    subscription: Subscription
+    type_name: str
+    lost: int = 0  # messages, as the middleware tells
+    overflowed: bool = False  # so many waited at once that others may have been dropped
+    heard: int = 0  # [ns] log time at which the latest message was published
 
 
 class BagRecorder(Node):
@@ -56,11 +69,12 @@ class BagRecorder(Node):
         super().__init__("record_bag", start_parameter_services=False)
         self.wanted = {self.resolve_topic_name(name) for name in options.topics}
         self.unwanted = {self.resolve_topic_name(name) for name in options.exclude}
-        self.recorded: dict[str, Subscription] = {}
-        self.types: dict[str, str] = {}  # of the recorded topics
-        self.bag = BagWriter(options.output, options.storage)
-        self.heard: dict[str, int] = {}  # [ns] when the latest message of a topic was published
-        self.stop_time = 0  # [ns] system clock; 0: not asked to stop
+        self.recorded: dict[str, Recorded] = {}
+        self.refused: set[tuple[str, str]] = set()  # topics with types that were said not to be
+        self.bag = BagWriter(options.output, options.storage, running_distro())
+        self.clock = LogClock()
+        self.stopped = 0  # [ns] steady clock when asked to stop; 0: not yet
+        self.stop_time = 0  # [ns] log time of that
 
     def run(self) -> None:
         """Record until asked to stop, and then what had been sent or had arrived by then."""
@@ -72,89 +86,134 @@ class BagRecorder(Node):
                 self.discover()
                 next_discovery = now + DISCOVERY_PERIOD
             if now >= next_flush:
+                self.tell_losses()
                 self.bag.flush()
                 next_flush = now + FLUSH_PERIOD
-            was_asked = bool(self.stop_time)
+            was_asked = bool(self.stopped)
             time.sleep(GRACE if was_asked else TAKE_PERIOD)
+            self.look_at_the_clock()
             oldest = self.take()
             is_behind = not was_asked or oldest <= self.stop_time or self.misses_some()
+        self.tell_losses()
 
     def discover(self) -> None:
         """Record new topics, and follow what the publishers of the recorded ones offer."""
         for name, types in self.get_topic_names_and_types():
             if not self.is_wanted(name):
                 continue
-            if name not in self.recorded:
-                self.start_recording(name, types)
-            elif offers := self.offers(name):
-                self.introduce(name, types[0])
-                self.adapt(name, types[0], offers)
+            if name not in self.bag:  # else its type is settled
+                self.choose_type(name, types)
+            if name in self.recorded:
+                self.refuse_others(name, types)
+                if offers := self.offers(name, self.recorded[name].type_name):
+                    self.introduce(name)
+                    self.adapt(name, offers)
 
     def is_wanted(self, name: str) -> bool:
         """Whether to record a topic: one of those asked for, else any that is not hidden."""
         hidden = "/_" in name
         return name not in self.unwanted and (name in self.wanted if self.wanted else not hidden)
 
-    def offers(self, name: str) -> list[QoSProfile]:
-        """The profiles that the publishers of a topic offer."""
-        return [publisher.qos_profile for publisher in self.get_publishers_info_by_topic(name)]
+    def offers(self, name: str, type_name: str) -> list[QoSProfile]:
+        """The profiles that the publishers of a topic's messages of one type offer."""
+        publishers = self.get_publishers_info_by_topic(name)
+        return [end.qos_profile for end in publishers if end.topic_type == type_name]
 
-    def start_recording(self, name: str, types: Sequence[str]) -> None:
-        """Subscribe a topic, even if nobody publishes it yet."""
-        if len(types) > 1 or find_message_class(types[0]) is None:
+    def choose_type(self, name: str, types: Sequence[str]) -> None:
+        """Subscribe a topic, even if nobody publishes it yet, with the type that most publish."""
+        known = [type_name for type_name in types if find_message_class(type_name)]
+        if not known:
             self.get_logger().warning(f"not recording {name}: unknown type {', '.join(types)}")
             self.unwanted.add(name)
-        else:
-            self.get_logger().info(f"recording {name} [{types[0]}]")
-            self.subscribe(name, types[0], request_for(self.offers(name)))
+            return
+        offers = {type_name: self.offers(name, type_name) for type_name in known}
+        chosen = max(known, key=lambda type_name: len(offers[type_name]))
+        present = self.recorded.get(name)
+        if present is None or (present.type_name != chosen and offers[chosen]):
+            self.get_logger().info(f"recording {name} [{chosen}]")
+            self.subscribe(name, chosen, request_for(offers[chosen]))
+
+    def refuse_others(self, name: str, types: Sequence[str]) -> None:
+        """Say once which types are not recorded: a topic in a bag has one."""
+        recorded = self.recorded[name].type_name
+        for type_name in set(types) - {recorded}:
+            if (name, type_name) not in self.refused:
+                self.refused.add((name, type_name))
+                self.get_logger().warning(
+                    f"not recording {type_name} on {name}, which is recorded as {recorded}"
+                )
 
     def subscribe(self, name: str, type_name: str, request: QoSProfile) -> None:
         """Subscribe a topic, in place of its present subscription."""
-        if name in self.recorded:
-            self.destroy_subscription(self.recorded[name])
-        self.types[name] = type_name
-        self.recorded[name] = self.create_subscription(
+        present = self.recorded.get(name)
+        if present is not None:
+            self.count_losses(name)
+            self.destroy_subscription(present.subscription)
+        subscription = self.create_subscription(
             find_message_class(type_name),
             name,
             lambda _: None,  # never called: see `take`
             request,
             raw=True,
             # the default ones warn of what `adapt` mends
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            event_callbacks=SubscriptionEventCallbacks(
+                message_lost=lambda _: None,  # likewise: see `count_losses`
+                use_default_callbacks=False,
+            ),
         )
+        lost = present.lost if present else 0
+        self.recorded[name] = Recorded(subscription, type_name, lost)
 
-    def adapt(self, name: str, type_name: str, offers: Sequence[QoSProfile]) -> None:
+    def adapt(self, name: str, offers: Sequence[QoSProfile]) -> None:
         """Subscribe a topic again if one of its publishers cannot serve the subscription.
 
         Likewise if all could serve a stricter one, which brings what a latching publisher sent
         before. Once messages have arrived it would bring some of them twice, so then not.
         """
-        present, request = self.recorded[name].qos_profile, request_for(offers)
+        recorded, request = self.recorded[name], request_for(offers)
+        present = recorded.subscription.qos_profile
         served = all(is_compatible(offer, present) for offer in offers)
         if not served or (request != present and not self.bag.count(name)):
-            self.subscribe(name, type_name, request)
+            self.subscribe(name, recorded.type_name, request)
 
-    def introduce(self, name: str, type_name: str) -> None:
+    def introduce(self, name: str) -> None:
         """Enter a topic into the bag, once its publishers' offers are known."""
         if name not in self.bag:
-            self.bag.add_topic(name, type_name, [to_metadata(qos) for qos in self.offers(name)])
+            type_name = self.recorded[name].type_name
+            offers = [to_metadata(qos) for qos in self.offers(name, type_name)]
+            self.bag.add_topic(name, type_name, offers)
+
+    def look_at_the_clock(self) -> None:
+        """Notice that the system clock was set, and that recording is to stop."""
+        step = self.clock.look()
+        if step < 0:
+            self.get_logger().warning(
+                f"the system clock was set back by {-step / 1e9:.3f} s: log times go on as before"
+            )
+        if self.stopped and not self.stop_time:
+            self.stop_time = self.clock.at(self.stopped)
 
     def take(self) -> int:
         """Record all that has arrived; return the oldest of its log times [ns]."""
         oldest = NEVER
-        for name, subscription in self.recorded.items():
-            with subscription.handle:
-                take = partial(subscription.handle.take_message, subscription.msg_type, True)
+        for name, recorded in self.recorded.items():
+            handle, taken_now = recorded.subscription.handle, 0
+            with handle:
+                take = partial(handle.take_message, recorded.subscription.msg_type, True)
                 while taken := take():
                     data, info = taken
-                    log_time = info["received_timestamp"] or time.time_ns()
-                    published = info["source_timestamp"] or log_time
+                    taken_now += 1
+                    received = info["received_timestamp"] or time.time_ns()
+                    shift = self.clock.shift(received)
+                    log_time = received + shift
+                    published = (info["source_timestamp"] or received) + shift
                     oldest = min(oldest, log_time)
-                    self.heard[name] = published
+                    recorded.heard = published
                     # else a bag would end with answers to what is no longer in it
                     if not self.stop_time or min(log_time, published) <= self.stop_time:
-                        self.introduce(name, self.types[name])
+                        self.introduce(name)
                         self.bag.write(name, log_time, published, data)
+            recorded.overflowed |= taken_now >= QUEUE_DEPTH
         return oldest
 
     def misses_some(self) -> bool:
@@ -164,57 +223,50 @@ class BagRecorder(Node):
         was published shortly before the stop is complete once it brings what is later than that.
         What is latched, or was published a few times only, may not be published again.
         """
-        if time.time_ns() > self.stop_time + REPAIR * 1e9:
+        if self.clock.at(time.monotonic_ns()) > self.stop_time + REPAIR * 1e9:
             return False
         return any(
-            self.stop_time - REPAIR * 1e9 < heard <= self.stop_time
-            and self.recorded[name].qos_profile.reliability == ReliabilityPolicy.RELIABLE
-            and self.recorded[name].qos_profile.durability == DurabilityPolicy.VOLATILE
+            self.stop_time - REPAIR * 1e9 < recorded.heard <= self.stop_time
+            and recorded.subscription.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+            and recorded.subscription.qos_profile.durability == DurabilityPolicy.VOLATILE
             and self.bag.count(name) > A_FEW
             and self.count_publishers(name)
-            for name, heard in self.heard.items()
+            for name, recorded in self.recorded.items()
         )
+
+    def count_losses(self, name: str) -> int:
+        """Take what the middleware tells of lost messages of a topic; return how many are new."""
+        recorded, new = self.recorded[name], 0
+        for handler in recorded.subscription.event_handlers:
+            handler._ready_to_take_data = True  # nobody waits for it: see `take`
+            if told := handler.take_data():
+                new += told.total_count_change
+        recorded.lost += new
+        return new
+
+    def tell_losses(self) -> None:
+        """Say of which topics messages are lost: at first in the log, how many in the metadata."""
+        for name, recorded in self.recorded.items():
+            is_first = not recorded.lost
+            new = self.count_losses(name)
+            if new and is_first:
+                self.get_logger().warning(f"messages on {name} are lost; metadata.yaml counts them")
+            if recorded.lost:
+                self.bag.custom_data[f"messages lost on {name}"] = str(recorded.lost)
+            if recorded.overflowed:
+                self.bag.custom_data[f"queue full on {name}"] = "more may be lost"
 
     def stop(self, *_: object) -> None:
         """Finish when all that had been sent by the first call is recorded."""
-        self.stop_time = self.stop_time or time.time_ns()
+        self.stopped = self.stopped or time.monotonic_ns()
 
 
-def request_for(offers: Sequence[QoSProfile]) -> QoSProfile:
-    """The strictest request that all offers serve; without any: a reliable one."""
-    reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
-    latched = all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
-    return QoSProfile(
-        depth=QUEUE_DEPTH,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=(
-            DurabilityPolicy.TRANSIENT_LOCAL if latched and offers else DurabilityPolicy.VOLATILE
-        ),
-    )
-
-
-def is_compatible(offer: QoSProfile, request: QoSProfile) -> bool:
-    """Whether messages pass between two profiles."""
-    return bool(qos_check_compatible(offer, request)[0] != QoSCompatibility.ERROR)
-
-
-def to_metadata(qos: QoSProfile) -> Qos:
-    """Return a profile as metadata.yaml holds it."""
-
-    def to_parts(duration: Duration) -> dict[str, int]:
-        return dict(zip(("sec", "nsec"), divmod(duration.nanoseconds, 10**9), strict=True))
-
-    return {
-        "history": qos.history.name.lower(),
-        "depth": qos.depth,
-        "reliability": qos.reliability.name.lower(),
-        "durability": qos.durability.name.lower(),
-        "deadline": to_parts(qos.deadline),
-        "lifespan": to_parts(qos.lifespan),
-        "liveliness": qos.liveliness.name.lower(),
-        "liveliness_lease_duration": to_parts(qos.liveliness_lease_duration),
-        "avoid_ros_namespace_conventions": qos.avoid_ros_namespace_conventions,
-    }
+def running_distro() -> str:
+    """The distribution of ROS that runs: as its set-up says, else by the version of rclpy."""
+    with suppress(PackageNotFoundError):
+        major = version("rclpy").split(".")[0]
+        return os.environ.get("ROS_DISTRO") or RCLPY.get(major, "unknown")
+    return os.environ.get("ROS_DISTRO") or "unknown"
 
 
 def find_message_class(type_name: str) -> type[Any] | None:
@@ -229,13 +281,13 @@ def find_message_class(type_name: str) -> type[Any] | None:
 
 def parse(arguments: Sequence[str]) -> Namespace:
     """Return the options of the command line."""
-    parser = ArgumentParser("record_bag", description="Record topics into a rosbag2 directory.")
+    parser = Parser("record_bag", "Record topics into a rosbag2 directory.")
     default = Path(datetime.now().strftime("climber_bag_%Y_%m_%d-%H_%M_%S"))
     parser.add_argument("--output", "-o", type=Path, default=default, help="a new directory")
     parser.add_argument("--storage", "-s", choices=STORAGES, default="mcap")
     for option, meaning in {"--topics": "default: all", "--exclude": "not these"}.items():
         parser.add_argument(option, nargs="+", type=topic_name, default=[], help=meaning)
-    return parser.parse_args(arguments)
+    return parser.arguments(arguments)
 
 
 def topic_name(name: str) -> str:
@@ -252,19 +304,21 @@ def record(options: Namespace) -> None:
     recorder = BagRecorder(options)
     # Our own handlers: those of rclpy would cut off what has arrived and is not yet recorded, and
     # KeyboardInterrupt, a second one too, might come in the middle of a write.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, recorder.stop)
+    on_end(recorder.stop)
     try:
         recorder.run()
     finally:
         recorder.bag.close()
         recorder.get_logger().info(f"{recorder.bag.message_count} messages in {recorder.bag.path}")
+        for what, how_much in recorder.bag.custom_data.items():
+            recorder.get_logger().warning(f"{what}: {how_much}")
         recorder.destroy_node()
 
 
 def main() -> None:
     """Run the recorder."""
     options = parse(remove_ros_args(sys.argv)[1:])
+    use_udp()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         record(options)
@@ -273,8 +327,7 @@ def main() -> None:
     except OSError as error:
         sys.exit(f"record_bag: {error}")
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
+        ignore_end()
         rclpy.try_shutdown()
 
 

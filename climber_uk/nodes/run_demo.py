@@ -5,7 +5,7 @@ All of it happens on this machine, in a ROS domain of its own unless ROS_DOMAIN_
 
 import argparse
 import os
-import signal
+import shutil
 import subprocess
 import sys
 import time
@@ -17,21 +17,39 @@ from pathlib import Path
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.executors import ExternalShutdownException
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
+from climber_uk.analysis.parameter_file import read_file
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading
 from climber_uk.nodes.running import ClimberNode
+from climber_uk.nodes.transport import use_udp
+from climber_uk.system.command_line import Parser
+from climber_uk.system.processes import die_with, dies_with_me, end
+from climber_uk.system.signals import ignore_end, on_end
 
 # One topic of each node that only the recorder subscribes, and does once it has found the node.
 FOUND = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")
 FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
 START_TIMEOUT = 60.0  # [s]
-STOP_TIMEOUT = 20.0  # [s]
+STOP_TIMEOUT = 20.0  # [s] for the recorder, and then for the nodes
+HURRIED = 3.8, 1.0  # [s] the same, once more than one signal has come
+
+
+class Ended(RuntimeError):  # noqa: N818 - it is what happened
+    """A process, of a `name`, ended that should go on."""
+
+    def __init__(self, name: str, status: int) -> None:
+        super().__init__(f"{name} ended with status {status}")
+        self.name = name
+
+
+class Interrupted(Exception):  # noqa: N818 - as above
+    """A signal came."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +65,13 @@ class Options:
 class Demo(ClimberNode):
     """Starts the trajectories once everybody listens, and watches the time go by."""
 
-    def __init__(self, climbers: Sequence[str]) -> None:
-        super().__init__("run_demo")
-        self.climbers = climbers
+    def __init__(
+        self, climbers: Sequence[str], signals: Sequence[int], arguments: Sequence[str]
+    ) -> None:
+        super().__init__("run_demo", arguments=arguments)
+        self.climbers, self.signals = climbers, signals
         self.processes: Processes = {}  # that have to go on
+        self.has_begun = False
         self.parameters.declare(Options)
         self.parameters.refuse_unknown()
         self.duration = self.parameters.read(Options).duration
@@ -81,13 +102,18 @@ class Demo(ClimberNode):
         )
 
     def wait(self, condition: Callable[[], bool], what: str) -> None:
-        """Spin until `condition()`; raise `RuntimeError` if a process ends, or time runs out."""
+        """Spin until `condition()`.
+
+        Raises `RuntimeError` if a process ends, or time runs out; `Interrupted` by a signal.
+        """
         until = time.monotonic() + START_TIMEOUT
         while not condition():
             rclpy.spin_once(self, timeout_sec=0.1)
+            if self.signals:
+                raise Interrupted
             for name, process in self.processes.items():
                 if process.poll() is not None:
-                    raise RuntimeError(f"{name} ended with status {process.returncode}")
+                    raise Ended(name, process.returncode)
             if time.monotonic() > until:
                 raise RuntimeError(f"waited {START_TIMEOUT:.0f} s in vain for {what}")
 
@@ -101,6 +127,7 @@ class Demo(ClimberNode):
             self.wait(partial(has_answered, answered), f"an answer on {topic}")
             self.destroy_subscription(answers)
         started = [starter.call_async(Trigger.Request()) for starter in self.starters]
+        self.has_begun = True
         self.wait(lambda: all(start.done() for start in started), "the trajectories to start")
 
     def run(self) -> None:
@@ -130,29 +157,38 @@ def has_answered(torques: list[JointState]) -> bool:
 
 
 @contextmanager
-def running(commands: dict[str, list[str]], logs: Path) -> Iterator[Processes]:
+def running(
+    commands: dict[str, list[str]], logs: Path, signals: Sequence[int]
+) -> Iterator[Processes]:
     """Processes of some commands, all ended whatever happens, the first one, a recorder, first."""
     processes: Processes = {}
     try:
         for name, command in commands.items():
-            with (logs / f"{name}.log").open("wb") as log:
+            with log_of(name, logs).open("wb") as log:
                 # a session of their own: Ctrl-C comes to them from here, in good order
                 processes[name] = subprocess.Popen(
-                    command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+                    command,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                    preexec_fn=dies_with_me(),
                 )
         yield processes
     finally:
-        recorder, *nodes = processes.values()
         # what a node sent last would be lost where its end is heard of first
-        for group in ([recorder], nodes):
-            for process in group:
-                process.send_signal(signal.SIGTERM)
-            for process in group:
-                try:
-                    process.wait(STOP_TIMEOUT)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
+        groups = [*processes.values()][:1], [*processes.values()][1:]
+        for group, hurried in zip(groups, HURRIED, strict=True):
+            end(group, partial(patience, signals, hurried))
+
+
+def patience(signals: Sequence[int], hurried: float) -> float:
+    """How long [s] processes may take to end, or `hurried` if more than one signal has come."""
+    return hurried if len(signals) > 1 else STOP_TIMEOUT
+
+
+def log_of(name: str, logs: Path) -> Path:
+    """File that has what a process says."""
+    return logs / f"{name}.log"
 
 
 def executable(name: str, *arguments: str) -> list[str]:
@@ -188,49 +224,80 @@ def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dic
     return commands
 
 
-def main() -> None:
-    """Run the demonstration; the bag is complete however it ends."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def parse() -> argparse.Namespace:
+    """Return the options of the command line."""
+    parser = Parser("run_demo", __doc__)
     parser.add_argument("--config", type=Path, required=True, help="parameter file of all nodes")
-    parser.add_argument("--output", type=Path, required=True, help="new directory")
+    parser.add_argument("--output", "-o", type=Path, required=True, help="new directory")
     parser.add_argument("--duration", type=float, help="[s] (default: that of the config)")
     parser.add_argument(
         "--climbers", type=int, help="how many, in namespaces climber_1, ... (default: one in none)"
     )
     parser.add_argument("--clock", choices=("sim", "wall"), default="sim", help="lock-step or not")
-    options = parser.parse_args()
-    if not options.config.is_file():
-        sys.exit(f"run_demo: there is no file {options.config}")
-    if options.output.exists():
-        sys.exit(f"run_demo: {options.output} exists already")
-    options.output.mkdir(parents=True)
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    parser.add_argument(
+        "--with-parent", action="store_true", help="end when what started it does, as make demo"
+    )
+    return parser.arguments()
 
-    bag = options.output / "bag"
-    simulated = options.clock == "sim"
+
+def main() -> None:
+    """Run the demonstration; the bag is complete however it ends."""
+    options = parse()
+    signals: list[int] = []
+    on_end(lambda number, _: signals.append(number))
+    if options.with_parent:
+        die_with(os.getppid())
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    use_udp()  # the nodes and the recorder inherit it
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
+    try:
+        for node in ("trajectory_publisher", "uk_torque_controller", "plant_simulator"):
+            for climber in climbers:
+                read_file(options.config, f"{climber}/{node}")
+        options.output.mkdir(parents=True)
+    except ValueError as error:
+        sys.exit(f"run_demo: {error}")
+    except OSError as error:
+        sys.exit(f"run_demo: {error.strerror}: {error.filename}")
+    try:
+        record(options, climbers, signals)
+    finally:
+        ignore_end()
+        rclpy.try_shutdown()
+    print(f"recorded: {options.output / 'bag'}")
+
+
+def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequence[int]) -> None:
+    """Run nodes and recorder into a new directory, which is removed if nothing has begun."""
+    bag, simulated = options.output / "bag", options.clock == "sim"
     commands = {
         "record_bag": executable("record_bag", "--output", str(bag)),
         **node_commands(climbers, options.config, simulated),
     }
-    demo = None
+    duration = ["-p", f"duration:={options.duration}"] if options.duration else []
+    arguments = ["--ros-args", "--params-file", str(options.config), *duration]
+    demo, said = None, ""
     try:
-        duration = ["-p", f"duration:={options.duration}"] if options.duration else []
-        rclpy.init(args=["--ros-args", "--params-file", str(options.config), *duration])
-        demo = Demo(climbers)
-        with running(commands, options.output) as processes:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        demo = Demo(climbers, signals, arguments)
+        with running(commands, options.output, signals) as demo.processes:
             print(f"{options.config} in ROS domain {os.environ['ROS_DOMAIN_ID']}")
-            demo.processes = processes
             demo.start(simulated)
             demo.run()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        sys.exit(f"\nrun_demo: interrupted; recorded so far: {bag}")
-    except (RuntimeError, ValueError) as error:
-        sys.exit(f"\nrun_demo: {error}; see the logs in {options.output}")
+    except Interrupted:
+        said = "interrupted"
+    except Ended as error:
+        lines = log_of(error.name, options.output).read_text(errors="replace").splitlines()
+        said = f"{error}" + (f": {lines[-1]}" if lines else "")
+    except (RuntimeError, ValueError, OSError) as error:
+        said = str(error)
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
         if demo is not None:
             demo.destroy_node()
-        rclpy.try_shutdown()
-    print(f"recorded: {bag}")
+    if not said:
+        return
+    if demo is not None and demo.has_begun:
+        sys.exit(f"\nrun_demo: {said}; recorded so far, and the logs: {options.output}")
+    shutil.rmtree(options.output)
+    sys.exit(f"run_demo: {said}")

@@ -1,22 +1,30 @@
-"""Publishes where the climber should be: a short preview of a trajectory, again and again."""
+"""Publishes where the climber should be: a short preview of a trajectory, again and again.
+
+The trajectory's times never change their meaning. A controller tells on `reference_time` how far
+it has come, and the preview begins there, however long the controller waits. Where no controller
+tells, the clock leads.
+"""
 
 from collections import deque
 from dataclasses import dataclass, replace
 
 from nav_msgs.msg import Odometry, Path
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import TimeReference
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.plan import KINDS, Plan, planned
+from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
 
 STANDSTILL = 0.2  # [s] of wall-clock time after which a clock that does not go on stands still
 ODOMETRY_AGE = 1.0  # [s] of an odometry that is too old to start at
+CLOCK_STEP = SECOND // 5  # [ns] back, from which time has started anew
 
 
 @dataclass(frozen=True)
@@ -39,23 +47,25 @@ class Options:
 
 
 class TrajectoryPublisher(ClimberNode):
-    """Starts a trajectory at the stamp of an odometry; from then on the clock leads."""
+    """Starts a trajectory at the stamp of an odometry, and goes on as it is followed."""
 
     def __init__(self) -> None:
         super().__init__("trajectory_publisher")
         for kind, prefix in [*KINDS, (Options, "")]:
             self.parameters.declare(kind, prefix)
-        self.parameters.refuse_unknown()
+        self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(Options)
         self.planned = planned(self.parameters.read)
         self.trajectory = self.planned
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
+        self.followed: int | None = None  # [ns] stamp that a controller has come to
         self.last_look = self.stood_at = 0  # [ns] what the clock said
         self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
         self.next_point = 0  # every point is computed once: previews agree to the last bit
 
         self.reference = self.publisher(MultiDOFJointTrajectory, "reference")
         self.path = self.publisher(Path, "reference_path", LATCHED)
+        self.subscription(TimeReference, "reference_time", self.on_reference_time)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_timer(self.options.publish_period, self.publish)
@@ -63,6 +73,12 @@ class TrajectoryPublisher(ClimberNode):
         self.odometry: Subscription | None = None  # only while a start is waited for
         if self.options.autostart:
             self.wait_for_odometry()
+
+    def summary(self) -> str:
+        """Numbers of the trajectory."""
+        found = summary(self.planned)
+        self.parameters.remarks += found.remarks
+        return f"{self.parameters.read(Plan).shape}, {found}"
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start, or start again from the beginning, at the next odometry."""
@@ -94,6 +110,9 @@ class TrajectoryPublisher(ClimberNode):
         now, stamp = self.get_clock().now().nanoseconds, reading.nanoseconds(message.header.stamp)
         try:
             reading.state(message, self.names.odom_frame, self.names.base_frame)
+            if not self.reference.get_subscription_count():
+                self.say("start", "waits for a subscriber of reference", is_fault=False)
+                return
             if now > 0 and abs(now - stamp) > ODOMETRY_AGE * SECOND:
                 raise ValueError("stamp is too far from the clock")
         except ValueError as error:
@@ -104,6 +123,7 @@ class TrajectoryPublisher(ClimberNode):
         self.odometry = None
         self.trajectory, self.next_point = self.planned, 0
         self.points.clear()
+        self.followed = None
         self.start, self.last_look = stamp + round(self.options.start_delay * SECOND), now
         self.publish_around(self.start)
         shape = self.parameters.read(Plan).shape
@@ -111,16 +131,34 @@ class TrajectoryPublisher(ClimberNode):
         path = writing.path(self.planned.path(points=400), self.start, self.names.odom_frame)
         self.path.publish(path)
 
+    def on_reference_time(self, message: TimeReference) -> None:
+        """Take note of how far along this trajectory a controller has come."""
+        followed = reading.nanoseconds(message.time_ref)
+        stamp, now = reading.nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
+        is_of_now = stamp < now + ODOMETRY_AGE * SECOND
+        if self.start is not None and is_of_now and self.start <= followed <= stamp + SECOND:
+            self.followed = followed
+
+    @property
+    def position(self) -> int:
+        """Stamp [ns] that the trajectory has come to: where it is followed, else the clock's."""
+        assert self.start is not None
+        if self.followed is not None:
+            return self.followed
+        if self.count_publishers("reference_time"):
+            return self.start
+        return max(self.start, self.get_clock().now().nanoseconds)
+
     def publish(self) -> None:
-        """Publish the preview at the clock's time."""
+        """Publish the preview from where the trajectory has come to."""
         now = self.get_clock().now().nanoseconds
-        if now < self.last_look and self.start is not None:
+        if now < self.last_look - CLOCK_STEP and self.start is not None:
             self.get_logger().warning("the clock went back: starts again at the next odometry")
             self.start = None
             self.wait_for_odometry()
         self.last_look = now
         if self.start is not None:
-            self.publish_around(max(self.start, now))
+            self.publish_around(self.position)
 
     def publish_at_standstill(self) -> None:
         """Publish again if time stands still: lock-step may wait for who missed the preview."""
@@ -129,10 +167,10 @@ class TrajectoryPublisher(ClimberNode):
             self.publish()
         self.stood_at = now
 
-    def publish_around(self, now: int) -> None:
+    def publish_around(self, position: int) -> None:
         """Publish points from before the last preview to the end of the next one."""
         assert self.start is not None
-        options, time = self.options, (now - self.start) / SECOND
+        options, time = self.options, (position - self.start) / SECOND
         oldest = time - options.publish_period - 2 * options.point_period
         self.next_point = max(self.next_point, int(oldest / options.point_period))
         while self.next_point * options.point_period < time + options.preview:
@@ -149,4 +187,4 @@ class TrajectoryPublisher(ClimberNode):
 
 def main() -> None:
     """Run the node."""
-    run(lambda: [TrajectoryPublisher()])
+    run(lambda: [TrajectoryPublisher()], __doc__)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import FluidPressure, JointState
+from sensor_msgs.msg import FluidPressure, JointState, TimeReference
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -19,20 +20,21 @@ from climber_uk.control.controller import Command
 from climber_uk.control.follower import Answer
 from climber_uk.control.safety import Mode
 from climber_uk.control.settings import KINDS, Choice, new_follower, settings
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.hold import ADHESION, Alarm, Grip, Hold
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading, reading_reference, writing
 from climber_uk.nodes.managed import ManagedNode
 from climber_uk.nodes.margins import Margins
-from climber_uk.nodes.running import BEST_EFFORT, LATCHED, SLOW, WALL_CLOCK, Rhythm, run
+from climber_uk.nodes.running import BEST_EFFORT, LATCHED, RELIABLE, SLOW, WALL_CLOCK, Rhythm, run
+
+LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points: to read one takes a quarter of a second
 
 
 @dataclass(frozen=True)
 class Options:
-    """What holds the climber, and what is published."""
+    """What is published."""
 
-    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
     effort_commands: bool = parameter(False, "", "publish effort_controller/commands as well")
     effort_order: str = parameter(
         "left_right", "", "order of the torques in them", choices=("left_right", "right_left")
@@ -50,7 +52,7 @@ class UkTorqueController(ManagedNode):
         parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
         for kind, prefix in [*KINDS, (Options, ""), (Grip, ""), (Alarm, ""), *parts]:
             self.parameters.declare(kind, prefix)
-        self.parameters.refuse_unknown()
+        self.parameters.refuse_unknown("the paper's scenario, up to 20 N m a wheel")
         self.options = self.parameters.read(Options)
         self.margins = Margins(self, self.parameters.read(Alarm))
         self.hold = self.hold_now()
@@ -58,12 +60,15 @@ class UkTorqueController(ManagedNode):
         self.follower = new_follower(self.parameters, self.pressure)
         self.answers = self.saturations = 0
         self.is_due = Rhythm(SLOW)  # to tell the disturbance
+        self.is_position_due = Rhythm(SLOW)
+        self.told_mode = Mode.WAITING
 
         self.torques = self.publisher(JointState, "wheel_torques")
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         self.error = self.publisher(Vector3Stamped, "~/tracking_error")
         self.force = self.publisher(WrenchStamped, "~/constraint_force")
         self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
+        self.reference_time = self.publisher(TimeReference, "reference_time")
         self.told = self.publisher(ParameterEvent, "~/parameters", LATCHED)
         self.tell_parameters()
         safety = self.follower.safety
@@ -73,13 +78,26 @@ class UkTorqueController(ManagedNode):
         self.start_diagnostics(self.values, alone_on=("odom", "reference", "wheel_torques"))
         self.start_life()
 
+    def summary(self) -> str:
+        """What is driven, how, and within which limits."""
+        climber, choice = self.parameters.read(Climber), self.parameters.read(Choice)
+        law, adhesion = choice.constraints, choice.adhesion
+        pull = self.hold.adhesion.force(climber)
+        return (
+            f"{climber.mass:g} kg, at most {climber.max_wheel_torque:g} N m a wheel, "
+            f"{adhesion} of {pull:.4g} N, constraints {law}, "
+            f"safe output {self.follower.safety.safe_output}"
+        )
+
     def listen(self) -> list[Subscription]:
         """Start from nothing with the safe output, and listen to all inputs."""
         self.follower = new_follower(self.parameters, self.pressure)
         self.follower.enable(False)
         return [
             self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT),
-            self.subscription(MultiDOFJointTrajectory, "reference", self.on_reference),
+            self.subscription(
+                MultiDOFJointTrajectory, "reference", self.on_reference, RELIABLE, raw=True
+            ),
             self.subscription(FluidPressure, "suction_pressure", self.on_pressure, BEST_EFFORT),
         ]
 
@@ -91,7 +109,8 @@ class UkTorqueController(ManagedNode):
 
     def hold_now(self) -> Hold:
         """What the parameters say that holds the climber on its wall."""
-        read, name = self.parameters.read, self.options.adhesion
+        read = self.parameters.read
+        name = read(Choice).adhesion
         return Hold(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
 
     def on_parameters(self) -> None:
@@ -122,10 +141,14 @@ class UkTorqueController(ManagedNode):
             return
         self.tell(self.follower.on_odometry(self.now(), stamp, state))
 
-    def on_reference(self, message: MultiDOFJointTrajectory) -> None:
+    def on_reference(self, serialized: bytes) -> None:
         """Keep the reference; answer the odometry that waits for it."""
         try:
+            if len(serialized) > LARGEST_REFERENCE:
+                raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
+            message = deserialize_message(serialized, MultiDOFJointTrajectory)
             preview = reading_reference.preview(message, self.names.odom_frame)
+            preview.check_heading()
         except ValueError as error:
             self.say("reference", "refused", str(error))
             return
@@ -156,17 +179,36 @@ class UkTorqueController(ManagedNode):
 
     def tell(self, answer: Answer | None) -> None:
         """Say what has changed, and publish an answer if there is one."""
-        mode = self.follower.mode
-        if mode is not Mode.WAITING:
-            trouble = "" if mode is Mode.FOLLOWING else mode.value
-            self.say("safe output", trouble, self.follower.detail, mode.is_fault)
+        follower = self.follower
+        mode = follower.mode
         if answer is not None:
             self.publish_torques(answer)
+        self.tell_position()
+        offset = follower.clock_offset
+        differ = "odometry's differs from this node's" if offset else ""
+        detail = f"by {offset:.3f} s; if that is latency, set transport_delay"
+        self.say("clock", differ, detail, is_fault=False)
+        if mode is not Mode.WAITING:
+            approaches = mode is Mode.APPROACHING
+            self.say("reference waits", mode.value if approaches else "", follower.detail, False)
+            trouble = "" if approaches or mode is Mode.FOLLOWING else mode.value
+            self.say("safe output", trouble, follower.detail, mode.is_fault)
+        if answer is not None:
             state = self.follower.state
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command, state)
             if state is not None:
                 self.take_margins(answer, state)
+
+    def tell_position(self) -> None:
+        """Tell how far along the reference the climber is: its planner waits for it."""
+        follower, stamp = self.follower, self.follower.stamp
+        position = follower.course.position(stamp)
+        has_changed, self.told_mode = follower.mode is not self.told_mode, follower.mode
+        if position is not None and (self.is_position_due(stamp) or has_changed):
+            self.reference_time.publish(
+                writing.time_reference(position, stamp, follower.mode.name.lower())
+            )
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
@@ -187,7 +229,8 @@ class UkTorqueController(ManagedNode):
         if self.is_due(stamp):
             drive, turn = follower.tracker.disturbance
             self.disturbance.publish(writing.wrench((drive, 0.0, turn), stamp, base_frame))
-        desired = follower.preview.at(stamp) if follower.preview else None
+        followed = follower.preview
+        desired = followed.at(follower.course.time_followed(stamp)) if followed else None
         if state is not None and desired is not None:
             error = tracking_error(state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
@@ -211,8 +254,17 @@ class UkTorqueController(ManagedNode):
 
     def diagnose(self) -> None:
         """Publish troubles and values, and how near to slipping and tipping it has been."""
+        self.tell_delay()
         super().diagnose()
         self.margins.diagnose()
+
+    def tell_delay(self) -> None:
+        """Say where torques act much later than `transport_delay` says, or earlier."""
+        tracker = self.follower.tracker
+        late = tracker.latency.is_far_off
+        delay = tracker.timing.transport_delay + tracker.latency.delay
+        hint = f"set transport_delay to {delay:.3f}, or see check_driver --move"
+        self.say("delay", "torques do not act when transport_delay says" * late, hint, False)
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
@@ -225,7 +277,9 @@ class UkTorqueController(ManagedNode):
             "answers": self.answers,
             "saturated answers": self.saturations,
             "odometry period [s]": tracker.period,
-            "reference waits [s]": tracker.pace.lag,
+            "clock offset [s]": self.follower.clock_offset,
+            "reference waits [s]": self.follower.course.waited,
+            "delay learnt [s]": tracker.latency.delay,
             "disturbance of the drive [N]": drive,
             "disturbance of the turn [N m]": turn,
             "suction pressure [Pa]": tracker.controller.climber.suction_pressure,
@@ -234,4 +288,4 @@ class UkTorqueController(ManagedNode):
 
 def main() -> None:
     """Run the node."""
-    run(lambda: [UkTorqueController()])
+    run(lambda: [UkTorqueController()], __doc__)

@@ -18,13 +18,22 @@ class Options:
     real_time_factor: float = parameter(
         0.0, "", "most of simulated time to the wall clock's; 0: as answers come", at_least=0
     )
-    control_period: float = parameter(0.005, "s", "between two odometry messages", above=0)
-    integration_step: float = parameter(0.0025, "s", "of the integrator", above=0)
-    command_timeout: float = parameter(0.1, "s", "age at which a torque is dropped", above=0)
+    control_period: float = parameter(
+        0.005, "s", "between two odometry messages", above=0, plausible=(5e-4, 0.5)
+    )
+    integration_step: float = parameter(
+        0.0025, "s", "of the integrator", above=0, plausible=(1e-5, 0.5)
+    )
+    command_timeout: float = parameter(
+        0.1, "s", "age at which a torque is dropped", above=0, plausible=(0.002, 5)
+    )
     push_timeout: float = parameter(
         0.5, "s", "age at which a push ends; 0: with the next one", at_least=0
     )
     lockstep_timeout: float = parameter(5.0, "s", "wall-clock wait that is reported", above=0)
+    wait_for: str = parameter(
+        "", "", "node, as a recorder, that must have subscribed all before time runs; none if empty"
+    )
     initial_x: float = parameter(0.0, "m", "x at the start")
     initial_y: float = parameter(0.0, "m", "y at the start")
     initial_heading: float = parameter(0.0, "rad", "heading at the start")

@@ -24,10 +24,18 @@ class Sensors:
         "truth", "", "what odometry measures", choices=("truth", "wheels")
     )
     odometry_delay: float = parameter(
-        0.0, "s", "from measuring, which is the stamp, to publishing", at_least=0
+        0.0,
+        "s",
+        "from measuring, which is the stamp, to publishing",
+        at_least=0,
+        plausible=(0.0, 1),
     )
-    position_noise: float = parameter(0.0, "m", "standard deviation of x and y", at_least=0)
-    heading_noise: float = parameter(0.0, "rad", "standard deviation", at_least=0)
+    position_noise: float = parameter(
+        0.0, "m", "standard deviation of x and y", at_least=0, plausible=(0.0, 1)
+    )
+    heading_noise: float = parameter(
+        0.0, "rad", "standard deviation", at_least=0, plausible=(0.0, 1)
+    )
     speed_noise: float = parameter(0.0, "m/s", "standard deviation", at_least=0)
     yaw_rate_noise: float = parameter(0.0, "rad/s", "standard deviation", at_least=0)
     x_bias: float = parameter(0.0, "m", "added to x")
@@ -36,7 +44,11 @@ class Sensors:
     speed_bias: float = parameter(0.0, "m/s", "added to the forward speed")
     yaw_rate_bias: float = parameter(0.0, "rad/s", "added to the yaw rate")
     encoder_resolution: float = parameter(
-        0.0, "rad", "of the wheels' encoders, for odometry from wheels; 0: exact", at_least=0
+        0.0,
+        "rad",
+        "of the wheels' encoders, for odometry from wheels; 0: exact",
+        at_least=0,
+        plausible=(0.0, 1),
     )
     seed: int = parameter(0, "", "of all noise", at_least=0)
 

@@ -142,16 +142,47 @@ class Made:
             self.add("wheel_torques", JOINTS, self.arrival(self.stamps[i]) + latency(i), made)
 
     def add_joints(self, rates, torques):
-        for stamp in self.stamps:
+        names = "left_wheel_joint", "right_wheel_joint"
+        self.add_joint_states(names, rates[::-1], torques[::-1])
+
+    def add_joint_states(self, names, rates, torques, later=0, topic="joint_states"):
+        """Of joints by their names, each message some ns later than the odometry."""
+        for stamp in self.stamps + later:
             made = message(
                 JOINTS,
                 stamp,
-                name=["left_wheel_joint", "right_wheel_joint"],
-                position=np.zeros(2),
-                velocity=np.array(rates[::-1], float),
-                effort=np.array(torques[::-1], float),
+                name=list(names),
+                position=np.zeros(len(names)),
+                velocity=np.array(rates, float),
+                effort=np.array(torques, float),
             )
-            self.add("joint_states", JOINTS, self.arrival(stamp), made)
+            self.add(topic, JOINTS, self.arrival(stamp), made)
+
+    def add_parameters(self, time=0.0, **values):
+        """What the controller tells of its parameters at some time."""
+        event = blank("rcl_interfaces/msg/ParameterEvent")
+        kinds = {bool: (1, "bool"), int: (2, "integer"), float: (3, "double"), str: (4, "string")}
+        for name, value in values.items():
+            number, kind = kinds[type(value)]
+            told = blank("rcl_interfaces/msg/Parameter")
+            told.name, told.value.type = name, number
+            setattr(told.value, f"{kind}_value", value)
+            event.new_parameters.append(told)
+        at = BEGAN + round(time * SECOND)
+        topic = "uk_torque_controller/parameters"
+        self.add(topic, "rcl_interfaces/msg/ParameterEvent", at, event)
+
+    def add_truth(self, pose, frame="odom"):
+        for stamp, (x, y, heading) in zip(self.stamps, pose.tolist(), strict=True):
+            made = message(ODOMETRY, stamp, frame, pose__pose__orientation=turn(heading))
+            made.pose.pose.position.x, made.pose.pose.position.y = x, y
+            self.add("ground_truth", ODOMETRY, self.arrival(stamp), made)
+
+    def edit(self, topic, change):
+        """Change the messages of a topic, each in its place."""
+        for full, _, _, made in self.messages:
+            if full == f"{self.namespace}/{topic}":
+                change(made)
 
     def add_vectors(self, topic, values):
         for stamp, (x, y, z) in zip(self.stamps, values, strict=False):

@@ -2,11 +2,13 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from made_bag import a_run, write
 
@@ -14,7 +16,7 @@ from climber_uk.analysis import analyze_bag, compare_bags
 from climber_uk.analysis.condition import Condition
 from climber_uk.analysis.metrics import METRICS, Case
 from climber_uk.analysis.recorded_run import read_runs
-from climber_uk.analysis.tables import Column
+from climber_uk.analysis.tables import Column, plain
 from climber_uk.analysis.topics import Topics
 
 pytestmark = pytest.mark.slow  # figures are
@@ -174,6 +176,44 @@ def test_bags_are_compared_side_by_side_with_ratios(bags, run, tmp_path):
     assert "second / first" in page
 
 
+@pytest.mark.parametrize("name", ["=1+1", "@x"])
+def test_no_name_becomes_a_formula_in_a_spreadsheet_and_numbers_stay_numbers(run, tmp_path, name):
+    made = a_run(200, torques=lambda time, _: np.full((len(time), 2), -2.0))
+    made.add_joints(rates=[1.0, 1.0], torques=[-3.0, -3.0])
+    bags = [made.write(tmp_path / name), made.write(tmp_path / "other")]
+    status, _, _ = run(*bags, command=compare_bags)
+    assert status == 0
+    header, *lines = csv.reader((tmp_path / "out" / "metrics.csv").read_text().splitlines())
+    assert header == ["metric", "unit", "'" + name, "other"]
+    values = {name: [float(cell) for cell in cells] for name, _, *cells in lines}
+    assert values["mean_power_right"] == [-3.0, -3.0]
+    assert not any(cell[:1] in ("=", "+", "@", "\t") for line in lines for cell in line)
+
+
+@pytest.mark.parametrize("name", ["=1", "+1", "-1", "@a", "\t=1", "\r=1", "\n=1"])
+def test_what_begins_like_a_formula_is_marked_as_text(name):
+    assert plain(name) == "'" + name
+    assert plain("a" + name) == "a" + name
+
+
+def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_path):
+    made = a_run(200)
+    made.add_truth(made.pose + np.array([0.3, 0, 0]))
+    status, out, _ = run(made.write(tmp_path / "bag"))
+    assert status == 0
+    rows = [line.split() for line in out]
+    tracking = rows.index(["Tracking"])
+    assert rows[tracking + 1] == ["truth_rms_distance", "300", "mm"]
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<b>300 mm RMS, truly</b>" in page
+    assert "by the odometry" in page
+    told = json.loads((tmp_path / "out" / "metrics.json").read_text())["runs"][0]["metrics"]
+    assert told["truth_max_distance"] == pytest.approx(0.3)
+    status, _, err = run(tmp_path / "bag", "--fail-if", "truth_max_distance>0.1")
+    assert status == 1
+    assert "truth_max_distance is 0.3 > 0.1" in err[-1]
+
+
 def test_comparing_one_bag_is_refused(bags, run):
     status, _, err = run(bags / "first", command=compare_bags)
     assert status == 2
@@ -185,3 +225,16 @@ def test_help_says_what_the_exit_status_means(command):
     module = f"climber_uk.analysis.{command}"
     said = subprocess.check_output([sys.executable, "-m", module, "--help"], text=True)
     assert "exit status" in said
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_leaves_takes_neither_files_nor_status_away(bags, tmp_path, unbuffered):
+    command = f"{sys.executable} -m climber_uk.analysis.analyze_bag {bags}/first -o {tmp_path}"
+    ran = subprocess.run(
+        ["bash", "-c", f"{command} | true; exit ${{PIPESTATUS[0]}}"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert (tmp_path / "metrics.json").is_file()

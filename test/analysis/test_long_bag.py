@@ -80,7 +80,7 @@ def part(stamps):
             pose__pose__orientation__w=np.cos(heading / 2),
         ),
         "/wheel_torques": filled(
-            JOINTS, message(JOINTS, 0, name=["l", "r"], effort=np.ones(2)), stamps
+            JOINTS, message(JOINTS, 0, name=["left", "right"], effort=np.ones(2)), stamps
         ),
         "/joint_states": filled(JOINTS, message(JOINTS, 0, **moving), stamps),
         "/uk_torque_controller/constraint_force": filled(WRENCH, message(WRENCH, 0), stamps),

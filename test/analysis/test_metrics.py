@@ -1,18 +1,23 @@
 """Metrics against values by hand, of bags whose errors are known in closed form."""
 
 import math
+import re
 
 import numpy as np
 import pytest
-from made_bag import RADIUS, RATE, START, Made
+from made_bag import RADIUS, RATE, START, Made, a_run, message
 
-from climber_uk.analysis.metrics import METRICS, Case, evaluate
+from climber_uk.analysis.events import is_fault
+from climber_uk.analysis.metrics import GROUPS, METRICS, Case, evaluate
+from climber_uk.analysis.page import page
 from climber_uk.analysis.recorded_run import read_runs
+from climber_uk.analysis.tables import Column, text
 from climber_uk.analysis.topics import Topics
+from climber_uk.control.safety import Mode
 from climber_uk.mechanics.climber import GRAVITY, Climber
 
 EXACT = {"rel": 1e-9, "abs": 1e-12}
-UNITS = {"", "%", "m", "rad", "s", "m/s", "N", "N m", "W", "J", "J/m", "Pa"}
+UNITS = {"", "%", "m", "rad", "s", "m/s", "1/s", "N", "N m", "W", "J", "J/m", "Pa"}
 
 
 def metrics_of(made, path, climber=None, settled=0.01):
@@ -220,6 +225,134 @@ def test_modes_give_stops_and_the_share_that_was_followed(tmp_path):
         (1.5, "mode", "the reference begins later"),
         (1.9, "state", "the reference begins later"),
     ]
+
+
+def test_how_far_it_truly_was_is_told_by_the_ground_truth(tmp_path):
+    """The odometry says that it is on its path; the truth is c to the left, and b in the middle."""
+    n, b, c = 401, 0.05, 0.03
+    made = a_run(n)
+    aside = np.where(np.arange(n) == 200, b, c)
+    truth = made.pose.copy()
+    truth[:, 0] -= aside * np.sin(truth[:, 2])
+    truth[:, 1] += aside * np.cos(truth[:, 2])
+    made.add_truth(truth)
+    got = metrics_of(made, tmp_path)
+    assert got["max_distance"] < 1e-9
+    same(
+        got,
+        truth_rms_distance=math.sqrt(((n - 1) * c**2 + b**2) / n),
+        truth_max_distance=b,
+    )
+    assert list(GROUPS["Tracking"])[:2] == [
+        METRICS["truth_rms_distance"],
+        METRICS["truth_max_distance"],
+    ]
+
+
+def test_a_truth_in_another_frame_is_not_used_and_said(tmp_path):
+    made = a_run()
+    made.add_truth(made.pose, frame="vicon")
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert math.isnan(evaluate(Case(run))["truth_rms_distance"])
+    assert said == ["/ground_truth: not used, frame_id='vicon' is not the odometry's, 'odom'"]
+
+
+def sagging(made, speed, stretch):
+    """Poses that sag down the wall in a stretch of time, more than it goes forwards."""
+    pose = made.pose.copy()
+    pose[:, 1] -= speed * np.clip(made.time - stretch[0], 0, stretch[1] - stretch[0])
+    return pose
+
+
+@pytest.mark.parametrize("told_by", ["odometry", "truth"])
+def test_that_it_slips_sideways_is_seen_by_the_way_it_goes(tmp_path, told_by):
+    """Wheels that stand on a wall while it sags at 5 cm/s for a second of four."""
+    made = Made(801, speed=0.0)
+    made.pose[:] = [1.0, 2.0, 0.0]
+    sags = sagging(made, 0.05, (1.0, 2.0))
+    if told_by == "odometry":
+        made.pose = sags
+    made.add_odometry()
+    if told_by == "truth":
+        made.add_truth(sags)
+    made.add_vectors("plant_simulator/margins", [[3.0, 9.0, 80.0]] * 801)
+    got = metrics_of(made, tmp_path)
+    assert got["slip_share"] == pytest.approx(25.0, abs=4.0)
+    assert got["max_side_slip"] == pytest.approx(0.05)
+
+
+def test_what_goes_round_without_slip_does_not_slip(tmp_path):
+    made = Made(801)
+    made.add_odometry()
+    made.add_truth(made.pose)
+    got = metrics_of(made, tmp_path)
+    assert got["slip_share"] == 0.0
+    assert got["max_side_slip"] < 1e-9
+
+
+def test_chatter_is_told_by_reversals_and_changes_of_the_torque(tmp_path):
+    """Right: ± 1 N m by turns, a tick each; left: 3 N m, and a ripple that is no reversal."""
+    n = 401
+    sign = (-1.0) ** np.arange(n)
+    ripple = 0.002
+
+    def torques(time, _):
+        return np.stack([sign, np.where(time < 1.0, 3.0, ripple * sign)], axis=1)
+
+    made = Made(n, torques=torques)
+    made.add_odometry()
+    made.add_torques()
+    got = metrics_of(made, tmp_path, Climber(max_wheel_torque=5.0))
+    step, changes = 3.0 - ripple, n - 1
+    ripples = 200 * (2 * ripple) ** 2
+    same(
+        got,
+        torque_reversals=200.0,
+        rms_torque_change=math.sqrt((changes * 4 + step**2 + ripples) / (2 * changes)),
+    )
+
+
+def test_a_change_of_the_torque_over_a_gap_is_none(tmp_path):
+    made = Made(100, torques=lambda time, _: np.repeat(np.floor(4 * time)[:, None], 2, axis=1))
+    made.add_odometry()
+    made.add_torques([*range(45), *range(55, 100)])  # it rises by 1 at 50
+    same(metrics_of(made, tmp_path), rms_torque_change=0.0, torque_reversals=0.0)
+
+
+@pytest.mark.parametrize(
+    ("modes", "stops"),
+    [  # each of them an error too
+        ([(-0.5, "no clock"), (0.0, "following")], 0),
+        ([(-0.5, "no odometry"), (-0.1, "waiting for a reference"), (0.0, "following")], 0),
+        ([(0.2, "no clock"), (0.4, "following")], 0),
+        ([(0.0, "no clock"), (0.1, "following"), (0.5, "no clock"), (0.6, "following")], 1),
+        ([(-0.5, "bad odometry"), (0.5, "following")], 1),
+        ([(0.0, "following"), (0.5, "no odometry"), (0.6, "following"), (0.7, "bad odometry")], 2),
+    ],
+)
+def test_to_start_up_without_a_clock_is_no_safety_stop(tmp_path, modes, stops):
+    made = Made(201)
+    made.add_odometry()
+    for time, mode in modes:
+        text = Mode.NO_CLOCK.value if mode == "no clock" else mode
+        made.add_mode(time, text, level=2 if is_fault(text) else 0)
+    same(metrics_of(made, tmp_path), safety_stops=float(stops), errors=float(stops))
+
+
+@pytest.mark.parametrize(("adhesion", "lowest"), [("suction", 8000.0), ("magnetic", math.nan)])
+def test_what_no_suction_holds_has_no_lowest_pressure(tmp_path, adhesion, lowest):
+    made = Made()
+    made.add_odometry()
+    made.add_parameters(adhesion=adhesion)
+    for stamp in made.stamps:
+        kind = "sensor_msgs/msg/FluidPressure"
+        told = message(kind, stamp, fluid_pressure=8000.0)
+        made.add("suction_pressure", kind, made.arrival(stamp), told)
+    (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    column = Column("a", "bag", Case(run))
+    assert column.values["lowest_pressure"] == pytest.approx(lowest, nan_ok=True)
+    told = "\n".join([text([column]), page("a", [column], {})])
+    assert bool(re.search("pressure|suction|seal", told)) == (adhesion == "suction")
 
 
 def test_without_a_reference_all_else_is_told(tmp_path):

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from climber_uk.analysis.changed_parameters import write_changed
 from climber_uk.analysis.parameter_file import Values, read_argument, read_file
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.mechanics.climber import Climber
@@ -53,11 +54,48 @@ def test_namespaces_may_be_nested_and_later_entries_win(file):
     assert read_file(path, NODE) == {"mass": 7.0, "half_track": 0.2}
 
 
-@pytest.mark.parametrize("text", ["a: [", "\x00", "5", ""])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("a: [", "\x00", "5", "", "mass: 5.0", "[[[", "[" * 100_000, "{" * 100_000),
+        "x:\n  ros__parameters: {mass: }",
+        "x:\n  ros__parameters: {mass: &m 5.0, half_track: *m}",
+        "x:\n  ros__parameters: {mass: [[1.0]]}",
+        "x:\n  ros__parameters: {? [mass] : 5.0}",
+    ],
+)
 def test_what_is_no_parameter_file_is_said_in_one_line(file, text):
     with pytest.raises(ValueError, match=r"parameters\.yaml") as error:
         read_file(file(text), NODE)
     assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "/**/a:\n  ros__parameters:\n    mass: 6.0\n    mass: 7.0\n",
+        "/**/a:\n  ros__parameters:\n    mass: 6.0\n/**/a:\n  ros__parameters:\n    mass: 7.0\n",
+        "/**/a:\n  ros__parameters:\n    b.c: 1.0\n    b:\n      c: 2.0\n",
+    ],
+)
+def test_what_a_file_has_twice_is_refused_by_name(file, text):
+    with pytest.raises(ValueError, match=r"has (mass|b\.c) of /\*\*/a twice$"):
+        read_file(file(text), "/a")
+
+
+def test_two_sections_of_one_node_are_one(file):
+    section = "/**/a:\n  ros__parameters:\n    {}: 6.0\n"
+    path = file(section.format("mass") + section.format("half_track"))
+    assert read_file(path, "/a") == {"mass": 6.0, "half_track": 6.0}
+
+
+def test_a_changed_file_has_the_same_values(file, tmp_path):
+    values = {"text": "5e0", "yes": "n", "octal": "010", "number": 1e-5, "on": True, "plain": "a"}
+    write_changed(
+        file("x:\n  ros__parameters: {a: '8e3', b: [y, 1]}"), {"node": values}, tmp_path / "b"
+    )
+    assert read_file(tmp_path / "b", "/node") == values
+    assert read_file(tmp_path / "b", "/x") == {"a": "8e3", "b": [True, 1]}
 
 
 def test_values_fill_dataclasses_and_are_checked_by_name():
@@ -68,6 +106,15 @@ def test_values_fill_dataclasses_and_are_checked_by_name():
 
 
 def test_arguments_are_read_as_yaml():
-    said = ("mass:=6.0", "predict:=false", "constraints:=exact")
+    said = ("mass:=6e0", "predict:=n", "constraints:=exact")
     read = [read_argument(argument) for argument in said]
     assert read == [("mass", 6.0), ("predict", False), ("constraints", "exact")]
+
+
+@pytest.mark.parametrize(
+    ("given", "found"), [("lanes.csv", "{0}/lanes.csv"), ("../a/b", "{0}/../a/b"), ("/c", "/c")]
+)
+def test_a_file_named_in_a_parameter_file_is_relative_to_that(file, given, found):
+    path = file(f"/**:\n  ros__parameters:\n    waypoints: {{file: {given}}}\n")
+    values = read_file(path, "/trajectory_publisher")
+    assert values == {"waypoints.file": found.format(path.parent)}

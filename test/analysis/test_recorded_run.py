@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from made_bag import ODOMETRY, SECOND, START, STORE, Made, a_run, blank, on_circle, write
+from made_bag import ODOMETRY, SECOND, START, STORE, Made, a_run, on_circle, write
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from climber_uk.analysis.recorded_run import read_run, read_runs
@@ -154,17 +154,45 @@ def test_wheels_are_told_apart_by_their_names(tmp_path):
     assert read_run(made.write(tmp_path / "bag")).torques[0].tolist() == [1.0, 2.0]
 
 
-def test_parameters_are_those_that_the_controller_told(tmp_path):
+def test_parameters_are_those_that_the_controller_told_last(tmp_path):
     made = a_run(N)
-    event = "rcl_interfaces/msg/ParameterEvent"
-    for mass in (4.0, 6.0):  # they were changed
-        told = blank(event)
-        for name, value in (vars(Climber()) | {"mass": mass, "other": 1.0}).items():
-            parameter = blank("rcl_interfaces/msg/Parameter")
-            parameter.name, parameter.value.type, parameter.value.double_value = name, 3, value
-            told.new_parameters.append(parameter)
-        made.add("uk_torque_controller/parameters", event, mass, told)
-    assert read_run(made.write(tmp_path / "bag")).climber == Climber(mass=6.0)
+    for time, mass in ((0.2, 6.0), (0.1, 4.0)):
+        made.add_parameters(time, **vars(Climber()) | {"mass": mass, "adhesion": "magnetic"})
+    run = read_run(made.write(tmp_path / "bag"))
+    assert run.climber == Climber(mass=6.0)
+    assert run.parameters["adhesion"] == "magnetic"
+
+
+def test_parameters_that_cannot_be_are_said_and_not_used(tmp_path):
+    made = a_run(N)
+    made.add_parameters(mass=-1.0)
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert run.climber is None
+    assert said == ["/uk_torque_controller/parameters: not used, mass=-1.0 must be > 0 [kg]"]
+
+
+def test_names_that_a_parameter_file_does_not_give_are_those_that_the_controller_told(tmp_path):
+    made = a_run(N)
+    made.add_parameters(left_wheel_joint="right", right_wheel_joint="left", mass=7.0)
+    bag = made.write(tmp_path / "bag")
+    (run,), _ = read_runs(bag, Topics(), parameters=lambda _: {"max_wheel_torque": 2.0})
+    assert len(run.torques) == N
+    assert run.climber == Climber(max_wheel_torque=2.0)
+    (run,), (said,) = read_runs(bag, Topics(), parameters=lambda _: {"left_wheel_joint": "l"})
+    assert "no l among the joints left, right" in said
+
+
+def test_that_a_topic_has_another_clock_is_said(tmp_path):
+    made = a_run(N)
+    made.add_truth(made.pose)
+    for topic in ("ground_truth", "wheel_torques"):
+        made.edit(topic, lambda sent: setattr(sent.header.stamp, "sec", 99))
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert len(run.torques) == len(run.truth_distance) == 0
+    assert sorted(said) == [
+        f"/{topic}: no message has a time of the odometry's"
+        for topic in ("ground_truth", "wheel_torques")
+    ]
 
 
 def test_points_are_where_they_were_written(tmp_path):

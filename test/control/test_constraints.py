@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from climber_uk.control.constraints import (
@@ -56,7 +56,20 @@ def differences(function, state, demand, time):
 @given(cases)
 def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
     trajectory, time, *_ = case
-    gains = Guidance(2.0, 1.3, 7.0, 6.0, 0.4, 1.5, 3.0)
+    gains = Guidance(
+        along_track_gain=2.0,
+        cross_track_gain=1.3,
+        speed_rate=7.0,
+        heading_frequency=6.0,
+        fade_speed=0.4,
+        catch_up_share=0.8,
+        catch_up_speed=1.5,
+        turn_radius=0.5,
+        turn_rate=3.0,
+    )
+    speed = abs(trajectory.at(time).speed)
+    for bend in (1.5 / 0.8, np.sqrt(1.5**2 - 0.4**2)):  # where the ceilings begin
+        assume(abs(speed - bend) > 0.01)
     state = state_of(case)
     demand = demanded(gains, state, trajectory.at(time))
 
@@ -64,7 +77,7 @@ def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
         reference = trajectory.at(time)
         e_x, _, _ = tracking_error(state.pose, reference)
         v_d = reference.speed
-        most = 0.2 + 1.5 * abs(v_d) / np.hypot(v_d, 0.4)
+        most = np.hypot(0.2, min(0.8 * abs(v_d), 1.5))
         if e_x * v_d > 0:
             most = np.hypot(v_d, 0.2)
         return state.forward_speed - v_d + most * np.tanh(2.0 * e_x / most)
@@ -76,9 +89,16 @@ def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
 
     value, rate, _ = differences(speed_error, state, demand, time)
     assert rate == pytest.approx(-7.0 * value, abs=1e-5 * (1 + abs(value)))
+
+    def fastest_turn(_, time):
+        return min(np.hypot(trajectory.at(time).speed, 0.4) / 0.5, 3.0)
+
     value, rate, second = differences(heading_error, state, demand, time)
-    part = np.tanh(6.0 * value / 3.0)
-    expected = -6.0 * ((1 - part**2) * rate + rate + 3.0 * part)
+    fastest, fastest_rate, _ = differences(fastest_turn, state, demand, time)
+    u = 6.0 * value / fastest
+    part = np.tanh(u)
+    wanted_rate = (1 - part**2) * (6.0 * rate - u * fastest_rate) + fastest_rate * part
+    expected = -wanted_rate - 6.0 * (rate + fastest * part)
     assert second == pytest.approx(expected, abs=1e-4 * (1 + abs(second)))
 
 

@@ -64,7 +64,7 @@ def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_b
     got = one, other
     np.testing.assert_allclose(done, forces(climber, *got), atol=1e-9)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
-        assert low - 1e-9 <= torque <= high + 1e-9
+        assert low <= torque <= high  # not beyond it by as little as rounding
     turn, drive = (right - left) / 2, (right + left) / 2
     # the nearest turn that any torques within the bounds give, then the nearest drive beside it
     turns = [(a - b) / 2 for a in right_bounds for b in left_bounds]
@@ -75,12 +75,35 @@ def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_b
     assert (got[0] + got[1]) / 2 == pytest.approx(np.clip(drive, lowest, highest), abs=1e-9)
 
 
-def test_a_limit_is_not_passed_by_rounding():
-    climber, random = Climber(max_wheel_torque=4.0), np.random.default_rng(1)
-    for _ in range(1000):
-        drive, turn = (1000 * random.normal(size=2)).tolist()
-        *_, right, left = limited(climber, drive, turn, (-4.0, 4.0), (-4.0, 4.0))
-        assert max(abs(right), abs(left)) <= 4.0
+@settings(max_examples=300, deadline=None)
+@given(
+    st.floats(0.01, 50),
+    st.sampled_from([0.0, 30.0, 400.0]),
+    st.sampled_from([0.0, 3.0, 1000.0]),
+    st.tuples(st.floats(-12, 12), st.floats(-30, 30), st.floats(-300, 300), st.floats(-300, 300)),
+    st.tuples(st.floats(-1, 1), st.floats(-1, 1)),
+    st.booleans(),
+)
+def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
+    limit, no_load, rate, motion, shares, many
+):
+    climber = Climber(max_wheel_torque=limit, no_load_wheel_rate=no_load)
+    controller = Controller(climber, Guidance(), Law(max_torque_rate=rate))
+    v, omega, drive, turn = (np.full(3, x) for x in motion) if many else motion
+    pose = np.zeros((3, 3) if many else 3)
+    at = State.rolling(pose, v, omega)
+    held = limit * np.array(shares)
+    if many:
+        held = np.repeat(held[:, None], 3, axis=1)
+    of = Situation(at.motion, Torques(*held), Wrench(drive, turn), PERIOD)
+    for wheels in controller.command(of, PAPER.at(0.0).target).wheels, controller.holding(of, 5.0):
+        bounds = climber.torque_bounds(at)
+        for torque, before, (low, high) in zip(wheels, held, bounds, strict=True):
+            assert np.all(np.abs(torque) <= limit)
+            assert np.all((low <= torque) & (torque <= high))
+            if rate > 0:  # where the motor can hold what it held
+                nearest = np.clip(before, low, high)
+                assert np.all(np.abs(torque - nearest) <= rate * PERIOD * (1 + 1e-12) + 1e-14)
 
 
 def test_what_the_limits_take_away_is_told():

@@ -3,13 +3,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.control.model import Observer, rolled
+from climber_uk.control.model import Learnt, Observer, rolled
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.motion import Torques, Wrench, forces, torques
 from climber_uk.simulation.plant import Plant
 
 CLIMBER = Climber()
-STILL, NONE = Torques(0.0, 0.0), Wrench(0.0, 0.0)
+STILL, NONE, NOTHING = Torques(0.0, 0.0), Wrench(0.0, 0.0), Learnt()
 
 
 def after(climber, motion, wheels, disturbance, time):
@@ -40,15 +40,16 @@ def test_at_rest_friction_holds_what_it_can_and_no_more():
     assert after(CLIMBER, rest, more, NONE, 0.1).speed == pytest.approx(0.02)
 
 
-def learn(observer, true, believed, state, wheels, disturbance=NONE, steps=200, h=0.005):
+def learn(observer, true, believed, state, wheels, learnt=NOTHING, steps=200, h=0.005):
     """Estimate after some steps of a climber that is not the one believed in."""
     plant = Plant(true, h / 2)
     seen = state.motion
     for _ in range(steps):
-        expected = after(believed, seen, wheels, disturbance, h)
+        expected = after(believed, seen, wheels, learnt, h)
         state = plant.advance(state, np.array(wheels), steps=2)
-        seen, disturbance = observer.corrected(believed, disturbance, expected, state.motion, h)
-    return state, seen, disturbance
+        shares = observer.shares(h, delay=0.0)
+        seen, learnt = observer.corrected(believed, learnt, expected, state.motion, h, shares)
+    return state, seen, learnt
 
 
 FLOOR = {"inclination": 0.0}
@@ -60,7 +61,7 @@ def test_the_observer_finds_the_friction_that_was_not_expected():
     rolling = State.rolling(np.zeros(3), 1.0, 0.0)
     _, _, found = learn(Observer(), SLIPPERY, believed, rolling, torques(believed, 30.0, 0.0))
     less = believed.seal_friction - SLIPPERY.seal_friction
-    np.testing.assert_allclose(found, [less, 0.0], atol=1e-6)
+    np.testing.assert_allclose(found[:2], [less, 0.0], atol=1e-3)
 
 
 def test_without_a_twist_it_finds_friction_and_speeds_from_poses():
@@ -86,5 +87,5 @@ def test_what_friction_holds_teaches_nothing():
 def test_switched_off_it_forgets(source):
     observer = Observer(bandwidth=0.0, velocity_source=source)
     rolling = State.rolling(np.zeros(3), 1.0, 0.0)
-    _, _, found = learn(observer, SLIPPERY, SLIPPERY, rolling, STILL, Wrench(9.0, 1.0), 400)
+    _, _, found = learn(observer, SLIPPERY, SLIPPERY, rolling, STILL, Learnt(9.0, 1.0), 400)
     np.testing.assert_allclose(found, 0, atol=1e-3)

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from climber_uk.analysis.closed_loop import Link, sampled, simulate
+from climber_uk.control.approach import ANYWHERE, Approach
 from climber_uk.control.constraints import Exact, Guidance
 from climber_uk.control.controller import Controller, Law
 from climber_uk.control.follower import Follower
+from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
@@ -43,9 +45,11 @@ def follower(
     timing=TIMING,
     pacing=PACING,
     safety=SAFETY,
+    approach=None,
+    guard=None,
 ):
     controller = Controller(climber, constraints, law)
-    return Follower(Tracker(controller, observer, timing, pacing), safety)
+    return Follower(Tracker(controller, observer, timing, pacing), safety, approach, guard)
 
 
 def lap(controlling, climber=CLIMBER, link=IDEAL, duration=10.0):
@@ -149,17 +153,21 @@ def test_a_slow_climber_comes_to_a_new_path_from_anywhere_on_the_old_one(time):
     eight = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))
     circle = Trajectory(Circle(0.5), RestToRest(rate=0.4, ramp_time=1.0), origin=(-0.5, 3.0))
     start = State(eight.at(time).pose, np.zeros(3))
-    run = simulate(circle, start, 18.0, follower(BUILT, BUILT_GAINS), BUILT)
-    assert run.distance[-1] < 2e-3
-    assert run.distance.max() < 2.5
-    assert np.abs(run.velocity[:, 2]).max() < 10.0
+    ours = follower(BUILT, BUILT_GAINS, approach=Approach(max_distance=0.1, approach_speed=0.3))
+    run = simulate(circle, start, 40.0, ours, BUILT)
+    off_the_circle = np.hypot(run.pose[:, 0] + 0.5, run.pose[:, 1] - 3.0) - 0.5
+    assert np.abs(off_the_circle[run.time > 35.0]).max() < 2e-3
+    assert ours.mode is Mode.FOLLOWING
+    assert np.abs(run.velocity[:, :2]).max() < 0.31
+    assert np.abs(run.velocity[:, 2]).max() < 1.5
 
 
 def test_it_catches_up_with_a_reference_that_runs_already():
     start = State(np.array([3.0, 0.0, 2.0]), np.zeros(3))  # the reference has left at 10 m/s
     weak = replace(CLIMBER, max_wheel_torque=4.0)
-    run = simulate(PAPER, start, 30.0, follower(weak), weak)
-    assert run.distance[run.time > 25.0].max() < 1e-3
+    ours = follower(weak, approach=ANYWHERE, guard=UNGUARDED)
+    run = simulate(PAPER, start, 30.0, ours, weak)
+    assert off_the_ellipse(run)[run.time > 25.0].max() < 1e-3
     assert np.abs(run.torques).max() <= 4.0
     assert np.abs(run.velocity[:, 2]).max() < 10.0  # no spin
 
@@ -206,12 +214,14 @@ def test_with_too_little_torque_it_stays_on_the_path_and_lags_along_it():
     after = run.time > 7.5
     assert run.error[after, 0].max() < 0.1
     assert run.distance[-1] < 1e-2
-    unpaced = too_weak(follower(pacing=Pacing(catch_up=0.0)), weak, until=7.0)
+    alone = follower(pacing=Pacing(catch_up=0.0), approach=ANYWHERE, guard=UNGUARDED)
+    unpaced = too_weak(alone, weak, until=7.0)
     assert off_the_ellipse(unpaced).max() > 0.5  # what pacing is for
 
 
 def test_stalled_it_waits_on_the_path_without_chatter():
-    run = too_weak(follower(), replace(CLIMBER, max_wheel_torque=0.3), until=99.0)
+    ours = follower(guard=UNGUARDED)
+    run = too_weak(ours, replace(CLIMBER, max_wheel_torque=0.3), until=99.0)
     last = run.time > 20.0
     assert np.abs(np.diff(run.torques[last], axis=0)).max() < 1e-3
     assert off_the_ellipse(run).max() < 0.05

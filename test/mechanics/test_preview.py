@@ -5,7 +5,7 @@ import pytest
 
 from climber_uk.mechanics.preview import Preview, joined
 from climber_uk.mechanics.shapes import Ellipse
-from climber_uk.mechanics.time_laws import ConstantRate
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
 PAPER = Trajectory(Ellipse(), ConstantRate())
@@ -88,3 +88,38 @@ def test_a_preview_of_something_else_does_not_go_on():
     turned = replace(newer, pose=newer.pose + np.array([0.0, 0.0, 2 * np.pi]))
     assert old.goes_on_with(turned, 1e-9)
     assert not old.goes_on_with(preview(60, 80), 0.05)
+
+
+def turned(angle, speed=0.2, heading=0.7):
+    """Preview of a motion whose velocity is `angle` off its heading."""
+    window = preview(0, 4)
+    direction = heading + angle
+    velocity = np.tile([speed * np.cos(direction), speed * np.sin(direction), 0.3], (4, 1))
+    velocity[:2] = 0.0
+    return replace(window, pose=np.tile([1.0, 2.0, heading], (4, 1)), velocity=velocity)
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi, 0.09, -0.09, np.pi - 0.09, 7 * np.pi])
+def test_forwards_and_backwards_with_small_angles_can_be_followed(angle):
+    turned(angle).check_heading()
+
+
+@pytest.mark.parametrize("angle", [0.11, -0.11, np.pi / 2, np.pi - 0.11, -2.0])
+def test_a_heading_across_the_velocity_is_refused_with_numbers(angle):
+    off = np.degrees(abs(np.arctan(np.tan(angle))) if abs(np.cos(angle)) > 1e-9 else np.pi / 2)
+    with pytest.raises(ValueError, match="point 3 moves sideways") as error:
+        turned(angle).check_heading()
+    assert f"0.2 m/s is {off:.3g}° off its heading of 0.7 rad" in str(error.value)
+
+
+def test_any_heading_will_do_at_rest():
+    turned(np.pi / 2, speed=0.0).check_heading()
+    turned(np.pi / 2, speed=0.004).check_heading()
+
+
+@pytest.mark.parametrize("reverse_gear", [False, True])
+def test_what_is_planned_here_never_moves_sideways(reverse_gear):
+    trajectory = Trajectory(Ellipse(), RestToRest(ramp_time=1.0), reverse_gear)
+    times = np.arange(0, 200) * PERIOD
+    r = trajectory.at(times * 1e-9)
+    Preview(times, r.pose, r.velocity, r.acceleration).check_heading()

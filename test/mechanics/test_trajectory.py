@@ -3,9 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from climber_uk.mechanics.shapes import SHAPES, Circle, Ellipse, Line, Waypoints
+from climber_uk.mechanics.shapes import SHAPES, Circle, Ellipse, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest, Stopping
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.waypoints import Waypoints
 
 CORNERS = [[0, 0], [1, 0], [1.5, 1], [0, 2]]
 
@@ -20,12 +21,14 @@ def waypoints(tmp_path):
     return make
 
 
-@pytest.fixture(params=[*SHAPES, "closed waypoints"])
+@pytest.fixture(params=[*SHAPES, "closed waypoints", "waypoints there and back"])
 def shape(request, waypoints):
     if request.param == "waypoints":
         return waypoints(CORNERS)
     if request.param == "closed waypoints":
         return waypoints([*CORNERS, CORNERS[0]])
+    if request.param == "waypoints there and back":
+        return waypoints([*CORNERS, [1.5, 0.8], [1.5, 1.0], [0, 1.9]])
     return SHAPES[request.param]()
 
 
@@ -55,27 +58,6 @@ def test_every_derivative_is_the_difference_of_the_one_below(shape, law, reverse
     ):
         difference = (high - low) / (2 * h)
         assert np.abs(difference - rate).max() <= 1e-6 * max(1.0, np.abs(rate).max())
-
-
-@pytest.mark.parametrize("closed", [False, True])
-def test_a_spline_meets_its_points_and_is_smooth_to_the_third_derivative(waypoints, closed):
-    points = np.array([*CORNERS, CORNERS[0]] if closed else CORNERS, float)
-    shape = waypoints(points)
-    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    np.testing.assert_allclose(shape.derivatives(knots)[0], points, atol=1e-12)
-    inner = knots[:-1] if closed else knots[1:-1]
-    for low, high in zip(
-        shape.derivatives(inner - 1e-9), shape.derivatives(inner + 1e-9), strict=True
-    ):
-        np.testing.assert_allclose(low, high, atol=1e-6)
-
-
-def test_a_straight_line_of_two_waypoints_stays_straight(waypoints):
-    shape = waypoints([[1, 1], [4, 5]])
-    p, p_1, p_2, p_3 = shape.derivatives(np.array([0.0, 2.5, 5.0]))
-    np.testing.assert_allclose(p, [[1, 1], [2.5, 3], [4, 5]], atol=1e-12)
-    np.testing.assert_allclose(p_1, [[0.6, 0.8]] * 3, atol=1e-12)
-    np.testing.assert_allclose([p_2, p_3], 0, atol=1e-12)
 
 
 def test_the_paper_starts_as_printed():
@@ -120,26 +102,6 @@ def test_stopping_leaves_the_past_alone_and_rests_after_its_ramp():
     assert stopped.duration == 3.0
     np.testing.assert_allclose(stopped.at(3.0).pose, stopped.at(50.0).pose)
     np.testing.assert_allclose(stopped.at(3.0).velocity, 0, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("content", "wrong"),
-    [
-        ("1 2\n", "1 point"),
-        ("1 2\n3 nan\n", "point 2 is not finite"),
-        ("1 2 3\n4 5 6\n", "two columns"),
-        ("1 2\n1 2\n3 4\n", "point 2 repeats"),
-        ("1 2\nthree four\n", "three"),
-        (None, "not found"),
-    ],
-)
-def test_a_bad_waypoint_file_is_named_with_what_is_wrong(tmp_path, content, wrong):
-    file = tmp_path / "bad.txt"
-    if content is not None:
-        file.write_text(content)
-    with pytest.raises(ValueError, match=wrong) as error:
-        Waypoints(str(file))
-    assert str(file) in str(error.value)
 
 
 def test_an_open_shape_refuses_a_law_that_would_run_off_it():

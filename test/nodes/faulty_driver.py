@@ -1,7 +1,6 @@
 """The plant as a driver with one planted fault: `faulty_driver.py FAULT`."""
 
 import math
-import sys
 import time
 from collections import deque
 
@@ -204,4 +203,4 @@ SELF = {
 }
 
 if __name__ == "__main__":
-    run(lambda: [Driver(sys.argv[1])])
+    run(lambda fault: [Driver(fault)], __doc__, {"fault": {"help": "what is wrong with it"}})

@@ -2,14 +2,13 @@
 
 import os
 import signal
-import subprocess
 import time
 
 import numpy as np
 import pytest
 from evo.core import metrics
 from evo.tools import file_interface
-from world import CONFIG, World, executable
+from world import CONFIG, World, executable, inhabitants
 
 from climber_uk.analysis import export_tum
 from climber_uk.analysis.bag import read_messages
@@ -24,29 +23,26 @@ ERROR = 2  # a level of diagnostic_msgs/DiagnosticStatus
 
 
 def demo(world, output, config, *arguments, **how):
-    return subprocess.Popen(
-        [executable("run_demo"), "--config", CONFIG / config, "--output", output, *arguments],
-        env=world.environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        **how,
-    )
+    """Start the demonstration; its output is `world.log("run_demo")`."""
+    words = "--config", CONFIG / config, "--output", output, *arguments
+    return world.run("run_demo", executable("run_demo"), *words, **how)
 
 
-def finished(process, timeout=150):
-    said, _ = process.communicate(timeout=timeout)
-    assert process.returncode == 0, said
-    return said
+def finished(world):
+    """What a demonstration has said, once it has ended well."""
+    process = world.processes["run_demo"]
+    assert process.wait(300) == 0, world.log("run_demo")
+    return world.log("run_demo")
 
 
-def hold_up_the_recorder(process):
+def is_under_way(world):
+    world.wait(lambda: "×" in world.log("run_demo"), "progress")
+
+
+def hold_up_the_recorder(world):
     """Stop it for a while, once the run has begun, as a busy machine may."""
-    process.stdout.read(40)
-    listed = subprocess.check_output(
-        ["ps", "-o", "pid=,args=", "--ppid", str(process.pid)], text=True
-    )
-    (recorder,) = [int(line.split()[0]) for line in listed.splitlines() if "record_bag" in line]
+    is_under_way(world)
+    (recorder,) = [number for number, said in inhabitants(world.domain) if "record_bag" in said]
     os.kill(recorder, signal.SIGSTOP)
     time.sleep(0.1)
     os.kill(recorder, signal.SIGCONT)
@@ -62,23 +58,24 @@ def by_stamp(bag, topic, content):
 def runs(tmp_path_factory):
     """Directory and ROS domain of the runs that several tests look at."""
     world = World(tmp_path_factory.mktemp("runs"))
-    world.close()  # its node: the tests have their own
-    return world
+    yield world
+    world.close()
 
 
 @pytest.fixture(scope="module")
 def paper_bags(runs):
     bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
     for bag in bags:
-        process = demo(runs, bag.parent, "paper.yaml")
-        hold_up_the_recorder(process)
-        finished(process)
+        demo(runs, bag.parent, "paper.yaml")
+        hold_up_the_recorder(runs)
+        finished(runs)
     return bags
 
 
 @pytest.fixture(scope="module")
 def climber_bag(runs):
-    finished(demo(runs, runs.directory / "climber", "climber.yaml"))
+    demo(runs, runs.directory / "climber", "climber.yaml")
+    finished(runs)
     return runs.directory / "climber" / "bag"
 
 
@@ -180,8 +177,8 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
     config = tmp_path / "lost.yaml"
     lost = "initial_y: 3.0\n    pressure_loss_time: 5.0\n    suction:\n      pump_time: 1.0"
     config.write_text((CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", lost))
-    said = finished(demo(world, tmp_path / "run", config, "--duration", "12"))
-    assert "fell off: tip margin" in said
+    demo(world, tmp_path / "run", config, "--duration", "12")
+    assert "fell off: tip margin" in finished(world)
     states, stopped, errors = {}, [], []
     for topic, _, message in read_messages(
         tmp_path / "run" / "bag", ["/ground_truth", "/diagnostics"]
@@ -205,9 +202,8 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
 
 
 def test_four_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
-    finished(
-        demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "4", "--duration", "4")
-    )
+    demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "4", "--duration", "4")
+    finished(world)
     bag, names = tmp_path / "run" / "bag", [f"climber_{number}" for number in (1, 2, 3, 4)]
     stamps, frames, tellers = {name: set() for name in names}, set(), set()
     for topic, _, message in read_messages(bag):
@@ -230,10 +226,9 @@ def test_four_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
 
 
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
-    # The machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`. And soon
-    # after the start Fast DDS may stop a process for a third of a second, see "Middleware" in
-    # docs/hardware.md: the climber is to be back after that.
-    finished(demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6"))
+    # The machine may be busy: what an idle one does is shown by `make demo CLOCK=wall`
+    demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6")
+    finished(world)
     run = read_run(tmp_path / "run" / "bag")
     assert 5 < run.time[-1] < 10
     assert run.distance[run.time > 4.0].max() < 0.05
@@ -243,24 +238,19 @@ def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_path, number):
     process = demo(world, tmp_path / "run", "paper.yaml", start_new_session=True)
-    bag = tmp_path / "run" / "bag"
-    world.wait(lambda: process.stdout.read(1) == "×", "progress")
-    children = subprocess.check_output(["ps", "-o", "pid=", "--ppid", str(process.pid)], text=True)
+    is_under_way(world)
+    assert len([*inhabitants(world.domain)]) == 5
     os.killpg(process.pid, number)  # as Ctrl-C in a terminal does
-    said, _ = process.communicate(timeout=60)
-    assert process.returncode != 0
+    assert process.wait(60) != 0
+    said = world.log("run_demo")
     assert "interrupted" in said
     assert "Traceback" not in said
-    assert len(children.split()) >= 4
-    for child in children.split():
-        with pytest.raises(ProcessLookupError):
-            os.kill(int(child), 0)
-    assert len(read_run(bag).time) > 10
+    assert not [*inhabitants(world.domain)]
+    assert len(read_run(tmp_path / "run" / "bag").time) > 10
 
 
 def test_what_a_demo_cannot_start_with_is_said_in_one_line(world, tmp_path):
-    process = demo(world, tmp_path / "run", "nothing.yaml")
-    said, _ = process.communicate(timeout=60)
-    assert process.returncode == 1
-    assert said.startswith("run_demo: there is no file")
-    assert len(said.splitlines()) == 1
+    assert demo(world, tmp_path / "run", "nothing.yaml").wait(60) == 1
+    (said,) = world.log("run_demo").splitlines()
+    assert said.startswith("run_demo: No such file or directory: ")
+    del world.processes["run_demo"]

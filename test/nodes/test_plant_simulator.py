@@ -10,7 +10,9 @@ from rcl_interfaces.srv import SetParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
+from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading, writing
 
 pytestmark = pytest.mark.nodes
@@ -102,7 +104,7 @@ def test_a_bad_torque_is_dropped_with_one_warning(world, kind, said):
 
 
 def test_a_stale_torque_acts_no_more_and_a_new_one_does(world):
-    world.start_node("plant_simulator", "inclination:=0.0")
+    world.start_node("plant_simulator", "inclination:=0.0", "command_timeout:=1.0")
     joints = world.listen(JointState, "joint_states")
     commands = world.speak(JointState, "wheel_torques")
     for _ in range(2):
@@ -115,7 +117,8 @@ def test_a_stale_torque_acts_no_more_and_a_new_one_does(world):
 
 
 def test_torques_beyond_the_limit_are_cut(world):
-    world.start_node("plant_simulator", "inclination:=0.0", "max_wheel_torque:=3.0")
+    patient = "command_timeout:=5.0"
+    world.start_node("plant_simulator", "inclination:=0.0", "max_wheel_torque:=3.0", patient)
     joints = world.listen(JointState, "joint_states")
     commands = world.speak(JointState, "wheel_torques")
     commands.publish(torques(100.0, -100.0))
@@ -357,3 +360,18 @@ def test_what_cannot_be_simulated_is_refused_with_one_line(world, parameters, sa
     (line,) = world.log("plant_simulator").splitlines()
     assert said in line
     del world.processes["plant_simulator"]
+
+
+def test_time_does_not_run_until_the_one_that_is_waited_for_listens_to_all(world):
+    world.start_node("plant_simulator", "simulated_time:=true", "wait_for:=test")
+    odometry = world.listen(Odometry, "odom")
+    heard = {"joint_states": JointState, "wheel_torques": JointState}
+    for topic, kind in heard.items():
+        world.node.create_subscription(kind, topic, lambda _: None, 10)
+    stepped = world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False))
+    assert "1.000 s" in stepped.message
+    assert not odometry
+    world.node.create_subscription(MultiDOFJointTrajectory, "reference", lambda _: None, 10)
+    world.wait(lambda: odometry, "first odometry")
+    assert reading.nanoseconds(odometry[0].header.stamp) == SECOND
+    assert "test listens" in world.log("plant_simulator")

@@ -1,10 +1,13 @@
 import os
 import random
+import shutil
 import signal
+import sqlite3
 import struct
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -26,14 +29,13 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 from world import new_domain
 
 from climber_uk.analysis.bag import read_messages
-from climber_uk.nodes.record_bag import is_compatible, request_for
+from climber_uk.nodes.offered_qos import is_compatible, request_for
 
 # the wheels' generator of message types, which rclpy imports, uses deprecated modules
 pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")
 
 ROOT = Path(__file__).parents[2]
 STORAGES = ["mcap", "sqlite3"]
-ENVIRONMENT = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_PYTHON_CHECK_FIELDS": "1"}
 TIMEOUT = 30.0  # [s] discovery has a long tail
 # a shell without a terminal lets what it puts into the background ignore SIGINT
 IN_BACKGROUND = ["sh", "-c", 'trap "" INT; exec "$@"', "sh"]
@@ -52,10 +54,11 @@ class Recorder:
     """A recorder in a process of its own."""
 
     def __init__(self, directory, domain, options, through=()):
+        directory.mkdir(exist_ok=True)
         self.bag = directory / "bag"
         self._log = directory / "log"
         command = [sys.executable, "-m", "climber_uk.nodes.record_bag", "--output", str(self.bag)]
-        environment = os.environ | ENVIRONMENT | {"ROS_DOMAIN_ID": str(domain)}
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
         with self._log.open("w") as log:
             self.process = subprocess.Popen(
                 [*through, *command, *options], cwd=ROOT, env=environment, stderr=log
@@ -84,6 +87,8 @@ class Recorder:
         """Wait until so many messages of each topic are recorded."""
 
         def is_recorded():
+            if not (self.bag / "metadata.yaml").exists():
+                return False
             recorded = {name: topic["message_count"] for name, topic in self.topics().items()}
             return recorded.items() >= counts.items()
 
@@ -100,13 +105,22 @@ class Graph:
         rclpy.init(context=self.context, domain_id=self.domain)
         self.node = Node("test", context=self.context, enable_rosout=False)
         self.recorder = None
+        self.others = []
+
+    def another_node(self):
+        """A node of another participant: in one of them, a topic has one type."""
+        context = Context()
+        rclpy.init(context=context, domain_id=self.domain)
+        self.others.append(Node("other", context=context, enable_rosout=False))
+        return self.others[-1]
 
     def close(self):
         if self.recorder:
             self.recorder.process.kill()
             self.recorder.process.wait()
-        self.node.destroy_node()
-        rclpy.shutdown(context=self.context)
+        for node in (self.node, *self.others):
+            node.destroy_node()
+            rclpy.shutdown(context=node.context)
 
     def publisher(self, topic, message_class, reliability=RELIABLE, durability=VOLATILE):
         # deep enough for all that a busy machine delays
@@ -129,9 +143,7 @@ def wait_for_subscription(*publishers):
 
 
 @pytest.fixture
-def graph(tmp_path, monkeypatch):
-    for name, value in ENVIRONMENT.items():
-        monkeypatch.setenv(name, value)
+def graph(tmp_path):
     graph = Graph(tmp_path)
     yield graph
     graph.close()
@@ -355,12 +367,148 @@ def test_publishers_may_come_later_and_offer_less_or_more(graph):
     assert [qos["durability"] for qos in offered["/latched"]] == ["transient_local"]
 
 
+@pytest.mark.nodes
+@pytest.mark.parametrize("storage", STORAGES)
+def test_of_a_second_type_on_a_topic_nothing_comes_into_the_bag_and_it_is_said_once(graph, storage):
+    """One is there before that which is recorded, but nobody publishes it; one comes later.
+
+    Each by a participant of its own, and both before it in the alphabet.
+    """
+    before, after = graph.another_node(), graph.another_node()
+    before.create_subscription(Float64MultiArray, "numbers", print, 10)
+    recorder = graph.record("--storage", storage)
+    wait_until(lambda: "recording /numbers [std_msgs/msg/Float64MultiArray]" in recorder.log, "it")
+    numbers = graph.publisher("numbers", Int64)
+    wait_until(lambda: numbers.get_subscription_count(), "subscription")
+    numbers.publish(Int64(data=1))
+    recorder.wait_for({"/numbers": 1})
+    others = after.create_publisher(Header, "numbers", 10)
+    said = "not recording {} on /numbers, which is recorded as std_msgs/msg/Int64"
+    types = "std_msgs/msg/Float64MultiArray", "std_msgs/msg/Header"
+    wait_until(lambda: all(said.format(t) in recorder.log for t in types), "a word")
+    for number in (2, 3):
+        others.publish(Header(frame_id="x" * 100))
+        numbers.publish(Int64(data=number))
+    recorder.wait_for({"/numbers": 3})
+    graph.finish(numbers)
+    recorder.end(signal.SIGTERM)
+
+    assert recorder.numbers() == [1, 2, 3]
+    assert recorder.topics()["/numbers"]["topic_metadata"]["type"] == "std_msgs/msg/Int64"
+    assert [recorder.log.count(said.format(t)) for t in types] == [1, 1]
+
+
+@pytest.mark.nodes
+def test_what_the_middleware_lost_is_told_and_counted_in_the_metadata(graph):
+    """A best-effort publisher goes on while the recorder does not read."""
+    publisher = graph.publisher("numbers", Int64, BEST_EFFORT)
+    whole = graph.publisher("whole", Int64)
+    recorder = graph.record()
+    wait_for_subscription(publisher, whole)
+    numbers = iter(range(1_000_000))
+
+    def publish_until(condition):
+        def step():
+            publisher.publish(Int64(data=next(numbers)))
+            return condition()
+
+        wait_until(step, "message")
+
+    publish_until(lambda: recorder.topics().get("/numbers", {}).get("message_count", 0) >= 10)
+    whole.publish(Int64(data=1))
+    recorder.process.send_signal(signal.SIGSTOP)
+    for _ in range(20_000):
+        publisher.publish(Int64(data=next(numbers)))
+    recorder.process.send_signal(signal.SIGCONT)
+    publish_until(lambda: "messages on /numbers are lost" in recorder.log)
+    graph.finish(whole)
+    recorder.end(signal.SIGTERM)
+
+    text = (recorder.bag / "metadata.yaml").read_text()
+    told = yaml.safe_load(text)["rosbag2_bagfile_information"]["custom_data"]
+    assert list(told) == ["messages lost on /numbers"]
+    read = recorder.numbers()
+    missing = read[-1] - read[0] + 1 - len(read)
+    assert missing > 1000
+    assert int(told["messages lost on /numbers"]) >= missing
+    assert f"messages lost on /numbers: {told['messages lost on /numbers']}" in recorder.log
+
+
+SET_CLOCK = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <time.h>
+
+int clock_gettime(clockid_t clock, struct timespec *now)
+{
+    static int (*real)(clockid_t, struct timespec *);
+    struct stat file;
+    if (!real)
+        real = dlsym(RTLD_NEXT, "clock_gettime");
+    int result = real(clock, now);
+    const char *set_back = getenv("SET_BACK");
+    if (clock == CLOCK_REALTIME && set_back && !stat(set_back, &file))
+        now->tv_sec -= 100;
+    return result;
+}
+"""
+
+
+@pytest.mark.nodes
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+def test_log_times_go_on_though_the_system_clock_is_set_back(graph, tmp_path, monkeypatch):
+    """By 100 s, for the recorder, once a file is there."""
+    (tmp_path / "clock.c").write_text(SET_CLOCK)
+    library, is_set = tmp_path / "clock.so", tmp_path / "set"
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, tmp_path / "clock.c"], check=True)
+    monkeypatch.setenv("SET_BACK", str(is_set))
+    publisher = graph.publisher("numbers", Int64)
+    recorder = graph.record(through=["env", f"LD_PRELOAD={library}"])
+    wait_for_subscription(publisher)
+    count, before = 90, time.time_ns()
+    for number in range(count):
+        if number == 30:
+            recorder.wait_for({"/numbers": number})
+            is_set.touch()
+        if number == 60:
+            wait_until(lambda: "clock was set back by 100.0" in recorder.log, "word of the step")
+        publisher.publish(Int64(data=number))
+    graph.finish(publisher)
+    recorder.end(signal.SIGTERM)
+    after = time.time_ns()
+
+    read = [(log_time, m.data) for _, log_time, m in read_messages(recorder.bag, ["/numbers"])]
+    times = [log_time for log_time, _ in read]
+    assert [number for _, number in read] == list(range(count))
+    assert before < times[0] < times[-1] < after
+    assert len(set(times)) == count
+
+
+@pytest.mark.nodes
+def test_the_distribution_in_the_metadata_is_the_one_that_runs(graph, monkeypatch):
+    installed = "jazzy"  # whose rclpy these tests have, if no set-up says otherwise
+    for name in (None, "kilted"):
+        monkeypatch.delenv("ROS_DISTRO", raising=False)
+        if name:
+            monkeypatch.setenv("ROS_DISTRO", name)
+        recorder = Recorder(graph.directory / str(name), graph.domain, ["--storage", "sqlite3"])
+        recorder.wait_for({})
+        recorder.end(signal.SIGTERM)
+        text = (recorder.bag / "metadata.yaml").read_text()
+        told = yaml.safe_load(text)["rosbag2_bagfile_information"]["ros_distro"]
+        assert told == (name or installed)
+        with closing(sqlite3.connect(recorder.bag / "bag_0.db3")) as database:
+            assert database.execute("SELECT ros_distro FROM schema").fetchall() == [(told,)]
+
+
 def run_record_bag(*options):
     command = [sys.executable, "-m", "climber_uk.nodes.record_bag", *options]
     return subprocess.run(
         command,
         cwd=ROOT,
-        env=os.environ | ENVIRONMENT | {"ROS_DOMAIN_ID": str(new_domain())},
+        env={**os.environ, "ROS_DOMAIN_ID": str(new_domain())},
         capture_output=True,
         text=True,
         timeout=TIMEOUT,

@@ -14,6 +14,7 @@ from world import World
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.bag_writer import BagWriter
+from climber_uk.analysis.storage import TYPESTORE
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.shapes import Circle
@@ -106,8 +107,11 @@ def bag(tmp_path_factory):
     return world.directory / "bag"
 
 
-def copied(bag, copy, without="", storage="mcap", late=()):
-    """Copy of a bag without a topic, or with messages of some that arrived 30 ms late."""
+def copied(bag, copy, without="", storage="mcap", late=(), published=None, change=None):
+    """Copy of a bag without a topic, or with messages of some that arrived 30 ms late.
+
+    `published` takes the place of all times of publishing, `change` changes wheel torques.
+    """
     with next(bag.glob("*.mcap")).open("rb") as file, BagWriter(copy, storage) as writer:
         for schema, channel, message in make_reader(file).iter_messages():
             if channel.topic == without:
@@ -115,7 +119,12 @@ def copied(bag, copy, without="", storage="mcap", late=()):
             if channel.topic not in writer:
                 writer.add_topic(channel.topic, schema.name, [])
             arrival = message.log_time + 30_000_000 * (channel.topic in late)
-            writer.write(channel.topic, arrival, message.publish_time, message.data)
+            at, data = message.publish_time if published is None else published, message.data
+            if change and channel.topic == "/wheel_torques":
+                sent = TYPESTORE.deserialize_cdr(data, schema.name)
+                change(sent)
+                data = bytes(TYPESTORE.serialize_cdr(sent, schema.name))
+            writer.write(channel.topic, arrival, at, data)
     return copy
 
 
@@ -137,6 +146,36 @@ def test_log_times_will_do_where_there_are_no_others(bag, tmp_path, replay):
     numbers = replay(copied(bag, tmp_path / "sqlite3", storage="sqlite3"))
     assert numbers["answers"]["in both"] == 320
     assert max(numbers["wheels"]["difference, RMS [N m]"]) < 0.01
+
+
+def test_log_times_will_do_where_times_of_publishing_were_left_0(bag, tmp_path, replay, capsys):
+    zeros = copied(bag, tmp_path / "zeros", published=0)
+    numbers = replay(zeros)
+    assert numbers["answers"]["in both"] == 320
+    assert max(numbers["wheels"]["difference, RMS [N m]"]) < 0.01
+    said = f"{zeros} does not tell when messages were published"
+    assert capsys.readouterr().err.count(said) == 1
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_torques_are_taken_by_the_names_of_the_wheels(bag, tmp_path, replay, order):
+    """In any order, and beside what else has a torque."""
+
+    def change(sent):
+        names, efforts = list(sent.name), list(sent.effort)
+        sent.name = ["left_brush", *(names[i] for i in order)]
+        sent.effort = np.array([9.0, *(efforts[i] for i in order)])
+
+    replay(copied(bag, tmp_path / "other", change=change), *EXACT)
+
+
+def test_torques_of_wheels_with_other_names_are_refused(bag, tmp_path, replay):
+    def change(sent):
+        sent.name = ["wheel_l", "wheel_r"]
+
+    other = copied(bag, tmp_path / "other", change=change)
+    with pytest.raises(SystemExit, match="no right_wheel_joint and no left_wheel_joint among the"):
+        replay(other)
 
 
 def test_what_other_parameters_change_is_told_and_may_be_too_much(bag, replay, capsys, tmp_path):

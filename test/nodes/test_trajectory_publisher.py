@@ -96,3 +96,20 @@ def test_where_the_clock_goes_back_the_trajectory_starts_again_and_goes_on(world
 
     goes_on_from(200, seconds)
     assert goes_on_from(1, 5) < 20
+
+
+def test_waypoints_are_relative_to_the_parameter_file_that_names_them(world, tmp_path):
+    (tmp_path / "lanes.csv").write_text("x;y\n0;0\n1,5;0\n1,5;0,3\n")
+    config = tmp_path / "lanes.yaml"
+    config.write_text(
+        "/**/trajectory_publisher:\n  ros__parameters:\n"
+        "    shape: waypoints\n    waypoints:\n      file: lanes.csv\n"
+    )
+    world.start_node("trajectory_publisher", config=config)
+    paths = []
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    world.node.create_subscription(Path, "reference_path", paths.append, latched)
+    world.start_node("plant_simulator")
+    world.wait(lambda: paths, "path")
+    end = paths[0].poses[-1].pose.position
+    np.testing.assert_allclose([end.x, end.y], [1.5, 0.3], atol=1e-9)

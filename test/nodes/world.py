@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import rclpy
@@ -53,6 +54,15 @@ def sweep(domain):
             file.unlink(missing_ok=True)
 
 
+def inhabitants(domain):
+    """Ids and command lines of all processes that were started in a domain."""
+    mark = f"ROS_DOMAIN_ID={domain}\0".encode()
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # it has ended meanwhile, or is somebody else's
+            if mark in (process / "environ").read_bytes():
+                yield int(process.name), (process / "cmdline").read_bytes().decode()
+
+
 def executable(name):
     """Where `ros2 run` finds an executable after colcon, else beside this Python."""
     try:
@@ -85,14 +95,15 @@ class World:
         """Start an executable of the package; its output is `log(name)`."""
         return self.run(name, *command(name), *arguments)
 
-    def run(self, name, *words):
-        """Start a command; its output is `log(name)`."""
+    def run(self, name, *words, **how):
+        """Start a command as `Popen` does; its output is `log(name)`."""
         with (self.directory / f"{name}.log").open("wb") as log:
             self.processes[name] = subprocess.Popen(
                 words,
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 env=self.environment,
+                **how,
             )
         return self.processes[name]
 
@@ -149,8 +160,16 @@ class World:
             process.kill()
 
     def close(self):
-        for name in list(self.processes):
-            self.end(name)
+        """End all that was started in the domain, by the test or by what it started."""
+        for process in self.processes.values():
+            process.send_signal(signal.SIGCONT)  # one that is stopped hears of nothing else
+            process.terminate()
+        for process in self.processes.values():
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(TIMEOUT)
+        for number, _ in inhabitants(self.domain):
+            with suppress(ProcessLookupError):
+                os.kill(number, signal.SIGKILL)
         self.executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()

@@ -27,7 +27,7 @@ from climber_uk.analysis.campaign.names import (
     SEED,
 )
 from climber_uk.analysis.campaign.scenario import Node, Scenario
-from climber_uk.analysis.parameter_file import read_file
+from climber_uk.analysis.parameter_file import given, load, nothing_for, read_sections, similar
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.simulation.options import Options
@@ -93,7 +93,7 @@ def read(path: Path, runs: int | None = None) -> Campaign:
     Raises `ValueError` or `OSError` naming the file, and what is wrong in it.
     """
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+        tree = load(path.read_text(encoding="utf-8"))
         return _campaign(tree, path.parent, {} if runs is None else {"runs": runs})
     except (yaml.YAMLError, ValueError) as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from None
@@ -138,10 +138,15 @@ def _size(given: dict[str, Any]) -> Size:
 def _read_base(path: Path) -> dict[str, Any]:
     """Parameters of all nodes that matter, by full name."""
     found = {}
+    sections = read_sections(path)
     for node in NODES:
-        for name, value in read_file(path, f"/{node}").items():
+        here = given(sections, f"/{node}")
+        if not here:
+            raise ValueError(nothing_for(f"/{node}", path, sections))
+        for name, (value, is_shared) in here.items():
             if f"{node}.{name}" in PARAMETERS:
                 found[f"{node}.{name}"] = value
-            elif name.split(".")[0] not in names.NODES_ONLY:
-                raise ValueError(f"{path}: {node}.{name} is not a parameter of it")
+            elif not is_shared and name.split(".")[0] not in names.NODES_ONLY:
+                meant = similar(f"{node}.{name}", PARAMETERS)
+                raise ValueError(f"{path}: {node}.{name} is not a parameter of it{meant}")
     return found

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from climber_uk.analysis.campaign.campaign import Campaign, read
+from climber_uk.system.command_line import Parser
 
 EXTRA = ["pyarrow", "matplotlib", "tqdm"]  # packages that no node needs
 
@@ -37,11 +38,11 @@ def main() -> None:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = Parser("campaign", __doc__)
     parser.add_argument(
         "file", type=Path, help="what is drawn, and the limits: config/campaign.yaml"
     )
-    parser.add_argument("--output", type=Path, help="directory (default: campaign_output/FILE)")
+    parser.add_argument("--output", "-o", type=Path, help="(default: campaign_output/FILE)")
     parser.add_argument("--runs", type=int, help="how many (default: what the file says)")
     parser.add_argument("--jobs", type=_number, help="processes (default: one for each core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to run it on")
@@ -51,7 +52,7 @@ def _options() -> argparse.Namespace:
         metavar="RUN",
         help="run this one again, through the nodes, into a bag (default output: run_RUN)",
     )
-    return parser.parse_args()
+    return parser.arguments()
 
 
 def _number(text: str) -> int:

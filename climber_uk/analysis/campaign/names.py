@@ -46,7 +46,7 @@ PARAMETERS = {
 # Parameters of the nodes that nothing in lock-step depends on: who is told what, and how often
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
-    *("stop_time", "adhesion", "effort_commands", "effort_order", "odom_frame", "base_frame"),
+    *("stop_time", "effort_commands", "effort_order", "odom_frame", "base_frame"),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames", "qos_overrides"),
 }
 # What each run may have its own of
@@ -64,6 +64,7 @@ VARIED -= {f"{PLANT}.{n}" for n in ("odometry_source", "odometry_delay", "encode
 REQUIRED = {
     f"{CONTROLLER}.pacing.catch_up": 0.0,
     f"{CONTROLLER}.least_pressure": 0.0,
+    f"{CONTROLLER}.adhesion": "suction",
     f"{CONTROLLER}.observer.velocity_source": "odometry",
     f"{PLANT}.friction": "coulomb",
     f"{PLANT}.adhesion": "suction",
@@ -77,6 +78,11 @@ REQUIRED = {
     f"{PLANT}.torque_resolution": 0.0,
     f"{PLANT}.odometry_source": "truth",
     f"{PLANT}.odometry_delay": 0.0,
+}
+# What they do without: each controller would have a timing of its own
+WITHOUT = {
+    f"{CONTROLLER}.learn_delay": False,
+    f"{CONTROLLER}.observer.twist": "instantaneous",
 }
 
 

@@ -1,15 +1,15 @@
 """One run of a campaign again, through the nodes: its parameters, its bag, its figures."""
 
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 from climber_uk.analysis.campaign.campaign import Campaign
 from climber_uk.analysis.campaign.limits import METRICS
-from climber_uk.analysis.campaign.names import MEASURED, PARAMETERS, PRESSURE
+from climber_uk.analysis.campaign.names import MEASURED, PARAMETERS, PRESSURE, WITHOUT
 from climber_uk.analysis.campaign.parts import computed
 from climber_uk.analysis.changed_parameters import write_changed
+from climber_uk.system.processes import call
 
 
 def rerun(campaign: Campaign, run: int, output: Path) -> int:
@@ -26,8 +26,7 @@ def rerun(campaign: Campaign, run: int, output: Path) -> int:
         ["run_demo", "--config", str(config), "--output", str(demo), "--duration", duration],
         ["analyze_bag", str(demo / "bag")],
     ):
-        status = subprocess.run([Path(sys.argv[0]).parent / command[0], *command[1:]]).returncode
-        if status:
+        if status := call([Path(sys.argv[0]).parent / command[0], *command[1:]]):
             return status
     return 0
 
@@ -35,7 +34,7 @@ def rerun(campaign: Campaign, run: int, output: Path) -> int:
 def parameters(campaign: Campaign, run: int) -> dict[str, dict[str, Any]]:
     """All parameters of a run, by node and name."""
     own = {name: column.tolist()[0] for name, column in campaign.columns(run, 1).items()}
-    values = {**campaign.scenario.values, **own}
+    values = {**WITHOUT, **campaign.scenario.values, **own}
     values[MEASURED] = values.get(PRESSURE, PARAMETERS[PRESSURE].default)
     by_node: dict[str, dict[str, Any]] = {}
     for name, value in values.items():

@@ -1,17 +1,12 @@
 """Run what is missing of a campaign: in processes of this machine, or on a Dask cluster."""
 
-import multiprocessing
-import os
-import signal
 import sys
-import threading
 from collections.abc import Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
     Executor,
     Future,
-    ProcessPoolExecutor,
     wait,
 )
 from contextlib import contextmanager
@@ -22,6 +17,7 @@ from tqdm import tqdm
 
 from climber_uk.analysis.campaign.campaign import Campaign
 from climber_uk.analysis.campaign.parts import Part, Store, computed
+from climber_uk.system.workers import workers
 
 Workers = tuple[Executor, int]  # and how many parts they may have in hand at a time
 
@@ -54,26 +50,8 @@ def _finished(
 @contextmanager
 def processes(jobs: int) -> Iterator[Workers]:
     """Processes of this machine, which end when this one does, however it ends."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, _start_worker) as executor:
-        try:
-            yield executor, 2 * jobs
-        except BaseException:
-            for process in multiprocessing.active_children():
-                process.terminate()
-            raise
-
-
-def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+    with workers(jobs) as executor:
+        yield executor, 2 * jobs
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from climber_uk.analysis.campaign.names import (
     PLANT,
     REQUIRED,
     SEED,
+    WITHOUT,
 )
 from climber_uk.analysis.closed_loops import Change, Course, Loops
 from climber_uk.analysis.parameter_file import Values
@@ -56,8 +57,9 @@ class Scenario:
     duration: float  # [s]
 
     def __post_init__(self) -> None:
-        for name, wanted in REQUIRED.items():
-            value = self.values.get(name, PARAMETERS[name].default)
+        defaults = {name: PARAMETERS[name].default for name in REQUIRED} | WITHOUT
+        for name, wanted in (REQUIRED | WITHOUT).items():
+            value = self.values.get(name, defaults[name])
             if value != wanted:
                 raise ValueError(f"{name}={value!r} must be {wanted!r} in a campaign")
 

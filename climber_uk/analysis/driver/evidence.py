@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from climber_uk.control.twist import TwistKind
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.motion import Motion as Rolling
 from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading
 
@@ -31,6 +33,9 @@ class Expected:
         0.005, "s", "from an odometry to the next", above=0, at_most=1
     )
     odometry_timeout: float = parameter(0.1, "s", "age at which odometry is stale", above=0)
+    transport_delay: float = parameter(
+        0.0, "s", "from a torque's publication to its action", at_least=0
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -78,6 +83,24 @@ class Motion:
         """Time (n,) [s] since the first one."""
         time: Array = (self.stamp - self.stamp[:1]) / SECOND
         return time
+
+    @cached_property
+    def period(self) -> float:
+        """The usual time between two of them [s]."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+
+    @cached_property
+    def tells_means(self) -> bool:
+        """Whether twists are means of the period before, as of encoders; see `TwistKind`."""
+        kind, motions = TwistKind(), self._motions()
+        for before, now, time in zip(motions, motions[1:], np.diff(self.time), strict=False):
+            kind.learn(before, now, float(time))
+        return kind.is_mean
+
+    def _motions(self) -> list[Rolling]:
+        columns = [*self.pose.T, *np.cos(self.pose[:, 2:]).T, *np.sin(self.pose[:, 2:]).T]
+        rows = zip(*(column.tolist() for column in (*columns, *self.reaction.T)), strict=True)
+        return [Rolling(*row) for row in rows]
 
     @cached_property
     def reaction(self) -> Array:

@@ -65,10 +65,12 @@ def latency(seen: Evidence) -> Finding:
     response = response_of(seen)
     if response is None:
         return NOT_MOVED
+    told = seen.expected.transport_delay
     said = f"{1e3 * response.delay:.1f} ms from a torque to its acceleration"
+    said += f"; transport_delay says {1e3 * told:.1f} ms" if told else ""
     hint = f"set the controller's transport_delay to {response.delay:.3f}"
     bounds = thresholds.REACTION, thresholds.LATE_REACTION
-    return graded(response.delay, bounds, said, hint, delay=response.delay)
+    return graded(abs(response.delay - told), bounds, said, hint, delay=response.delay)
 
 
 def watchdog(seen: Evidence) -> Finding:

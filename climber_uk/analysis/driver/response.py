@@ -3,7 +3,8 @@
     speed(t) = speed₀ + G ∫ τ(t - L) dt + c t - κ ∫ speed dt
 
 while it slides one way: c and κ take up friction and weight, whatever they are. By (11) and (15)
-G = 2/(r m) for the drive and 2 d/(r J) for the turn.
+G = 2/(r m) for the drive and 2 d/(r J) for the turn. A speed that is the mean of the period before
+its stamp, as of encoders, is that of the period's middle.
 """
 
 from dataclasses import dataclass
@@ -99,13 +100,14 @@ def _fit_all(
 ) -> dict[tuple[int, int], list[Fit]]:
     """Fits by pair (drive, turn) and speed (forward, yaw rate), one for each pulse that moved."""
     begin = motion.stamp[0]
+    moments = motion.time - (motion.period / 2 if motion.tells_means else 0.0)
     times = np.array([command.time - begin for command in trial.commands]) / SECOND
     torques = np.array([command.torques for command in trial.commands])
     impulse = np.vstack([np.zeros((1, 2)), np.cumsum(torques[:-1] * np.diff(times)[:, None], 0)])
     fits: dict[tuple[int, int], list[Fit]] = {(p, s): [] for p in (0, 1) for s in (0, 1)}
     for pulse in trial.pulses:
         during = (motion.stamp >= pulse.begin) & (motion.stamp <= pulse.end)
-        time = motion.time[during]
+        time = moments[during]
         right, left = (np.interp(time - delay, times, column) for column in impulse.T)
         pair = (right - left if pulse.turns else right + left) / 2
         for speed in (0, 1):

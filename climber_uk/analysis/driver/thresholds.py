@@ -11,7 +11,8 @@ OLD = 0.5  # of `odometry_timeout`, at which the controller refuses an odometry
 AHEAD = 0.02  # [s] of the clock: two computers synchronised by NTP, or a tick of /clock
 NEAREST_CLOCK = 10.0  # [s] from a clock that may be meant by a stamp; clocks are further apart
 FEWEST = 5  # messages that tell anything
-REACTION, LATE_REACTION = 0.02, 0.1  # [s]: what the controller was tried with, and its timeout
+# [s] of a delay that is not told: half of what the controller bears, docs/control.md; its timeout
+REACTION, LATE_REACTION = 0.01, 0.1
 
 # Motion
 MOVED, TURNED = 0.005, 0.01  # [m], [rad] from which on a motion says something

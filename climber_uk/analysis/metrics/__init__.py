@@ -1,11 +1,16 @@
 """A run in numbers: `GROUPS` has all metrics, and says what they are."""
 
 from climber_uk.analysis.metrics import effort, safety, timing, tracking, wall
-from climber_uk.analysis.metrics.metric import Case, Metric, prefix
+from climber_uk.analysis.metrics.metric import NAN, Case, Metric, prefix
 
 RUN = (
     Metric("duration", "s", "from the first odometry to the last", lambda c: float(c.run.time[-1])),
-    Metric("travelled", "m", "way of the centre, by the speed in the odometry", effort.travelled),
+    Metric(
+        "travelled",
+        "m",
+        "way of the centre, by the speed in the odometry, or by its poses if it tells no twist",
+        effort.travelled,
+    ),
 )
 GROUPS: dict[str, tuple[Metric, ...]] = {
     "Run": RUN,
@@ -20,7 +25,10 @@ METRICS = {metric.name: metric for group in GROUPS.values() for metric in group}
 
 def evaluate(case: Case) -> dict[str, float]:
     """All metrics of a run, by their names; nan for what cannot be told."""
-    return {name: metric.of(case) for name, metric in METRICS.items()}
+    return {
+        name: float(metric.of(case)) if metric.concerns(case) else NAN
+        for name, metric in METRICS.items()
+    }
 
 
 __all__ = ["GROUPS", "METRICS", "Case", "Metric", "evaluate", "prefix"]

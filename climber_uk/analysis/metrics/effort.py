@@ -9,11 +9,12 @@ from functools import partial
 import numpy as np
 
 from climber_uk.analysis import topics
-from climber_uk.analysis.metrics.metric import NAN, Case, Metric, largest, mean, rms, share
-from climber_uk.mechanics import Array
+from climber_uk.analysis.metrics.metric import GAP, NAN, Case, Metric, largest, mean, rms, share
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import State
 
 WHEELS = "right", "left"
+NEGLIGIBLE = 0.01  # of the most torque, whose sign does not count
 FORCES = (
     ("drive", "N", "forwards"),
     ("lateral", "N", "to the left"),
@@ -29,23 +30,42 @@ def saturated(case: Case) -> float:
     return share((np.abs(case.run.torques) >= limit).any(axis=1))
 
 
-def powers(case: Case) -> tuple[Array, Array]:
-    """Times (n,) [s] and powers (n, 2) right, left [W]: of joint_states, else of the odometry."""
+def power(case: Case, wheel: int) -> tuple[Array, Array]:
+    """Times (n,) [s] and power (n,) [W] of a motor: of joint_states, else of the odometry."""
     run = case.run
-    joints = run.recorded[topics.JOINTS]
-    if len(joints):
-        return run.seconds(joints), joints.values[:, :2] * joints.values[:, 2:]
+    joint = run.wheels[wheel]
+    if len(joint):
+        return run.seconds(joint), joint.values[:, 0] * joint.values[:, 1]
     if (climber := case.known_climber) is None or not len(run.commands):
-        return np.empty(0), np.empty((0, 2))
-    values = run.answered.values
-    state = State.rolling(values[:, :3], values[:, 3], values[:, 5])
-    return run.seconds(run.commands), climber.wheel_rates(state) * run.torques
+        return np.empty(0), np.empty(0)
+    speed, _, yaw_rate = run.rates[run.is_answered].T
+    state = State.rolling(run.pose[run.is_answered], speed, yaw_rate)
+    return run.seconds(run.commands), (climber.wheel_rates(state) * run.torques)[:, wheel]
 
 
 def energy(case: Case, wheel: int) -> float:
     """Work of a motor [J], by the trapezoidal rule."""
-    time, power = powers(case)
-    return float(np.trapezoid(power[:, wheel], time)) if len(time) > 1 else NAN
+    time, values = power(case, wheel)
+    return float(np.trapezoid(values, time)) if len(time) > 1 else NAN
+
+
+def reversals(case: Case) -> float:
+    """How often a second the torque of the wheel that does it more changes its sign [1/s]."""
+    run = case.run
+    if len(run.commands) < 2:
+        return NAN
+    climber, told = case.known_climber, np.abs(run.torques).max()
+    least = NEGLIGIBLE * (climber.max_wheel_torque if climber else told)
+    signs = (np.sign(wheel[np.abs(wheel) > least]) for wheel in run.torques.T)
+    lasted = np.ptp(run.commands.stamps) / SECOND
+    return max(float(np.sum(np.diff(sign) != 0)) for sign in signs) / lasted
+
+
+def changes(case: Case) -> Array:
+    """From each torque to the next, of answers to odometry one period apart (k, 2) [N m]."""
+    apart = np.diff(case.run.commands.stamps)
+    usual = apart <= GAP * np.median(apart) if len(apart) else []
+    return np.diff(case.run.torques, axis=0)[usual]
 
 
 def energy_per_metre(case: Case) -> float:
@@ -56,12 +76,11 @@ def energy_per_metre(case: Case) -> float:
 
 def travelled(case: Case) -> float:
     """Way of the centre [m], from the speed, which noise makes no longer."""
-    speed = np.abs(case.run.odometry.values[:, 3])
-    return float(np.trapezoid(speed, case.run.time)) if len(speed) > 1 else NAN
+    return float(np.trapezoid(np.abs(case.run.rates[:, 0]), case.run.time))
 
 
 def _of_power(statistic: Callable[[Array], float], wheel: int, case: Case) -> float:
-    return statistic(powers(case)[1][:, wheel])
+    return statistic(power(case, wheel)[1])
 
 
 def _of_force(statistic: Callable[[Array], float], component: int, case: Case) -> float:
@@ -98,6 +117,20 @@ METRICS = (
     ),
     Metric(
         "peak_torque", "N m", "largest torque of a wheel", lambda case: largest(case.run.torques)
+    ),
+    Metric(
+        "torque_reversals",
+        "1/s",
+        "how often a second a wheel's torque changes its sign, of the wheel that does it more: "
+        "above a few it chatters; what is below 1 % of `max_wheel_torque` (if that is not known, "
+        "of the largest torque) does not count",
+        reversals,
+    ),
+    Metric(
+        "rms_torque_change",
+        "N m",
+        "root mean square of what a wheel's torque changes from one answer to the next",
+        lambda case: rms(changes(case)),
     ),
     Metric("saturation", "%", "share of answers with a wheel at `max_wheel_torque`", saturated),
     *(metric for wheel, side in enumerate(WHEELS) for metric in _of_wheel(wheel, side)),

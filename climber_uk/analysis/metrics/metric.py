@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from climber_uk.analysis.recorded_run import RecordedRun
+from climber_uk.analysis.run import RecordedRun
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
 NAN = float("nan")
+GAP = 1.5  # periods between two stamps from which on a message is missing
 PREFIXED = {"m", "rad", "s", "m/s"}  # units that may have one of the prefixes
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
@@ -38,6 +39,7 @@ class Metric:
     unit: str
     definition: str
     of: Callable[[Case], float]
+    concerns: Callable[[Case], bool] = lambda _: True  # whether the climber has such a thing
 
 
 def rms(values: Array) -> float:

@@ -2,10 +2,16 @@
 
 import numpy as np
 
-from climber_uk.analysis.metrics.metric import NAN, Case, Metric, deviation, largest, percentile
+from climber_uk.analysis.metrics.metric import (
+    GAP,
+    NAN,
+    Case,
+    Metric,
+    deviation,
+    largest,
+    percentile,
+)
 from climber_uk.mechanics import SECOND, Array
-
-GAP = 1.5  # periods between two stamps from which on a message is missing
 
 
 def periods(case: Case) -> Array:
@@ -83,8 +89,8 @@ METRICS = (
     Metric(
         "odometry_unfit",
         "",
-        "odometry messages left out: a number is not finite, or absurd, or it does not lie flat",
-        lambda case: float(case.run.odometry.unfit),
+        "odometry messages left out: pose not finite, or absurd, or no unit turn about z",
+        lambda case: float(sum(case.run.odometry.unfit.values())),
     ),
     Metric(
         "odometry_repeated",

@@ -74,7 +74,23 @@ def _relative(case: Case) -> Array:
     return relative_errors(reference, pose, time, STRETCH) if len(time) else np.empty((0, 2))
 
 
+TRUTH = (
+    Metric(
+        "truth_rms_distance",
+        "m",
+        "root mean square of the true distance from the reference: by `ground_truth`, of a "
+        "simulation or of what watches from outside, where that was recorded",
+        lambda case: rms(case.run.truth_distance),
+    ),
+    Metric(
+        "truth_max_distance",
+        "m",
+        "largest true distance from the reference",
+        lambda case: largest(case.run.truth_distance),
+    ),
+)
 METRICS = (
+    *TRUTH,
     *(_statistic(statistic, quantity) for quantity in QUANTITIES for statistic in STATISTICS),
     Metric(
         "end_distance",

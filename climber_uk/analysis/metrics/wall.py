@@ -11,6 +11,8 @@ from climber_uk.mechanics import Array
 
 WINDOW = 0.5  # [s] over which momentum is balanced
 MOVING = 0.01  # [m/s] above which friction is that of sliding
+ASIDE, ASKEW = 0.02, 0.05  # [m/s] to a side, and share of the speed, above which it slips
+SUCTION = "suction"  # of the controller's `adhesion`
 
 
 def friction(case: Case) -> float:
@@ -18,9 +20,9 @@ def friction(case: Case) -> float:
     run, climber = case.run, case.known_climber
     if climber is None or len(run.commands) < 2:
         return NAN
-    time, speed = run.seconds(run.commands), run.answered.values[:, 3]
+    time, speed = run.seconds(run.commands), run.rates[run.is_answered, 0]
     drive, _ = climber.drive_and_turn(run.torques)
-    push = drive - climber.weight_along_wall * np.sin(run.answered.values[:, 2])
+    push = drive - climber.weight_along_wall * np.sin(run.pose[run.is_answered, 2])
     pushed = np.concatenate([[0.0], np.cumsum(push[:-1] * np.diff(time))])
     ways = np.concatenate([[0], np.cumsum(np.sign(speed) * (np.abs(speed) > MOVING))])
 
@@ -35,6 +37,28 @@ def friction(case: Case) -> float:
 
 def _margin(case: Case, column: int) -> Array:
     return case.run.hold.values[:, column]
+
+
+def slip_share(case: Case) -> float:
+    """Share of time that it slips [%], by the margin or by the way it goes, whichever is more.
+
+    Odometry of wheels sees no slip: that it alone tells none is not known to be none.
+    """
+    run = case.run
+    aside = np.abs(run.path_rates[:, 1]) > np.maximum(ASIDE, ASKEW * np.abs(run.path_rates[:, 0]))
+    if not (len(run.hold) or len(run.recorded[topics.TRUTH]) or aside.any()):
+        return NAN
+    return largest(np.array([share(_margin(case, 0) < 1), share(aside)]))
+
+
+def max_side_slip(case: Case) -> float:
+    """Largest speed to a side [m/s], by the twist and by the poses."""
+    return largest(np.concatenate([case.run.side_slip, case.run.path_rates[:, 1]]))
+
+
+def has_suction(case: Case) -> bool:
+    """Whether suction holds the climber, as far as is known."""
+    return case.run.parameters.get("adhesion", SUCTION) == SUCTION
 
 
 def _pressure(case: Case) -> Array:
@@ -52,8 +76,10 @@ METRICS = (
     Metric(
         "slip_share",
         "%",
-        "share of time with a slip margin below 1",
-        lambda case: share(_margin(case, 0) < 1),
+        "share of time with a slip margin below 1, or in which it goes to a side at more than "
+        "2 cm/s and 5 % of its speed, whichever is more: by the poses over 0.5 s, those of "
+        "`ground_truth` if it was recorded",
+        slip_share,
     ),
     Metric(
         "lowest_tip_margin",
@@ -72,18 +98,19 @@ METRICS = (
         "Pa",
         "least pressure difference of the suction",
         lambda case: lowest(_pressure(case)),
+        has_suction,
     ),
     Metric(
         "max_side_slip",
         "m/s",
-        "largest speed to a side, by the odometry",
-        lambda case: largest(case.run.side_slip),
+        "largest speed to a side, by the twist of the odometry or by the poses, as `slip_share`",
+        max_side_slip,
     ),
     Metric(
         "friction",
         "N",
-        "Coulomb friction of the seal: least squares of the momentum's balance over windows of "
-        "0.5 s in which the climber moves one way; `identify` does it with care",
+        "Coulomb friction against its motion: least squares of the momentum's balance over windows "
+        "of 0.5 s in which the climber moves one way; `identify` does it with care",
         friction,
     ),
 )

@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from climber_uk.analysis.recorded_run import RecordedRun, read_run
+from climber_uk.analysis.recorded_run import read_run
+from climber_uk.analysis.run import RecordedRun
+from climber_uk.system.processes import dies_with_me
 
 CONFIG = "config/paper.yaml"
 TIMEOUT = 100.0  # [s]
@@ -26,7 +28,13 @@ def record() -> RecordedRun | str:
         output = Path(scratch) / "demo"
         command = [str(run_demo), "--config", str(config), "--output", str(output)]
         try:
-            subprocess.run(command, check=True, capture_output=True, timeout=TIMEOUT)
+            subprocess.run(
+                command,
+                check=True,
+                capture_output=True,
+                timeout=TIMEOUT,
+                preexec_fn=dies_with_me(),
+            )
             return read_run(output / "bag")
         except subprocess.CalledProcessError as error:
             return f"run_demo: {error.stderr.decode(errors='replace').strip()}"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from climber_uk.analysis.paper.motion import Motion
-from climber_uk.analysis.recorded_run import RecordedRun
+from climber_uk.analysis.run import RecordedRun
 from climber_uk.mechanics import Array
 
 COLUMNS = (

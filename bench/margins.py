@@ -1,0 +1,177 @@
+"""`python bench/margins.py`: the longest delay and lag that nobody told and the loop bears.
+
+Linear: about a straight path at constant speed the sampled loop is a matrix from one odometry to
+the next, of the climber, its motors, what is on its way, and the controller; it stands while all
+eigenvalues lie in the unit circle. Simulated: by bisection, with the controller as the nodes run
+it, first without and then with `learn_delay`.
+"""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from robustness import (
+    AT_REST,
+    BUILT,
+    EIGHT,
+    ELLIPSE,
+    GUIDANCE,
+    IN_MOTION,
+    PAPER,
+    SLOW_GUIDANCE,
+    run_of,
+)
+from scipy.linalg import expm
+
+from climber_uk.analysis.closed_loop import Link
+from climber_uk.control.approach import ANYWHERE
+from climber_uk.control.constraints import Guidance
+from climber_uk.control.controller import Controller, Law
+from climber_uk.control.follower import Follower
+from climber_uk.control.guard import UNGUARDED
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.safety import Safety
+from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.trajectory import Trajectory
+
+MILLISECOND = 1e-3
+LONGEST = 0.2  # [s] that is looked for
+OFF, CHATTER = 5e-3, 0.05  # [m] RMS distance and [N m] RMS change of a torque: it does not stand
+
+
+class Scenario(NamedTuple):
+    """A climber on a path, its gains, and the speed [m/s] about which the loop is taken linear."""
+
+    climber: Climber
+    gains: Guidance
+    trajectory: Trajectory
+    start: State
+    speed: float
+
+
+SCENARIOS = {
+    "climber.yaml": Scenario(BUILT, SLOW_GUIDANCE, EIGHT, AT_REST, 0.26),
+    "defaults, as slow": Scenario(BUILT, GUIDANCE, EIGHT, AT_REST, 0.26),
+    "paper.yaml": Scenario(PAPER, GUIDANCE, ELLIPSE, IN_MOTION, 10.0),
+}
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Drive or turn: ẏ = v θ, θ̇ = ω, ω̇ = u; for the drive y is not there, and θ is the way."""
+
+    speed: float  # v [m/s]
+    feedback: Array  # (3,) of u = -feedback (y, θ, ω)
+
+    @classmethod
+    def both(cls, gains: Guidance, speed: float) -> "tuple[Channel, Channel]":
+        """Of the guidance, along a line."""
+        k_x, rate, omega_n = gains.along_track_gain, gains.speed_rate, gains.heading_frequency
+        g = gains.cross_track_gain * speed / np.hypot(speed, gains.fade_speed)
+        turn = [omega_n**2 * g, omega_n**2 + 2 * omega_n * g * speed, 2 * omega_n + g * speed]
+        return cls(0.0, np.array([0.0, k_x * rate, k_x + rate])), cls(speed, np.array(turn))
+
+    def over(self, time: float, lag: float = 0.0) -> tuple[Array, Array]:
+        """Matrix (n, n) and input (n,) of `time` [s], with the motor's torque where it lags."""
+        size = 4 if lag > 0 else 3
+        A = np.zeros((size + 1, size + 1))
+        A[0, 1], A[1, 2] = self.speed, 1.0
+        A[2, 3] = 1.0  # the motor's torque, or the input
+        if lag > 0:
+            A[3, 3], A[3, 4] = -1 / lag, 1 / lag
+        whole = expm(A * time)
+        return whole[:size, :size], whole[:size, size]
+
+
+def stands(channel: Channel, observer: Observer, period: float, delay: float, lag: float) -> bool:
+    """Whether the linear loop does."""
+    late = int(delay / period + 1e-9)
+    before, after = (
+        channel.over(t, lag) for t in (delay - late * period, (late + 1) * period - delay)
+    )
+    whole, halfway = channel.over(period), channel.over(period / 2)
+    size = len(before[1])
+    new, newer = observer.shares(period, 0.0) if observer.bandwidth else (0.0, 0.0)
+
+    def step(state: Array) -> Array:
+        """The loop's state an odometry later: climber, r, ṙ, last torques, last odometry."""
+        body, (r, rate), sent, last = np.split(state, [size, size + 2, size + 4 + late])
+        found = body[:3]
+        expected = whole[0] @ last + whole[1] * (sent[0] + r)
+        off = (found[2] - expected[2]) / period
+        r, rate = r + period * rate + new * off, rate + newer * off / period
+        u = sent[0]
+        for _ in range(2):
+            u = -channel.feedback @ (halfway[0] @ found + halfway[1] * (u + r)) - r
+        sent = np.concatenate([[u], sent[:-1]])
+        body = before[0] @ body + before[1] * sent[late + 1]
+        return np.concatenate([after[0] @ body + after[1] * sent[late], [r, rate], sent, found])
+
+    matrix = np.stack([step(unit) for unit in np.eye(size + 7 + late)], axis=1)
+    return float(np.abs(np.linalg.eigvals(matrix)).max()) < 1 + 1e-6
+
+
+def simulated(scenario: Scenario, observer: Observer, learns: bool, link: Link) -> bool:
+    """Whether the loop of the nodes stands."""
+    controller = Controller(scenario.climber, scenario.gains, Law())
+    tracker = Tracker(controller, observer, Timing(learn_delay=learns), Pacing())
+    follower = Follower(tracker, Safety(), ANYWHERE, UNGUARDED)
+    run = run_of(scenario.trajectory, scenario.start, 15.0, follower, scenario.climber, link)
+    return run.rms(7.5) < OFF and run.chatter() < CHATTER
+
+
+def longest(holds: Callable[[float], bool], step: float) -> float:
+    """Longest time [ms], in multiples of `step` [s], up to which it `holds`; by bisection."""
+    low, high = 0, round(LONGEST / step)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle * step) else (low, middle)
+    return low * step / MILLISECOND
+
+
+def linear_margins(scenario: Scenario, observer: Observer, period: float) -> tuple[float, float]:
+    """Longest delay and lag [ms], by eigenvalues."""
+    channels = Channel.both(scenario.gains, scenario.speed)
+
+    def holds(delay: float, lag: float) -> bool:
+        return all(stands(channel, observer, period, delay, lag) for channel in channels)
+
+    return longest(lambda t: holds(t, 0.0), 5e-4), longest(lambda t: holds(0.0, t), 5e-4)
+
+
+def simulated_margins(
+    scenario: Scenario, observer: Observer, period: float, learns: bool
+) -> tuple[float, float]:
+    """Longest delay and lag [ms], of the loop that the nodes run."""
+    link = Link(period=period)
+
+    def holds(**late: float) -> bool:
+        return simulated(scenario, observer, learns, replace(link, **late))
+
+    return (
+        longest(lambda t: holds(delay=t), link.step),
+        longest(lambda t: holds(torque_lag=t), link.step),
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--period", type=float, default=0.005, help="of the odometry [s]")
+    parser.add_argument("--bandwidth", type=float, default=Observer().bandwidth, help="[1/s]")
+    options = parser.parse_args()
+    period, observer = options.period, Observer(bandwidth=options.bandwidth)
+    print(f"{'delay, lag [ms]':<20}{'linear':>16}{'simulated':>16}{'and learnt':>16}")
+    for name, scenario in SCENARIOS.items():
+        cells = [linear_margins(scenario, observer, period)]
+        cells += [simulated_margins(scenario, observer, period, learns) for learns in (False, True)]
+        print(f"{name:<20}" + "".join(f"{f'{d:.1f}, {lag:.1f}':>16}" for d, lag in cells))
+
+
+if __name__ == "__main__":
+    main()

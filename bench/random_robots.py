@@ -1,0 +1,151 @@
+"""`python bench/random_robots.py`: how many of random robots end in a limit cycle.
+
+Each is a crawler as `climber.yaml` has it, but with a period, a lag, a delay, encoders, friction,
+mass and inertia of its own, of which its controller is told nothing; then once more with the
+`transport_delay` that `check_driver --move` tells it.
+"""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from multiprocessing import Pool
+from typing import NamedTuple
+
+import numpy as np
+from robustness import AT_REST, BUILT, EIGHT, SLOW_GUIDANCE, ours
+
+from climber_uk.analysis.closed_loop import Link, simulate
+from climber_uk.analysis.driver.evidence import Arrival, motion_of
+from climber_uk.analysis.driver.response import respond
+from climber_uk.analysis.driver.trial import Bounds, Trial
+from climber_uk.control.follower import Answer
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.friction import Stribeck
+from climber_uk.mechanics.preview import Preview
+from climber_uk.messages import writing
+from climber_uk.simulation.plant import Plant
+
+STEP = 0.0025  # [s] of the plant: of all times
+DURATION = 12.0  # [s], of which the second half counts
+OFF, CHATTER = 5e-3, 0.05  # [m] RMS distance and [N m] RMS change of a torque: a limit cycle
+AT_FIRST = 50  # messages at rest before a trial
+
+
+class Robot(NamedTuple):
+    """What a robot is in truth."""
+
+    climber: Climber
+    link: Link
+    contact: Contact
+
+
+class Result(NamedTuple):
+    """How a robot drove."""
+
+    distance: float  # RMS [m]
+    chatter: float  # RMS change of a torque from tick to tick [N m]
+    learnt: float  # delay [s]
+
+    @property
+    def cycles(self) -> bool:
+        """Whether it ended in a limit cycle."""
+        return not (self.distance < OFF and self.chatter < CHATTER)
+
+
+def robot(seed: int) -> Robot:
+    """The robot of a seed."""
+    random = np.random.default_rng(seed)
+    link = Link(
+        step=STEP,
+        period=STEP * float(random.choice([2, 4, 6, 8])),
+        torque_lag=random.uniform(0.0, 0.02),
+        delay=STEP * float(random.integers(0, 4)),
+        encoder_counts=int(random.choice([2048, 4096, 8192])),
+    )
+    climber = replace(
+        BUILT,
+        mass=BUILT.mass * random.uniform(0.8, 1.2),
+        yaw_inertia=BUILT.yaw_inertia * random.uniform(0.8, 1.2),
+        seal_friction_coefficient=BUILT.seal_friction_coefficient * random.uniform(0.5, 1.5),
+    )
+    return Robot(climber, link, Contact(friction=Stribeck(ratio=random.uniform(1.0, 1.6))))
+
+
+class Trying:
+    """The trial of `check_driver --move`, in the controller's place."""
+
+    def __init__(self, period: float) -> None:
+        self.period, self.heard, self.trial = period, list[Arrival](), None
+
+    def on_reference(self, now: int, preview: Preview) -> Answer | None:
+        """Leave it be."""
+
+    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+        """Answer with the trial's torques, once it has begun."""
+        self.heard.append(Arrival(writing.odometry(state, stamp, "odom", "base_link"), now, now, 0))
+        if len(self.heard) == AT_FIRST:
+            self.trial = Trial(BUILT, Bounds(), self.heard, self.period, False)
+        torques = self.trial.torques(stamp, now, state) if self.trial else np.zeros(2)
+        return Answer(stamp, np.zeros(2) if torques is None else torques, None)
+
+
+def told(of: Robot) -> float:
+    """The delay [s] that `check_driver --move` tells, and 0 if its trial tells none."""
+    trying = Trying(of.link.period)
+    simulate(
+        EIGHT,
+        AT_REST,
+        10.0,
+        trying,
+        of.climber,
+        of.link,
+        plant_of=partial(Plant, contact=of.contact),
+    )
+    assert trying.trial is not None
+    record = trying.trial.record()
+    return respond(motion_of(trying.heard), record, BUILT).delay if record.pulses else 0.0
+
+
+def driven(seed: int, delay_of: Callable[[Robot], float]) -> Result:
+    """How the robot of a seed drives, told of a delay."""
+    of = robot(seed)
+    follower = ours(BUILT, SLOW_GUIDANCE, delay_of(of))
+    run = simulate(
+        EIGHT,
+        AT_REST,
+        DURATION,
+        follower,
+        of.climber,
+        of.link,
+        plant_of=partial(Plant, contact=of.contact),
+    )
+    late = DURATION / 2
+    return Result(run.rms(late), run.chatter(late), follower.tracker.latency.delay)
+
+
+def untold(_: Robot) -> float:
+    """No delay."""
+    return 0.0
+
+
+def main() -> None:
+    """Print how many, and those that do."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first one")
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    seeds = range(options.first, options.first + options.robots)
+    with Pool(options.processes) as pool:
+        for name, delay_of in (("told nothing", untold), ("told by check_driver", told)):
+            results = pool.map(partial(driven, delay_of=delay_of), seeds, chunksize=1)
+            cycles = [seed for seed, result in zip(seeds, results, strict=True) if result.cycles]
+            worst = 1e3 * max(result.distance for result in results)
+            said = f"{name}: {len(cycles)} of {len(seeds)} in a limit cycle {cycles or ''}"
+            print(f"{said}; largest RMS distance {worst:.2g} mm", flush=True)
+
+
+if __name__ == "__main__":
+    main()

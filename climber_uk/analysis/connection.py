@@ -1,0 +1,66 @@
+"""What the storage files of bags have in common."""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+CDR = "cdr"
+MOST_TOPICS = 65535  # of a file, as many as MCAP can have
+LONGEST_NAME, LONGEST_LINE = 500, 1000  # characters of a topic or a type, and of what is told
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A topic of a storage file."""
+
+    id: int
+    topic: str
+    msgtype: str
+    msgcount: int
+    definition: str  # of its type, with those of the types it contains; '' if not told
+
+
+# connection, log time, publishing time (0: not told) [ns] and serialised message
+Logged = tuple[Connection, int, int, bytes]
+Lose = Callable[[str], None]  # is told what could not be read
+
+
+class StorageFile(Protocol):
+    """A file of messages, open for reading; nothing is ever written to it or beside it."""
+
+    size: int  # [bytes]
+    connections: list[Connection]  # those whose messages are CDR
+    start: int  # first log time [ns]
+    end: int  # last log time [ns]
+
+    def messages(self, connections: Collection[Connection]) -> Iterator[Logged]:
+        """Yield what is sound of some topics, in the order of the log times."""
+
+    def close(self) -> None:
+        """Close the file."""
+
+
+def tell_encodings(name: str, others: dict[str, list[str]], lose: Lose) -> None:
+    """Say which topics of a file are left out, by their encodings."""
+    for encoding, topics in others.items():
+        lose(f"{name}: {listed(topics)} left out: encoded as {encoding or 'nothing'}, not {CDR}")
+
+
+def listed(names: Sequence[str]) -> str:
+    """At most three names, and how many more there are."""
+    some = ", ".join(names[:3])
+    return f"{some} and {len(names) - 3} more" if len(names) > 3 else some or "nothing"
+
+
+def is_name(name: object) -> bool:
+    """Whether a topic or a type may be called so; no terminal obeys what may."""
+    return isinstance(name, str) and len(name) <= LONGEST_NAME and name.isprintable()
+
+
+def one_line(text: str) -> str:
+    r"""One line to print, of what a file tells: what a terminal could obey is written as `\x1b`."""
+    shown = "".join(
+        character if character.isprintable() else character.encode("unicode_escape").decode()
+        for character in " ".join(text[:LONGEST_LINE].split())
+    )
+    return shown + "…" * (len(text) > LONGEST_LINE)

@@ -1,0 +1,55 @@
+"""Where the tools that read a bag write, and how they print what others have written.
+
+One rule for all: into the directory that `--output` names; else into a new one in the bag, or
+beside it if it is a single file. Nothing that was there before is overwritten then.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
+from pathlib import Path
+from tempfile import TemporaryFile
+
+
+@contextmanager
+def output(bag: Path, name: str, given: Path | None) -> Iterator[Path]:
+    """Make the directory before the work begins; take it away if nothing comes into it.
+
+    It is `given`, or the first of `name`, `name_2`, … that is not there. Raises `OSError` of one
+    line if there is no bag, or if nobody can write there.
+    """
+    if not bag.exists():
+        raise FileNotFoundError(f"there is no bag {bag}")
+    directory = given or new_directory(bag, name)
+    made = [path for path in (directory, *directory.parents) if not path.exists()]
+    try:
+        check_writable(directory)
+        yield directory
+    finally:
+        for path in made:
+            with suppress(OSError):  # it is not empty
+                path.rmdir()
+
+
+def new_directory(bag: Path, name: str) -> Path:
+    """Directory in a bag, or beside it, that is not there yet."""
+    first = bag / name if bag.is_dir() else bag.with_name(f"{bag.stem}_{name}")
+    others = (first.with_name(f"{first.name}_{number}") for number in count(2))
+    return first if not first.exists() else next(path for path in others if not path.exists())
+
+
+def check_writable(directory: Path) -> None:
+    """Make a directory, if need be; raises `OSError` unless files can be written into it."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=directory):
+            pass
+    except OSError as error:
+        raise OSError(
+            f"cannot write into {directory} ({error.strerror}): --output says where else"
+        ) from None
+
+
+def printable(text: str) -> str:
+    """Text in which nothing commands a terminal: what is not to be read is written out."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)

@@ -1,0 +1,118 @@
+"""The way to a reference that is elsewhere: turn to it, drive there, and turn as it does.
+
+Each of the three moves goes from rest to rest by the polynomial of least jerk, p(u) = 10 u³ - 15 u⁴
++ 6 u⁵, whose fastest rate is 15/8 of the mean one.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.motion import Motion, Target
+from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.preview import Preview
+
+PEAK = 15 / 8  # of p'
+SHORTEST = 0.4  # [s] that a move takes
+POINT_PERIOD = 0.05  # [s]
+HERE = 1e-3  # [m] that need not be driven
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How a climber gets to its reference, which waits for it meanwhile."""
+
+    max_start_distance: float = parameter(
+        2.0, "m", "from further away the reference is refused", above=0
+    )
+    max_distance: float = parameter(
+        1.0, "m", "from the reference, beyond which it waits and is approached", above=0
+    )
+    max_heading: float = parameter(
+        2.0, "rad", "away from the reference's heading, beyond which it is the same", above=0
+    )
+    approach_speed: float = parameter(0.1, "m/s", "fastest speed of the approach", above=0)
+    approach_yaw_rate: float = parameter(0.5, "rad/s", "fastest turn of the approach", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def way(self, motion: Motion, target: Target, begin: int) -> Preview:
+        """Reference from where a climber is, at rest from `begin` [ns] on, to where `target` is."""
+        offset_x, offset_y = target.x - motion.x, target.y - motion.y
+        distance = math.hypot(offset_x, offset_y)
+        first, direction = float(motion.heading), 1.0
+        if distance > HERE:
+            turned = float(wrapped(math.atan2(offset_y, offset_x) - first))
+            if abs(turned) > math.pi / 2:  # in reverse gear it is less of a turn
+                turned, direction = float(wrapped(turned + math.pi)), -1.0
+            course = first + turned
+        else:
+            distance, course = 0.0, first
+        last = course + float(wrapped(target.heading - course))
+        start = (motion.x, motion.y)
+        end = (target.x, target.y) if distance else start
+        parts = [
+            self._turn(start, first, course),
+            self._drive(start, course, direction, distance),
+            self._turn(end, course, last),
+        ]
+        return _joined([part for part in parts if part is not None] or [_rest(end, last)], begin)
+
+    def _turn(self, place: tuple[float, float], first: float, last: float) -> Array | None:
+        angle = last - first
+        if not angle:
+            return None
+        time, p, p_1, p_2 = _move(abs(angle), self.approach_yaw_rate)
+        rows = np.zeros((len(time), 10))
+        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place, first + p * angle
+        rows[:, 6], rows[:, 9] = p_1 * angle, p_2 * angle
+        return rows
+
+    def _drive(
+        self, place: tuple[float, float], course: float, direction: float, distance: float
+    ) -> Array | None:
+        if not distance:
+            return None
+        time, p, p_1, p_2 = _move(distance, self.approach_speed)
+        way = direction * distance * np.array([math.cos(course), math.sin(course)])
+        rows = np.zeros((len(time), 10))
+        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * way, course
+        rows[:, 4:6], rows[:, 7:9] = p_1[:, None] * way, p_2[:, None] * way
+        return rows
+
+
+ANYWHERE = Approach(max_start_distance=1e6, max_distance=1e6, max_heading=10.0)
+"""Follows at once, from wherever the climber is: the law by itself."""
+
+
+def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:
+    """Times (n,) [s], and p, ṗ, p̈ at them, of a move of `size` at a rate of `fastest` at most."""
+    duration = max(PEAK * size / fastest, SHORTEST)
+    time = np.linspace(0.0, duration, math.ceil(duration / POINT_PERIOD) + 1)
+    u = time / duration
+    p = u**3 * (10 - 15 * u + 6 * u**2)
+    p_1 = 30 * u**2 * (1 - u) ** 2 / duration
+    p_2 = 60 * u * (1 - u) * (1 - 2 * u) / duration**2
+    return time, p, p_1, p_2
+
+
+def _rest(place: tuple[float, float], heading: float) -> Array:
+    rows = np.zeros((2, 10))
+    rows[:, 0], rows[:, 1:3], rows[:, 3] = (0.0, POINT_PERIOD), place, heading
+    return rows
+
+
+def _joined(parts: list[Array], begin: int) -> Preview:
+    """Preview of moves one after the other: rows of time, pose, velocity and acceleration."""
+    rows: list[Array] = []
+    end = 0.0
+    for part in parts:
+        rows.append(part[1 if rows else 0 :] + np.eye(10)[0] * end)
+        end = rows[-1][-1, 0]
+    table = np.concatenate(rows)
+    times = begin + np.round(table[:, 0] * SECOND).astype(np.int64)
+    return Preview(times, table[:, 1:4], table[:, 4:7], table[:, 7:10])

@@ -1,0 +1,243 @@
+"""A guard beside the law: does the climber do what torques and reference can explain?
+
+It knows the model, the torques that acted and the reference's fastest motion, and nothing of the
+law. What it finds is a `Mode` in which the safe output is given.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from climber_uk.control.safety import Mode
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.motion import Motion, Torques, Wrench
+from climber_uk.mechanics.parameter import check, parameter
+
+IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
+MOVES = 0.02  # [m/s] from which it is known how much the seal rubs, and against what
+AT_LIMIT = 0.98  # of the largest torque
+STRONG = 0.6  # of the largest torque, which has to move a climber that stands
+STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
+UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
+EXCITED = 0.12  # of the largest torque: standard deviation that tells whether a wheel answers
+SUSPECTED = 0.4  # of both is enough where the climber runs away
+
+
+@dataclass(frozen=True, slots=True)
+class GuardOptions:
+    """What is beyond explanation, and when the climber is trusted again; 0 switches a check off."""
+
+    speed_margin: float = parameter(
+        0.05, "m/s", "above the fastest that the constraints ask for on this reference", at_least=0
+    )
+    yaw_rate_margin: float = parameter(
+        1.0, "rad/s", "above the fastest turn that they ask for", at_least=0
+    )
+    stall_time: float = parameter(
+        0.12, "s", "for which a torque at its limit may move nothing", at_least=0
+    )
+    max_disturbance: float = parameter(
+        1.0, "", "of what adhesion and weight could cause, as force and as moment", at_least=0
+    )
+    response_time: float = parameter(
+        0.15, "s", "in which a wheel has to answer its torque", at_least=0
+    )
+    recovery_time: float = parameter(
+        0.5, "s", "of rest after which the reference is followed again", at_least=0
+    )
+    attempts: int = parameter(
+        3, "", "faults within `memory`, after which ~/enable is waited for", at_least=1
+    )
+    memory: float = parameter(20.0, "s", "for which a fault counts", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+UNGUARDED = GuardOptions(
+    speed_margin=0.0, yaw_rate_margin=0.0, stall_time=0.0, max_disturbance=0.0, response_time=0.0
+)
+
+
+class Fastest(NamedTuple):
+    """Fastest motion of a reference, or of what follows it."""
+
+    speed: float  # [m/s]
+    yaw_rate: float  # [rad/s]
+
+
+class Variance:
+    """Mean and variance of what was added, each older value counting less."""
+
+    def __init__(self) -> None:
+        self.number, self.mean, self.variance = 0, 0.0, 0.0
+
+    def add(self, value: float, share: float) -> None:
+        """Add a value with a `share` of all weight."""
+        self.number += 1
+        if self.number == 1:
+            self.mean = value
+            return
+        off = value - self.mean
+        self.mean += share * off
+        self.variance = (1 - share) * (self.variance + share * off * off)
+
+
+class Wheel:
+    """A wheel that answers its torque: the force that acted follows the one that was asked for.
+
+    Of a dead one the force stays what it was, and what is left, their difference, varies instead.
+    What resists the climber as a whole makes that vary on both sides.
+    """
+
+    def __init__(self) -> None:
+        self.asked, self.found, self.left = Variance(), Variance(), Variance()
+
+    def add(self, asked: float, found: float, share: float) -> None:
+        """Add the force [N] that a torque should cause, and the one that acted."""
+        self.asked.add(asked, share)
+        self.found.add(found, share)
+        self.left.add(found - asked, share)
+
+    def answers(self, other: "Wheel", largest: float, proof: float) -> bool:
+        """Whether it does, or too little was asked of it to know; of `largest` [N] at most."""
+        excited = self.asked.variance > (proof * EXCITED * largest) ** 2
+        explained = max(self.found.variance, other.left.variance)
+        return not (excited and self.left.variance > proof * UNANSWERED * explained)
+
+
+class Guard:
+    """Watches a climber that follows."""
+
+    def __init__(self, options: GuardOptions) -> None:
+        self.options = options
+        self.faults: deque[int] = deque()  # [ns] stamps
+        self.restart()
+
+    def restart(self) -> None:
+        """Watch from now on."""
+        self._too_fast = 0
+        self._stalled = 0.0  # [s]
+        self._forget_wheels()
+
+    def _forget_wheels(self) -> None:
+        self._wheels = Wheel(), Wheel()
+        self._moved = 0.0  # [s]
+
+    def watch(
+        self,
+        climber: Climber,
+        before: Motion,
+        after: Motion,
+        time: float,
+        torques: Torques,
+        disturbance: Wrench,
+        reference: Fastest,
+        allowed: Fastest,
+        waits: bool,
+    ) -> tuple[Mode, str] | None:
+        """What is wrong `time` [s] later, after mean `torques`; None if all is well.
+
+        `reference` is followed, no faster than `allowed`; it `waits` where torque is missing.
+        """
+        self._add_to_wheels(climber, before, after, time, torques)
+        too_fast = self._watch_rates(after, allowed)
+        return (
+            self._watch_wheels(climber, torques, SUSPECTED if too_fast else 1.0)
+            or too_fast
+            or self._watch_limit(climber, after, time, torques, reference, waits)
+            or self._watch_disturbance(climber, disturbance)
+        )
+
+    def _watch_rates(self, motion: Motion, allowed: Fastest) -> tuple[Mode, str] | None:
+        options = self.options
+        fastest = allowed.speed + options.speed_margin
+        fastest_turn = allowed.yaw_rate + options.yaw_rate_margin
+        is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
+        is_turning = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_turn
+        self._too_fast = self._too_fast + 1 if is_fast or is_turning else 0
+        if self._too_fast < IN_A_ROW:
+            return None
+        if is_fast:
+            return Mode.TOO_FAST, f"{motion.speed:.2f} m/s, at most {fastest:.2f} are asked for"
+        return Mode.TOO_FAST, (
+            f"{motion.yaw_rate:.2f} rad/s, at most {fastest_turn:.2f} are asked for"
+        )
+
+    def _watch_limit(
+        self,
+        climber: Climber,
+        motion: Motion,
+        time: float,
+        torques: Torques,
+        reference: Fastest,
+        waits: bool,
+    ) -> tuple[Mode, str] | None:
+        largest = max(abs(torques.right), abs(torques.left))
+        share = largest / climber.max_wheel_torque
+        if reference.speed > MOVES:
+            stands = abs(motion.speed) < STANDS * reference.speed
+        else:  # it turns in place, or rests
+            stands = abs(motion.yaw_rate) < STANDS * reference.yaw_rate
+        is_stalled = (stands and share >= STRONG) or (waits and share >= AT_LIMIT)
+        self._stalled = self._stalled + time if is_stalled else 0.0
+        if not 0 < self.options.stall_time < self._stalled:
+            return None
+        return Mode.STALLED, f"{largest:.2f} N m for {self._stalled:.2f} s"
+
+    def _watch_disturbance(self, climber: Climber, disturbance: Wrench) -> tuple[Mode, str] | None:
+        adhesion = climber.suction_pressure * climber.suction_area
+        most = self.options.max_disturbance * (adhesion + climber.mass * 9.81)
+        moment = most * climber.half_track
+        if most == 0 or (abs(disturbance.drive) <= most and abs(disturbance.turn) <= moment):
+            return None
+        return Mode.DISTURBED, (
+            f"{disturbance.drive:.0f} N, {disturbance.turn:.0f} N m; "
+            f"explained are {most:.0f} N, {moment:.0f} N m"
+        )
+
+    def _add_to_wheels(
+        self, climber: Climber, before: Motion, after: Motion, time: float, torques: Torques
+    ) -> None:
+        """See `Wheel`; (11) and (15) tell the force that acted on each."""
+        response_time = self.options.response_time
+        if response_time == 0 or min(abs(before.speed), abs(after.speed)) < MOVES:
+            self._forget_wheels()
+            return
+        self._moved += time
+        mass, inertia, friction, weight = climber.inertial
+        drive = mass * (after.speed - before.speed) / time + weight * after.sine
+        drive += math.copysign(friction, after.speed)
+        turn = inertia * (after.yaw_rate - before.yaw_rate) / time / climber.half_track
+        share = 1 - math.exp(-time / response_time)
+        found = (drive + turn) / 2, (drive - turn) / 2
+        for wheel, torque, force in zip(self._wheels, torques, found, strict=True):
+            wheel.add(torque / climber.wheel_radius, force, share)
+
+    def _watch_wheels(
+        self, climber: Climber, torques: Torques, proof: float
+    ) -> tuple[Mode, str] | None:
+        if not 0 < self.options.response_time < self._moved:
+            return None
+        right, left = self._wheels
+        largest = climber.max_wheel_torque / climber.wheel_radius
+        if not right.answers(left, largest, proof):
+            return Mode.DEAD_WHEEL, f"the right one, at {torques.right:.2f} N m"
+        if not left.answers(right, largest, proof):
+            return Mode.DEAD_WHEEL, f"the left one, at {torques.left:.2f} N m"
+        return None
+
+    # Faults, and the way back
+
+    def fault(self, stamp: int) -> None:
+        """Count a fault at `stamp` [ns]."""
+        self.faults.append(stamp)
+        while self.faults and stamp - self.faults[0] > self.options.memory * SECOND:
+            self.faults.popleft()
+
+    @property
+    def has_given_up(self) -> bool:
+        """Whether there were so many faults that somebody has to look after the climber."""
+        return len(self.faults) >= self.options.attempts

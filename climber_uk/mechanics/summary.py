@@ -1,0 +1,126 @@
+"""What a trajectory asks of a climber, in numbers: how long, how fast, how tight."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.shapes import Shape
+from climber_uk.mechanics.trajectory import Trajectory
+
+SAMPLES = 4001  # in time
+LONG = 500.0  # [m] of a path that a climber hardly has
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Extremes of a trajectory; `str` of it is one line for a log."""
+
+    length: float  # [m] of the path, once along it
+    duration: float  # [s]; infinite if it goes on without end
+    fastest_speed: float  # [m/s]
+    fastest_yaw_rate: float  # [rad/s]
+    smallest_radius: float  # [m]; infinite if all is straight
+    tightest_place: tuple[float, float]  # [m] x and y where it is
+    fastest_wheel_speed: float | None  # [m/s] of a wheel's rim; None if the track is not known
+    closed: bool
+    remarks: tuple[str, ...] = ()  # what looks like a mistake, each worth a warning
+
+    def __str__(self) -> str:
+        """Return one line."""
+        said = f"{self.length:.4g} m, {'closed' if self.closed else 'open'}, "
+        said += "without end" if math.isinf(self.duration) else f"{self.duration:.4g} s"
+        said += f", at most {self.fastest_speed:.3g} m/s and {self.fastest_yaw_rate:.3g} rad/s"
+        if self.fastest_wheel_speed is not None:
+            said += f", wheels at most {self.fastest_wheel_speed:.3g} m/s"
+        if math.isinf(self.smallest_radius):
+            return f"{said}, straight"
+        x, y = self.tightest_place
+        return f"{said}, smallest radius {self.smallest_radius:.3g} m at ({x:.3g}, {y:.3g}) m"
+
+
+def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
+    """Extremes of any trajectory; with `half_track` [m] those of its wheels as well."""
+
+    def curvature(s: Array) -> Array:
+        _, p_1, p_2, _ = path.derivatives(s)
+        return np.abs(_cross(p_1, p_2)) / _size(p_1) ** 3
+
+    def speed(time: Array) -> Array:
+        return np.abs(trajectory.at(time).speed)
+
+    def yaw_rate(time: Array) -> Array:
+        return np.abs(trajectory.at(time).yaw_rate)
+
+    def wheel_speed(time: Array) -> Array:
+        reference = trajectory.at(time)
+        return np.abs(reference.speed) + (half_track or 0.0) * np.abs(reference.yaw_rate)
+
+    path, times = trajectory.course, _times(trajectory)
+    length = _length(path)
+    tightest, bend = _highest(curvature, path.stations)
+    x, y = path.derivatives(np.array(tightest))[0] + trajectory.origin
+    return Summary(
+        length=length,
+        duration=trajectory.duration,
+        fastest_speed=_highest(speed, times)[1],
+        fastest_yaw_rate=_highest(yaw_rate, times)[1],
+        smallest_radius=1 / bend if bend * length > 1e-9 else math.inf,
+        tightest_place=(float(x), float(y)),
+        fastest_wheel_speed=None if half_track is None else _highest(wheel_speed, times)[1],
+        closed=path.closed,
+        remarks=_remarks(trajectory, length),
+    )
+
+
+def _remarks(trajectory: Trajectory, length: float) -> tuple[str, ...]:
+    remarks = []
+    if length > LONG:
+        remarks.append(f"the path is {length:.4g} m long: are its sizes in mm rather than in m?")
+    laps = getattr(trajectory.law, "laps", 1)
+    if laps > 1 and not trajectory.course.closed:
+        remarks.append(f"laps={laps} has no effect: the path is open")
+    return tuple(remarks)
+
+
+def _times(trajectory: Trajectory) -> Array:
+    """Times [s] until all repeats itself, evenly spaced in time and in the path's parameter."""
+    path, law = trajectory.course, trajectory.law
+    times = np.linspace(0.0, law.horizon(path), 4 * SAMPLES)
+    progress = np.maximum.accumulate(law.progress(times, path)[0])
+    stations = path.stations
+    if path.closed:
+        stations = np.concatenate([stations, stations + path.length])
+    even = np.interp(stations[stations < progress[-1]], progress, times)
+    return np.union1d(times, even)
+
+
+def _length(path: Shape) -> float:
+    """Length [m] by Simpson's rule between stations."""
+    s = path.stations
+    middle, step = (s[:-1] + s[1:]) / 2, np.diff(s)
+    ends, halfway = (_size(path.derivatives(at)[1]) for at in (s, middle))
+    return float(((ends[:-1] + 4 * halfway + ends[1:]) * step).sum() / 6)
+
+
+def _highest(f: Callable[[Array], Array], x: Array) -> tuple[float, float]:
+    """Place and value of the maximum of `f`, whose peaks are wider than the steps of `x`.
+
+    Of maxima that are equal but for rounding the first.
+    """
+    for _ in range(4):
+        values = f(x)
+        best = int(np.argmax(values >= values.max() * (1 - 1e-9)))
+        place, value = float(x[best]), float(values[best])
+        x = np.linspace(x[max(best - 1, 0)], x[min(best + 1, len(x) - 1)], 101)
+    return place, value
+
+
+def _size(vectors: Array) -> Array:
+    return np.hypot(vectors[..., 0], vectors[..., 1])
+
+
+def _cross(u: Array, v: Array) -> Array:
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]

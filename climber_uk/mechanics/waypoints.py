@@ -1,0 +1,168 @@
+"""A path through waypoints: the polyline of a file with its corners rounded, slow in its bends."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.elementary import Derivatives, compose
+from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.mechanics.rounding import Rounded, rounded
+from climber_uk.mechanics.slowing import Limits, Slowed, slowed
+from climber_uk.mechanics.waypoint_file import read_waypoints
+
+STATIONS = 2001
+
+
+@dataclass(frozen=True)
+class Waypoints:
+    """Straight from each point of a text file to the next, corners rounded within `tolerance`.
+
+    The path parameter s is the distance [m] on straights. In bends it is stretched, so that at
+    the law's rate the limits of yaw rate and acceleration hold. Where the points turn back, the
+    climber stops and goes back in the other gear. The path is closed if its last point is
+    nearer than a sixth of the tolerance to its first. Raises `ValueError` naming the file.
+    """
+
+    file: str = parameter("", "", "text file with x and y of a point a line, in m", is_path=True)
+    tolerance: float = parameter(
+        0.02, "m", "how far the path may be from the lines between the points", above=0
+    )
+    max_yaw_rate: float = parameter(1.0, "rad/s", "yaw rate in bends, which are slow", above=0)
+    max_acceleration: float = parameter(0.5, "m/s²", "acceleration in and before bends", above=0)
+    reversal_angle: float = parameter(
+        0.35,
+        "rad",
+        "a corner that turns back, within this angle of the way it came, is driven in reverse",
+        at_least=0.01,
+        at_most=1.0,
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        _ = self._rounded  # a bad file is found now, not when the climber starts
+
+    @cached_property
+    def _rounded(self) -> Rounded:
+        points = read_waypoints(self.file)
+        try:
+            return rounded(points, self.tolerance, self.reversal_angle)
+        except ValueError as error:
+            raise ValueError(f"file={self.file!r}: {error}") from None
+
+    @cached_property
+    def _by_rate(self) -> dict[float, "SlowedPath"]:
+        return {}
+
+    def at_rate(self, rate: float) -> "SlowedPath":
+        """See `Shape`."""
+        if rate not in self._by_rate:
+            limits = Limits(rate, self.max_yaw_rate, self.max_acceleration)
+            path = self._rounded
+            try:
+                pace = slowed(path.curve, path.length, path.closed, self.tolerance, limits)
+            except ValueError as error:
+                raise ValueError(f"waypoints.file={self.file!r}: {error}") from None
+            self._by_rate[rate] = SlowedPath(path, pace)
+        return self._by_rate[rate]
+
+    # Without a rate there is no need to be slow:
+
+    @property
+    def closed(self) -> bool:
+        """See `Shape`."""
+        return self._rounded.closed
+
+    @property
+    def length(self) -> float:
+        """See `Shape`."""
+        return self.at_rate(0.0).length
+
+    @property
+    def reversals(self) -> Array:
+        """See `Shape`."""
+        return self.at_rate(0.0).reversals
+
+    @property
+    def stations(self) -> Array:
+        """See `Shape`."""
+        return self.at_rate(0.0).stations
+
+    def gear(self, s: Array) -> Any:
+        """See `Shape`."""
+        return self.at_rate(0.0).gear(s)
+
+    def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
+        """See `Shape`."""
+        return self.at_rate(0.0).derivatives(s)
+
+
+@dataclass(frozen=True)
+class SlowedPath:
+    """A rounded polyline, its parameter stretched in bends."""
+
+    path: Rounded
+    slowed: Slowed
+
+    @property
+    def closed(self) -> bool:
+        """See `Shape`."""
+        return self.path.closed
+
+    @property
+    def length(self) -> float:
+        """See `Shape`."""
+        return self.slowed.length
+
+    @cached_property
+    def _start(self) -> float:
+        """Parameter of `slowed` where this one is 0."""
+        return float(self.slowed.parameter(self.path.start))
+
+    def at_rate(self, _: float) -> "SlowedPath":
+        """See `Shape`."""
+        return self
+
+    @cached_property
+    def reversals(self) -> Array:
+        """See `Shape`."""
+        return self._from_start(self.slowed.parameter(self.path.reversals))
+
+    def _from_start(self, parameter: Array) -> Array:
+        s = parameter - self._start
+        return np.sort(np.where(s < -1e-9 * self.length, s + self.length, np.maximum(s, 0.0)))
+
+    @cached_property
+    def stations(self) -> Array:
+        """See `Shape`: denser where it is fastest, turns fastest, or is tightest."""
+        cells = self.slowed.cells
+        middle = (cells[:-1] + cells[1:]) / 2
+        p_1, p_2 = self.path.curve(middle, 1), self.path.curve(middle, 2)
+        speed, rho = np.hypot(*p_1.T), self.slowed.slowness(middle)
+        bend = np.abs(p_1[:, 0] * p_2[:, 1] - p_1[:, 1] * p_2[:, 0]) / speed**2
+        most = [np.argsort(what)[-STATIONS:] for what in (speed / rho, bend / rho, bend / speed)]
+        s = self._from_start(self.slowed.parameter(middle[np.unique(np.concatenate(most))]))
+        return np.union1d(s, np.linspace(0.0, self.length, STATIONS))
+
+    def gear(self, s: Array) -> Any:
+        """See `Shape`."""
+        if not len(self.path.reversals):
+            return 1.0
+        places = self._progress(s)[0], np.array(self.path.start)
+        now, first = (np.searchsorted(self.path.reversals, at, "right") for at in places)
+        return 1.0 - 2.0 * ((now - first) % 2)
+
+    def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
+        """See `Shape`."""
+        place, *rates = self._progress(s)
+        path = tuple(self.path.curve(place, order) for order in range(4))
+        by_s_1, by_s_2, by_s_3 = (np.asarray(rate)[..., None] for rate in rates)
+        return compose(path, (by_s_1, by_s_2, by_s_3))  # type: ignore[arg-type]
+
+    def _progress(self, s: Array) -> Derivatives:
+        """Place on the rounded polyline, with its derivatives by s."""
+        s = s + self._start
+        s = np.mod(s, self.length) if self.closed else np.clip(s, 0.0, self.length)
+        return self.slowed.progress(s)

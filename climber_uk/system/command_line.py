@@ -1,0 +1,58 @@
+"""What all command lines share: `--help`, `--version`, errors of one line, output into a pipe."""
+
+import argparse
+import io
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+PACKAGE = "climber_uk"
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser with `--version`; what is wrong with the arguments is said in one line, status 2."""
+
+    def __init__(self, name: str, description: str | None, epilog: str | None = None) -> None:
+        super().__init__(name, description=description, epilog=epilog)
+        self.add_argument(
+            "--version",
+            action=_Version,
+            nargs=0,
+            default=argparse.SUPPRESS,  # it is no option of what runs
+            help="print the version and exit",
+        )
+
+    def arguments(self, given: Sequence[str] | None = None) -> argparse.Namespace:
+        """Parse; from now on a reader of the output, as `head`, may end before this program."""
+        out = sys.stdout
+        if out is sys.__stdout__ and out is not None:
+            binary = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
+            sys.stdout = io.TextIOWrapper(
+                binary, out.encoding, out.errors, line_buffering=out.line_buffering
+            )
+        return self.parse_args(given)
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with one line."""
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version  # slow to import
+
+        print(parser.prog, version(PACKAGE))
+        parser.exit()
+
+
+class _Output(io.FileIO):
+    """Drops what is written after its reader has gone: files and exit status stay the same."""
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data) or 0
+        except BrokenPipeError:
+            with open(os.devnull, "wb") as nowhere:
+                os.dup2(nowhere.fileno(), self.fileno())
+            return memoryview(data).nbytes

@@ -1,0 +1,59 @@
+"""Processes that are started by this one, and do not outlive it."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from climber_uk.system.signals import END, on_end
+
+LIBC = ctypes.CDLL(None)
+PR_SET_PDEATHSIG = 1
+
+
+def dies_with_me() -> Callable[[], None]:
+    """For `Popen`'s `preexec_fn`: a child that gets SIGTERM when this process has ended."""
+    return partial(_begin_child, os.getpid())
+
+
+def _begin_child(parent: int) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # what comes before `exec` would be lost else
+    die_with(parent)
+
+
+def die_with(parent: int) -> None:
+    """Have this process get SIGTERM when its parent, of that id, ends, be it by SIGKILL."""
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:  # it ended before
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def call(command: Sequence[str | Path]) -> int:
+    """Run a command to its end and return its status; signals to end are passed on to it."""
+    process = subprocess.Popen(command, preexec_fn=dies_with_me())
+    before = {number: signal.getsignal(number) for number in END}
+    on_end(lambda number, _: process.send_signal(number))
+    try:
+        return process.wait()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def end(processes: Sequence["subprocess.Popen[bytes]"], patience: Callable[[], float]) -> None:
+    """Have processes end by SIGTERM; by SIGKILL those that do not within `patience()` [s].
+
+    It is asked again and again: it may shrink meanwhile.
+    """
+    for process in processes:
+        process.send_signal(signal.SIGTERM)
+    begin = time.monotonic()
+    while alive := [process for process in processes if process.poll() is None]:
+        if time.monotonic() > begin + patience():
+            for process in alive:
+                process.kill()
+        time.sleep(0.02)

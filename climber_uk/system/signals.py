@@ -1,0 +1,20 @@
+"""Signals that ask a process to end: taken alike, and ignored once it does."""
+
+import signal
+from collections.abc import Callable
+from typing import Any
+
+END = signal.SIGINT, signal.SIGTERM, signal.SIGHUP  # Ctrl-C, kill, and a terminal that is closed
+
+
+def on_end(handler: Callable[..., Any]) -> None:
+    """Call `handler` for every signal that asks this process to end, but for one nohup ignores."""
+    for number in END:
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def ignore_end() -> None:
+    """Ignore these signals: the process is ending, and they come more than once."""
+    for number in END:
+        signal.signal(number, signal.SIG_IGN)

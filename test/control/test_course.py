@@ -1,0 +1,202 @@
+import numpy as np
+import pytest
+from climbs import Climb
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from climber_uk.control.approach import Approach
+from climber_uk.control.safety import Mode
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.motion import Motion, Target
+
+slow = pytest.mark.slow
+
+
+def is_at_rest(climb):
+    return abs(climb.state.forward_speed) < 1e-3
+
+
+@slow
+@pytest.mark.parametrize("late", [5.0, 30.0, 600.0])
+def test_a_reference_waits_at_its_begin_for_a_controller_that_is_enabled_late(late):
+    climb = Climb()
+    climb.follower.enable(False)
+    climb.run(1.0)
+    climb.time += late  # of which nothing is heard
+    climb.run(0.5)
+    assert climb.follower.mode is Mode.DISABLED
+    climb.follower.enable(True)
+    begin = climb.time
+    climb.run(20.0)
+    assert climb.follows()
+    assert climb.fastest() <= 1.3 * climb.reference_speed
+    assert climb.off_the_path() < 0.02
+    assert climb.position == pytest.approx(climb.time - begin, abs=0.02)
+
+
+@slow
+@pytest.mark.parametrize("gap", [0.4, 1.5, 20.0], ids=["blink", "stopped", "gone"])
+def test_a_reference_waits_while_odometry_is_gone_and_goes_on_where_it_was(gap):
+    climb = Climb().run(12.0)
+    position = climb.position
+    climb.run(gap, odometry=lambda *_: None, motors=lambda _, torques: 0 * torques)
+    assert climb.follower.mode is Mode.NO_ODOMETRY
+    begin = climb.time
+    climb.run(15.0)
+    assert climb.follows()
+    assert climb.fastest(begin) <= 1.3 * climb.reference_speed
+    assert climb.off_the_path() < 0.02
+    assert position < climb.position < position + 15.2
+
+
+@slow
+def test_enabled_again_in_mid_course_it_goes_on_where_it_is():
+    climb = Climb().run(12.0)
+    climb.follower.enable(False)
+    climb.run(3.0)
+    assert is_at_rest(climb)
+    stopped = climb.position
+    assert stopped == pytest.approx(12.0, abs=0.1)
+    climb.follower.enable(True)
+    climb.run(10.0)
+    assert climb.position == pytest.approx(stopped + 10.0, abs=0.5)
+    assert climb.fastest() <= 1.3 * climb.reference_speed
+    assert climb.off_the_path() < 0.005
+
+
+@slow
+def test_a_start_3_m_off_is_refused_with_the_distance():
+    climb = Climb(offset=(3.0, 0.0, 0.0)).run(1.0)
+    assert climb.follower.mode is Mode.TOO_FAR
+    assert climb.follower.detail.startswith("3.00 m, from (3.00, 3.00) to (0.00, 3.00)")
+    assert climb.fastest() < 1e-3
+
+
+@slow
+@pytest.mark.parametrize("turned", [0.0, 2.0, -3.0])
+def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned):
+    climb = Climb(offset=(2.4, -1.8, turned), max_start_distance=5.0, approach_speed=0.2)
+    climb.run(5.0)
+    assert climb.follower.mode is Mode.APPROACHING
+    climb.run(40.0)
+    approaching = [mode is Mode.APPROACHING for mode in climb.modes]
+    speeds = [
+        abs(state.forward_speed)
+        for state, approaches in zip(climb.states, approaching, strict=True)
+        if approaches
+    ]
+    assert max(speeds) < 0.21
+    assert climb.follows()
+    assert not any(mode.is_fault for mode in climb.modes)
+    assert climb.off_the_path(since=climb.time - 5.0) < 0.005
+
+
+@slow
+@pytest.mark.parametrize("offset", [0.0, 0.01, 0.02, 0.03, 0.05, 0.09, -0.04, -0.09])
+@pytest.mark.parametrize("since", [0.0, 6.0])
+def test_an_offset_of_the_clocks_is_no_latency(offset, since):
+    climb = Climb().run(since).run(4.0, clock=offset)
+    assert climb.follows()
+    assert not any(mode.is_fault for mode in climb.modes)
+    distance = [
+        np.hypot(*(state.pose - climb.trajectory.at(time).pose)[:2])
+        for time, state in zip(climb.times, climb.states, strict=True)
+    ]
+    assert max(distance) < 0.05
+    assert max(np.abs(sent).max() for sent in climb.sent) < 3.9
+    told = climb.follower.ages.offset(0.02)
+    assert told == pytest.approx(offset if abs(offset) > 0.02 else 0.0, abs=0.006)
+
+
+@slow
+@pytest.mark.parametrize(
+    ("lie", "mode"),
+    [
+        (lambda _, s: State.rolling(s.pose, -s.forward_speed, s.yaw_rate), Mode.SIGN_WRONG),
+        (lambda _, s: State.rolling(s.pose, s.forward_speed, -s.yaw_rate), Mode.SIGN_WRONG),
+        (lambda _, s: State(s.pose, 0 * s.velocity), Mode.NO_TWIST),
+    ],
+    ids=["twist of another sign", "yaw rate of another sign", "no twist"],
+)
+def test_odometry_that_lies_is_found_out_before_it_does_harm(lie, mode):
+    climb = Climb().run(8.0, odometry=lie)
+    first = next(mode for mode in climb.modes if mode.is_fault)
+    assert first is mode
+    assert climb.off_the_path() < 0.05
+    saturated = np.array([np.abs(sent).max() > 3.99 for sent in climb.sent])
+    assert saturated.sum() * 0.005 < 0.5
+    assert climb.fastest(7.0) < 0.1
+
+
+@slow
+@pytest.mark.parametrize("scale", [0.3, 2.5, 100.0])
+def test_a_twist_in_another_unit_does_not_end_in_a_runaway(scale):
+    def scaled(_, state):
+        return State.rolling(state.pose, scale * state.forward_speed, scale * state.yaw_rate)
+
+    climb = Climb().run(10.0, odometry=scaled)
+    assert any(mode.is_fault for mode in climb.modes) or climb.off_the_path() < 0.05
+    assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
+
+
+@slow
+def test_odometry_that_is_slower_than_its_timeout_allows_is_refused_in_words():
+    def seldom(time, state):
+        return state if round(time / 0.005) % 20 == 0 else None
+
+    climb = Climb().run(1.0, odometry=seldom)
+    assert climb.follower.mode is Mode.SELDOM
+    assert climb.follower.detail == "every 0.10 s for a timeout of 0.1 s"
+    slower = Climb(odometry_timeout=0.3).run(4.0, odometry=seldom)
+    assert slower.off_the_path() < 0.05
+
+
+angle = st.floats(-10.0, 10.0)
+place = st.floats(-3.0, 3.0)
+
+
+@settings(deadline=None)
+@given(place, place, angle, place, place, angle)
+def test_an_approach_goes_from_rest_to_rest_no_faster_than_it_should(x, y, heading, x_d, y_d, end):
+    options = Approach(approach_speed=0.1, approach_yaw_rate=0.5)
+    motion = Motion(x, y, heading, np.cos(heading), np.sin(heading), 0.0, 0.0)
+    target = Target(x_d, y_d, end, *[0.3] * 8)
+    way = options.way(motion, target, SECOND)
+    first, last = way.at(int(way.times[0])), way.at(int(way.times[-1]))
+    assert way.times[0] == SECOND
+    np.testing.assert_allclose(first.pose, (x, y, heading), atol=1e-9)
+    assert np.hypot(*(last.pose[:2] - (x_d, y_d))) < 1.1e-3
+    assert abs(wrapped(float(last.pose[2]) - end)) < 1e-9
+    for reference in (first, last):
+        np.testing.assert_allclose(reference.velocity, 0, atol=1e-9)
+        np.testing.assert_allclose(reference.acceleration, 0, atol=1e-9)
+    times = np.linspace(way.times[0], way.times[-1], 200).astype(np.int64)
+    for time in times:
+        reference = way.at(int(time))
+        assert np.hypot(*reference.velocity[:2]) < 0.1 + 1e-9
+        assert abs(reference.velocity[2]) < 0.5 + 1e-9
+        across = reference.velocity[1] * np.cos(reference.heading)
+        assert across == pytest.approx(
+            reference.velocity[0] * np.sin(reference.heading), abs=1e-6
+        )  # no side slip
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.integers(1, 200), min_size=1, max_size=60), st.booleans())
+def test_a_reference_that_nobody_follows_is_kept_in_part_only(steps, with_odometry):
+    climb = Climb()
+    climb.follower.enable(False)
+    course, whole = climb.follower.course, climb.follower.course.preview
+    shift = 0
+    for step in steps:
+        shift += step * SECOND // 20
+        newer = type(whole)(
+            whole.times[:40] + shift, whole.pose[:40], whole.velocity[:40], whole.acceleration[:40]
+        )
+        course.take(newer)
+        if with_odometry:
+            now = SECOND + shift
+            climb.follower.on_odometry(now, now, climb.state)
+    assert len(course.preview.times) <= 5000

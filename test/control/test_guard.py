@@ -1,0 +1,122 @@
+from copy import deepcopy
+from functools import cache
+
+import numpy as np
+import pytest
+from climbs import LIMIT, Climb
+
+from climber_uk.control.guard import Guard, GuardOptions
+from climber_uk.control.safety import Mode
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import State
+
+pytestmark = pytest.mark.slow
+
+
+@cache
+def healthy(scrubs, until):
+    """Climb that goes well until some time [s]; without motion of its wheels, with what resists."""
+    climb = deepcopy(healthy(scrubs, until - 6.0)) if until > 6.0 else Climb(scrubs=scrubs)
+    climb.run(until - climb.time)
+    assert not any(mode.is_fault for mode in climb.modes)
+    return climb
+
+
+def dead(side, since):
+    """Motors of which one has no torque any more."""
+
+    def motors(time, torques):
+        alive = np.ones(2)
+        alive[side] = time < since
+        return torques * alive
+
+    return motors
+
+
+@pytest.mark.parametrize("side", [0, 1], ids=["right", "left"])
+@pytest.mark.parametrize("scrubs", [False, True], ids=["two wheels", "scrubbing tracks"])
+@pytest.mark.parametrize("since", [1.0, 7.0, 13.0, 19.0])
+def test_a_dead_motor_is_noticed_and_the_climber_comes_to_rest(side, scrubs, since):
+    climb = deepcopy(healthy(scrubs, since))
+    climb.run(3.0, motors=dead(side, since))
+    assert climb.fastest(since) < 1.5 * climb.reference_speed + 0.1
+    # on tracks that hold its heading, one motor can do for a while what two should
+    assert climb.faulty_after(since) < 0.3 + climb.harmless(since)
+    assert climb.fastest(climb.time - 0.5) < 0.01
+    if scrubs:  # nothing but the motor that died resists the turn of the other one
+        assert climb.fastest_turn(climb.time - 0.5) < 0.01
+
+
+def test_a_dead_wheel_is_named_and_waits_for_somebody():
+    climb = deepcopy(healthy(False, 13.0))
+    climb.run(12.0, motors=dead(0, 13.0))
+    assert climb.follower.mode is Mode.DEAD_WHEEL
+    assert climb.follower.detail.startswith("the right one, at ")
+    assert climb.follower.detail.endswith("~/enable to go on")
+    climb.follower.enable(True)
+    climb.run(10.0)
+    assert climb.follows()
+    assert climb.off_the_path(since=climb.time - 1.0) < 0.02
+
+
+def test_motors_that_are_too_weak_stall_safely_and_give_up_after_some_attempts():
+    climb = deepcopy(healthy(False, 7.0))
+    climb.run(20.0, motors=lambda _, torques: 0.1 * torques)
+    assert climb.follower.mode in (Mode.STALLED, Mode.DISTURBED)
+    assert climb.follower.detail.endswith("~/enable to go on")
+    assert climb.fastest(7.0) < climb.reference_speed
+
+
+@pytest.mark.parametrize("turned", [0.0, 3.1, 1.6], ids=["ahead", "back", "around"])
+def test_a_push_is_ridden_out_and_the_path_goes_on_where_it_was_left(turned):
+    climb = deepcopy(healthy(False, 7.0))
+    course = climb.state.heading + turned
+    climb.run(0.3, push=150.0 * np.array([np.cos(course), np.sin(course), 0.02]))
+    climb.run(40.0)
+    assert climb.follows()
+    assert climb.off_the_path(since=climb.time - 5.0) < 0.02
+    assert 7.0 < climb.position < climb.time
+
+
+def test_a_speed_is_a_fault_only_where_two_odometries_in_a_row_tell_it():
+    climb = deepcopy(healthy(False, 7.0))
+    begin = climb.time
+
+    def glitch(at, seconds):
+        def odometry(time, state):
+            if not 0 <= time - at < seconds - 1e-9:
+                return state
+            return State.rolling(state.pose, 0.8, state.yaw_rate)
+
+        return odometry
+
+    climb.run(0.5, odometry=glitch(begin + 0.1, 0.005))
+    assert climb.follows()
+    climb.run(0.5, odometry=glitch(climb.time + 0.1, 0.015))
+    assert Mode.TOO_FAST in climb.since(begin, climb.modes)
+
+
+@pytest.mark.parametrize(
+    ("option", "switched_off"),
+    [("speed_margin", True), ("max_disturbance", False), ("response_time", False)],
+)
+def test_each_check_can_be_switched_off(option, switched_off):
+    climb = Climb(**{f"guard.{option}": 0.0}).run(2.0)
+    climb.run(0.02, odometry=lambda _, state: State.rolling(state.pose, 0.8, state.yaw_rate))
+    assert (climb.follower.mode is not Mode.TOO_FAST) == switched_off
+
+
+def test_faults_count_for_a_while_only():
+    guard = Guard(GuardOptions(attempts=2, memory=10.0))
+    guard.fault(SECOND)
+    assert not guard.has_given_up
+    guard.fault(20 * SECOND)
+    assert not guard.has_given_up
+    guard.fault(29 * SECOND)
+    assert guard.has_given_up
+
+
+def test_torques_stay_within_the_limit_whatever_is_wrong():
+    climb = deepcopy(healthy(False, 7.0))
+    climb.run(3.0, motors=dead(1, 7.0))
+    assert max(np.abs(torques).max() for torques in climb.sent) <= LIMIT

@@ -1,0 +1,132 @@
+"""What the loop bears that nobody told it, and what it learns of that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from climber_uk.analysis.closed_loop import Link, simulate
+from climber_uk.analysis.identification_experiments import SCENARIOS
+from climber_uk.control.approach import ANYWHERE
+from climber_uk.control.constraints import Guidance
+from climber_uk.control.controller import Controller, Law
+from climber_uk.control.follower import Follower
+from climber_uk.control.guard import UNGUARDED
+from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.safety import Mode, Safety
+from climber_uk.control.tracker import Timing, Tracker
+
+BUILT = SCENARIOS["climber.yaml"]
+ENCODERS = Link(encoder_counts=4096, delay=0.005, torque_lag=0.005)
+
+
+def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, **timing):
+    """Run of climber.yaml's climber, and the controller after it."""
+    controller = Controller(BUILT.believed, guidance, Law())
+    tracker = Tracker(controller, Observer(), Timing(**timing), Pacing())
+    follower = Follower(tracker, Safety(), ANYWHERE, UNGUARDED)
+    run = simulate(BUILT.trajectory, BUILT.start, duration, follower, climber, link)
+    assert follower.mode is Mode.FOLLOWING
+    return run, follower.tracker
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("guidance", [BUILT.guidance, Guidance()], ids=["climber.yaml", "defaults"])
+@pytest.mark.parametrize(
+    "link",
+    [
+        Link(delay=0.02),
+        Link(torque_lag=0.035),
+        *(replace(ENCODERS, period=period) for period in (0.005, 0.01, 0.02, 0.05)),
+        replace(ENCODERS, period=0.05, delay=0.0, torque_lag=0.0),
+    ],
+    ids=[
+        "20 ms of delay",
+        "35 ms of lag",
+        *(f"{hz} Hz" for hz in (200, 100, 50, 20)),
+        "late twist",
+    ],
+)
+def test_what_nobody_told_ends_in_no_limit_cycle(link, guidance):
+    run, _ = drive(link, guidance)
+    assert run.rms() < 2e-3
+    assert run.chatter() < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_model_that_is_wrong_as_well_ends_in_no_limit_cycle(seed):
+    random = np.random.default_rng(seed)
+    off = {name: random.uniform(0.8, 1.2) for name in ("mass", "yaw_inertia")}
+    off["seal_friction_coefficient"] = random.uniform(0.5, 1.5)
+    true = replace(
+        BUILT.believed,
+        **{name: share * getattr(BUILT.believed, name) for name, share in off.items()},
+    )
+    run, _ = drive(replace(ENCODERS, period=0.02, delay=0.0075, torque_lag=0.02), climber=true)
+    assert run.rms(4.0) < 2e-3
+    assert run.chatter(4.0) < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [0.03, 0.04])
+def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
+    run, tracker = drive(Link(delay=delay), duration=15.0)
+    assert run.rms() < 5e-3
+    assert run.chatter(10.0) < 0.05
+    assert (
+        delay - 0.021 < tracker.latency.delay < 1.3 * delay
+    )  # what is beyond the margin, at least
+    lost, _ = drive(Link(delay=delay), learn_delay=False)
+    assert lost.chatter(4.0) > 0.5
+
+
+@pytest.mark.slow
+def test_a_delay_that_is_told_but_not_there_is_unlearnt():
+    """Of encoders with a slow period, where it would not be borne."""
+    run, tracker = drive(replace(ENCODERS, period=0.02), transport_delay=0.05, duration=15.0)
+    assert run.chatter(10.0) < 0.05
+    assert tracker.latency.delay <= 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.5, 1.5])
+def test_friction_that_is_wrong_is_taken_for_no_delay(share):
+    coefficient = share * BUILT.believed.seal_friction_coefficient
+    true = replace(BUILT.believed, seal_friction_coefficient=coefficient)
+    _, tracker = drive(Link(), climber=true)
+    assert tracker.latency.delay < 2e-3
+
+
+def test_an_acceleration_oscillates_once_it_has_gone_to_and_fro_often():
+    oscillation = Oscillation()
+    steady = [oscillation.add(0.01 * step, 0.995) for step in range(400)]
+    noisy = [oscillation.add(4.0 + 0.1 * (-1) ** step, 0.995) for step in range(400)]
+    assert not any(steady + noisy)
+    swinging = [oscillation.add(4.0 + np.sin(0.15 * step), 0.995) for step in range(400)]
+    assert swinging[-1]
+    assert not any(swinging[:60])  # the first two seconds of its periods
+
+
+def test_a_delay_is_found_from_a_swing_and_changes_no_faster_than_it_may():
+    latency, time, delay, delays = Latency(), 0.005, 0.012, []
+    for step in range(2000):
+        now, before = (np.sin(20 * (step - late) * time) for late in (0, 1))
+        error = -(delay - latency.delay) * (now - before)
+        latency.learn(Sample((float(now), 0.0), (float(error), 0.0), time), (0.0, 0.0))
+        delays.append(latency.delay)
+    assert delays[-1] == pytest.approx(delay, rel=0.01)
+    assert np.abs(np.diff(delays)).max() <= FASTEST * time * (1 + 1e-9)
+
+
+def test_a_delay_stays_within_its_bounds():
+    for sign in (1.0, -1.0):
+        latency = Latency()
+        for step in range(2000):
+            swing = (-1.0) ** step
+            sample = Sample((swing, swing), (-sign * swing, -sign * swing), 0.005)
+            latency.learn(sample, (0.0, 0.0), told=0.01)
+        assert latency.delay == (LONGEST if sign > 0 else -0.01)
+        assert latency.is_far_off is (sign > 0)

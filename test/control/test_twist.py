@@ -1,0 +1,60 @@
+"""Twists that are means of a period are told from those of their stamps."""
+
+import numpy as np
+import pytest
+
+from climber_uk.analysis.closed_loop import Link, simulate
+from climber_uk.analysis.identification_experiments import SCENARIOS
+from climber_uk.control.controller import Controller, Law
+from climber_uk.control.follower import Follower
+from climber_uk.control.model import Observer
+from climber_uk.control.pacing import Pacing
+from climber_uk.control.safety import Safety
+from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.control.twist import mean_twist
+from climber_uk.mechanics.climber import State
+
+BUILT = SCENARIOS["climber.yaml"]
+
+
+def driven(link, twist="auto", duration=4.0):
+    controller = Controller(BUILT.believed, BUILT.guidance, Law())
+    observer, timing = Observer(twist=twist), Timing(learn_delay=False)
+    follower = Follower(Tracker(controller, observer, timing, Pacing()), Safety())
+    run = simulate(BUILT.trajectory, BUILT.start, duration, follower, BUILT.believed, link)
+    return run, follower.tracker
+
+
+def test_a_mean_twist_leads_from_one_pose_to_the_other():
+    start = State.rolling(np.array([1.0, 2.0, 3.0]), 0.2, 0.5)
+    time = 0.02
+    turned, way = 0.5 * time, 0.2 * time
+    middle = 3.0 + turned / 2
+    end = State.rolling(
+        start.pose + np.array([way * np.cos(middle), way * np.sin(middle), turned]), 0.2, 0.5
+    )
+    assert mean_twist(start.motion, end.motion, time) == pytest.approx((0.2, 0.5))
+
+
+@pytest.mark.parametrize("period", [0.005, 0.05])
+@pytest.mark.parametrize(
+    ("link", "is_mean"),
+    [
+        ({}, False),
+        ({"position_noise": 1e-3, "heading_noise": 1e-3, "speed_noise": 1e-2}, False),
+        ({"speed_noise": 1e-3}, False),
+        ({"encoder_counts": 512}, True),
+        ({"encoder_counts": 65536}, True),
+    ],
+    ids=["truth", "noise", "noise of the twist", "few counts", "many counts"],
+)
+def test_it_is_told_which_twist_odometry_has(period, link, is_mean):
+    _, tracker = driven(Link(period=period, **link))
+    assert tracker.twist.is_mean is is_mean
+
+
+def test_a_mean_twist_taken_for_one_of_its_stamp_costs_the_margin_of_slow_odometry():
+    slow = Link(period=0.05, encoder_counts=4096, delay=0.005, torque_lag=0.005)
+    for twist, stands in (("auto", True), ("mean", True), ("instantaneous", False)):
+        run, _ = driven(slow, twist, duration=12.0)
+        assert (run.chatter(6.0) < 0.05) is stands, twist

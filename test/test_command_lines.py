@@ -1,0 +1,60 @@
+"""Every executable tells its use and its version, and refuses what it does not know in one line."""
+
+import json
+import re
+import subprocess
+import sys
+from importlib.metadata import entry_points, version
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+OURS = {
+    script.name: script
+    for script in entry_points(group="console_scripts")
+    if script.value.startswith("climber_uk.")
+}
+# what `main` does with some arguments, each in turn: its status and its output
+TRY = """
+import contextlib, importlib, io, json, sys
+name, module, *tries = sys.argv[1:]
+main = importlib.import_module(module).main
+for words in tries:
+    sys.argv = [name, *words.split()]
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            status = main()
+        except SystemExit as end:
+            status = end.code
+    print(json.dumps([status, out.getvalue(), err.getvalue()]))
+"""
+SILENT = {
+    *("trajectory_publisher", "uk_torque_controller", "plant_simulator", "markers", "check_driver")
+}  # they write no files
+TRIES = ["--help", "--version", "--foo", "-o"]
+
+
+def test_all_executables_of_the_package_are_tried():
+    assert {"trajectory_publisher", "run_demo", "markers", "campaign", "identify"} <= OURS.keys()
+    assert len(OURS) >= 14
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_an_executable_tells_its_use_and_its_version_and_refuses_what_it_does_not_know(name):
+    command = [sys.executable, "-c", TRY, name, OURS[name].module, *TRIES]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    assert ran.stderr == ""
+    use, told, *refused = map(json.loads, ran.stdout.splitlines())
+    assert use[0] in (0, None)
+    assert use[1].startswith(f"usage: {name} ")
+    assert "--version" in use[1]
+    options = set(re.findall(r"(?<![-\w])-[-\w]+", use[1]))
+    assert ({"--output", "-o"} <= options) == (name not in SILENT)
+    assert told == [0, f"{name} {version('climber_uk')}\n", ""]
+    for status, out, err in refused:
+        assert (status, out) == (2, "")
+        assert err.startswith(f"{name}: ")
+        assert err.endswith(f"(see {name} --help)\n")
+        assert len(err.splitlines()) == 1
