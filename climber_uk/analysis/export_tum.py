@@ -14,7 +14,6 @@ import numpy as np
 from climber_uk.analysis.bag import open_bag
 from climber_uk.analysis.collecting import collect
 from climber_uk.analysis.outputs import output, printable
-from climber_uk.analysis.reference import poses_at
 from climber_uk.analysis.run_reader import NoRunError, RunReader
 from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TRUTH, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
@@ -41,7 +40,7 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
             except NoRunError as error:
                 raise ValueError(f"{bag}: {error}") from None
             odometry, truth = (reader.recorded(part, name) for name in (ODOMETRY, TRUTH))
-            reference = poses_at(part.reference, odometry.stamps)
+            reference = reader.reference(part, odometry.stamps)
             known = np.isfinite(reference[:, 0])
             poses = {
                 ODOMETRY: (odometry.stamps, odometry.values[:, :3]),

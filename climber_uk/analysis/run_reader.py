@@ -18,7 +18,7 @@ from climber_uk.analysis.reference import poses_at
 from climber_uk.analysis.run import RecordedRun
 from climber_uk.analysis.taking import TAKEN
 from climber_uk.analysis.topics import Topics
-from climber_uk.mechanics import SECOND
+from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
@@ -96,7 +96,7 @@ class RunReader:
     def run(self, found: Collected, told: Collection[Event], part: str) -> RecordedRun:
         """One run; raises `NoRunError`."""
         whole = odometry = self.recorded(found, topics.ODOMETRY)
-        reference = poses_at(found.reference, odometry.stamps)
+        reference = self.reference(found, odometry.stamps)
         known = np.flatnonzero(np.isfinite(reference[:, 0]))
         if len(known):
             first, last = known[0], known[-1]
@@ -127,13 +127,25 @@ class RunReader:
             reference=reference,
             commands=commands.where(np.isin(commands.stamps, odometry.stamps)),
             wheels=(right, left),
-            truth_reference=poses_at(found.reference, recorded[topics.TRUTH].stamps),
+            truth_reference=self.reference(found, recorded[topics.TRUTH].stamps),
             recorded=recorded,
             events=sorted(news, key=itemgetter(0)),
             is_diagnosed=any(event.kind == "state" for event in own),
             parameters=parameters,
             part=part,
         )
+
+    def reference(self, found: Collected, stamps: Stamps) -> Array:
+        """Reference (n, 3) at stamps (n,) [ns]: where it waited for the climber, that place.
+
+        The controller tells 20 times a second; between, its reference went on evenly.
+        """
+        told = Recorded.of(found.parts[topics.REFERENCE_TIME])
+        if len(told):
+            begin = told.stamps[0]
+            behind = np.interp(stamps - begin, told.stamps - begin, told.values[:, 0])
+            stamps = stamps - np.round(behind * SECOND).astype(np.int64)
+        return poses_at(found.reference, stamps)
 
     def recorded(self, found: Collected, name: str) -> Recorded:
         """The messages of a topic; says how many are left out, and why."""

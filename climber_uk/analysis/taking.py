@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.analysis.batches import Batch
-from climber_uk.analysis.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, TRUTH
-from climber_uk.mechanics import Array
+from climber_uk.analysis.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, REFERENCE_TIME, TRUTH
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE
 
 Faults = NDArray[np.intp]  # (n,) places in FAULTS
@@ -52,6 +52,12 @@ def _odometry(batch: Batch) -> tuple[Array, Faults]:
     return np.column_stack([place, turn, np.where(are_sound(rates), rates, np.nan)]), faults
 
 
+def _behind(batch: Batch) -> tuple[Array, Faults]:
+    """How much earlier the reference's time is than the stamp, (n, 1) [s]."""
+    behind = (batch.stamps - batch.times("time_ref")) / SECOND
+    return behind[:, None], np.where(are_sound(behind), 0, 1)
+
+
 def _columns(*paths: str) -> Callable[[Batch], tuple[Array, Faults]]:
     def take(batch: Batch) -> tuple[Array, Faults]:
         values = batch.columns(*paths)
@@ -64,6 +70,7 @@ WIDEST = 6  # values of a message
 TAKEN: dict[str, Callable[[Batch], tuple[Array, Faults]]] = {
     ODOMETRY: _odometry,
     TRUTH: _odometry,
+    REFERENCE_TIME: _behind,
     PRESSURE: _columns("fluid_pressure"),
     FORCE: _columns("wrench.force.x", "wrench.force.y", "wrench.torque.z"),
     **dict.fromkeys(MARGINS, _columns("vector.x", "vector.y", "vector.z")),

@@ -4,12 +4,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
+REFERENCE_TIME = "reference_time"  # where on the reference the climber was
 TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PARAMETERS = "joint_states", "suction_pressure", "uk_torque_controller/parameters"
 FORCE = "uk_torque_controller/constraint_force"
 MARGINS = "plant_simulator/margins", "uk_torque_controller/margins"  # the plant knows better
 DIAGNOSTICS, LOG = "/diagnostics", "/rosout"
-NAMES = (ODOMETRY, TRUTH, REFERENCE, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE, *MARGINS)
+NAMES = (
+    *(ODOMETRY, TRUTH, REFERENCE, REFERENCE_TIME, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE),
+    *MARGINS,
+)
 KNOWN = {*NAMES, DIAGNOSTICS, LOG}
 MOST_CLIMBERS = 100  # that are told of, unless they were chosen
 

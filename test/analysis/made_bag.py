@@ -189,6 +189,14 @@ class Made:
             made = message(VECTOR, stamp, vector__x=x, vector__y=y, vector__z=z)
             self.add(topic, VECTOR, self.arrival(stamp), made)
 
+    def add_reference_time(self, position, every=0.05):
+        """Where on the reference the climber was: `position` [s] of a time [s]."""
+        kind = "sensor_msgs/msg/TimeReference"
+        for time in np.arange(0.0, self.time[-1] + every, every):
+            stamp, at = (START + round(t * SECOND) for t in (time, position(time)))
+            made = message(kind, stamp, time_ref__sec=at // SECOND, time_ref__nanosec=at % SECOND)
+            self.add("reference_time", kind, self.arrival(stamp), made)
+
     def add_forces(self, values):
         for stamp, (x, y, z) in zip(self.stamps, values, strict=True):
             made = message(

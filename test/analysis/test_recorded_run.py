@@ -143,6 +143,18 @@ def test_the_reference_is_that_of_the_joined_previews():
     assert np.isnan(poses_at([], stamps)).all()
 
 
+def test_distances_are_from_where_the_reference_waited(tmp_path):
+    made = Made(400)
+    made.pose = on_circle(np.minimum(made.time, 0.5))[0]
+    made.add_odometry()
+    made.add_reference()
+    made.add_reference_time(lambda time: min(time, 0.5))
+    run = read_run(made.write(tmp_path / "bag"))
+    assert run.distance.max() < 1e-6
+    waited = run.recorded["reference_time"].values[-1, 0]
+    assert waited == pytest.approx(made.time[-1] - 0.5, abs=0.06)
+
+
 def test_wheels_are_told_apart_by_their_names(tmp_path):
     made = Made(N, torques=lambda time, _: np.tile([1.0, 2.0], (len(time), 1)))
     made.add_odometry()

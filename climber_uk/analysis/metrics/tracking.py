@@ -15,6 +15,7 @@ from climber_uk.analysis.metrics.metric import (
     percentile,
     rms,
 )
+from climber_uk.analysis.topics import REFERENCE_TIME
 from climber_uk.analysis.trajectory_errors import absolute_errors, relative_errors
 from climber_uk.mechanics import Array
 
@@ -103,6 +104,13 @@ METRICS = (
         "s",
         "from the start until the distance stays below 1 cm (`--settled`); unknown if it does not",
         settling_time,
+    ),
+    Metric(
+        "reference_waited",
+        "s",
+        "how much later than planned the reference was at the end: it waits where it is not "
+        "followed, and distances are from where it waits; unknown without `reference_time`",
+        lambda case: largest(case.run.recorded[REFERENCE_TIME].values[-1:, 0]),
     ),
     Metric(
         "ape_rmse",
