@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.analysis.closed_loop import Link
-from climber_uk.control.constraints import Guidance, demanded, tracking_error
+from climber_uk.control.constraints import ConstraintSet, Guidance, demanded, tracking_error
 from climber_uk.control.controller import Command
 from climber_uk.control.follower import Answer
 from climber_uk.control.tracker import Tracker
@@ -98,8 +98,10 @@ class AdaptiveRobust(Tracker):
         super().forget()
         self.bounds = np.zeros(2)
 
-    def answer(self, preview: Preview, age: float) -> Command | None:
-        """Torques for the last odometry."""
+    def answer(
+        self, preview: Preview, age: float, constraints: ConstraintSet | None = None
+    ) -> Command | None:
+        """Torques for the last odometry, by its own constraints."""
         reference = preview.at(self.stamp)
         if reference is not None and self.motion is not None:
             state = State.moving(self.motion)

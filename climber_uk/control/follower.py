@@ -263,7 +263,7 @@ class Follower:
         if self._heard is None:
             return Mode.WAITING, ""
         if now - self._heard > self.safety.odometry_timeout * SECOND:
-            return Mode.NO_ODOMETRY, f"for odometry_timeout, {self.safety.odometry_timeout} s"
+            return Mode.NO_ODOMETRY, ""
         return self._trouble or self._told_fault() or self._unfit() or self._missing(now)
 
     def _told_fault(self) -> Trouble | None:

@@ -71,6 +71,7 @@ class TrajectoryPublisher(ClimberNode):
         self.create_timer(self.options.publish_period, self.publish)
         self.create_timer(STANDSTILL, self.publish_at_standstill, clock=WALL_CLOCK)
         self.odometry: Subscription | None = None  # only while a start is waited for
+        self.publish_path(self.get_clock().now().nanoseconds)
         if self.options.autostart:
             self.wait_for_odometry()
 
@@ -128,8 +129,7 @@ class TrajectoryPublisher(ClimberNode):
         self.publish_around(self.start)
         shape = self.parameters.read(Plan).shape
         self.get_logger().info(f"{shape} starts at {self.start / SECOND:.3f} s")
-        path = writing.path(self.planned.path(points=400), self.start, self.names.odom_frame)
-        self.path.publish(path)
+        self.publish_path(self.start)
 
     def on_reference_time(self, message: TimeReference) -> None:
         """Take note of how far along this trajectory a controller has come."""
@@ -148,6 +148,11 @@ class TrajectoryPublisher(ClimberNode):
         if self.count_publishers("reference_time"):
             return self.start
         return max(self.start, self.get_clock().now().nanoseconds)
+
+    def publish_path(self, stamp: int) -> None:
+        """Publish the whole path, for display."""
+        path = self.planned.path(points=400)
+        self.path.publish(writing.path(path, stamp, self.names.odom_frame))
 
     def publish(self) -> None:
         """Publish the preview from where the trajectory has come to."""

@@ -181,6 +181,11 @@ class UkTorqueController(ManagedNode):
         """Say what has changed, and publish an answer if there is one."""
         follower = self.follower
         mode = follower.mode
+        if mode is not Mode.WAITING:  # a replay takes it for the mode of the next torque
+            approaches = mode is Mode.APPROACHING
+            self.say("reference waits", mode.value if approaches else "", follower.detail, False)
+            trouble = "" if approaches or mode is Mode.FOLLOWING else mode.value
+            self.say("safe output", trouble, follower.detail, mode.is_fault)
         if answer is not None:
             self.publish_torques(answer)
         self.tell_position()
@@ -188,13 +193,8 @@ class UkTorqueController(ManagedNode):
         differ = "odometry's differs from this node's" if offset else ""
         detail = f"by {offset:.3f} s; if that is latency, set transport_delay"
         self.say("clock", differ, detail, is_fault=False)
-        if mode is not Mode.WAITING:
-            approaches = mode is Mode.APPROACHING
-            self.say("reference waits", mode.value if approaches else "", follower.detail, False)
-            trouble = "" if approaches or mode is Mode.FOLLOWING else mode.value
-            self.say("safe output", trouble, follower.detail, mode.is_fault)
         if answer is not None:
-            state = self.follower.state
+            state = follower.state
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command, state)
             if state is not None:

@@ -162,11 +162,13 @@ def test_a_slow_climber_comes_to_a_new_path_from_anywhere_on_the_old_one(time):
     assert np.abs(run.velocity[:, 2]).max() < 1.5
 
 
-def test_it_catches_up_with_a_reference_that_runs_already():
+def test_a_reference_that_has_left_is_approached_and_followed():
     start = State(np.array([3.0, 0.0, 2.0]), np.zeros(3))  # the reference has left at 10 m/s
     weak = replace(CLIMBER, max_wheel_torque=4.0)
-    ours = follower(weak, approach=ANYWHERE, guard=UNGUARDED)
+    there = Approach(max_start_distance=10.0, approach_speed=2.0, approach_yaw_rate=2.0)
+    ours = follower(weak, approach=there)
     run = simulate(PAPER, start, 30.0, ours, weak)
+    assert ours.mode is Mode.FOLLOWING
     assert off_the_ellipse(run)[run.time > 25.0].max() < 1e-3
     assert np.abs(run.torques).max() <= 4.0
     assert np.abs(run.velocity[:, 2]).max() < 10.0  # no spin

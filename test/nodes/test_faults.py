@@ -131,7 +131,7 @@ def test_odometry_of_the_future_is_refused(world):
     loop.follows()
     loop.is_safe(age=-5 * SECOND)
     loop.follows()
-    refused = "bad odometry (stamp is too far from the clock)"
+    refused = "bad odometry (stamp is -5.00 s from the clock, too far)"
     world.wait(lambda: "ok again" in said(world, CONTROLLER)[-1:], "word of the recovery")
     assert said(world, CONTROLLER)[-2:] == [refused, "ok again"]
     assert said(world, CONTROLLER).count(refused) == 1

@@ -4,7 +4,7 @@ import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import SetBool
-from test_uk_torque_controller import Loop
+from test_uk_torque_controller import UNGUARDED, Loop
 
 pytestmark = pytest.mark.nodes
 
@@ -25,7 +25,7 @@ LABELS += ["transition_success", "Activate", "active", "nonsense", "\u03c4"]
 @pytest.mark.parametrize("state", STATES)
 def test_what_does_not_fit_the_state_is_refused_in_words_and_changes_nothing(world, state):
     allowed, way = STATES[state]
-    world.start_node(NAME, "autostart:=false", "odometry_timeout:=1.0")
+    world.start_node(NAME, *UNGUARDED, "autostart:=false", "odometry_timeout:=1.0")
     client = world.node.create_client(ChangeState, f"{NAME}/change_state")
     world.wait(client.service_is_ready, "the service")
 
@@ -60,7 +60,7 @@ def test_what_does_not_fit_the_state_is_refused_in_words_and_changes_nothing(wor
 
 
 def test_what_fits_the_state_is_taken_by_its_label_as_well(world):
-    world.start_node(NAME, "autostart:=false", "odometry_timeout:=1.0")
+    world.start_node(NAME, *UNGUARDED, "autostart:=false", "odometry_timeout:=1.0")
     for label in ("configure", "activate", "deactivate", "cleanup", "shutdown"):
         request = ChangeState.Request(transition=Transition(label=label))
         assert world.call(ChangeState, f"{NAME}/change_state", request).success

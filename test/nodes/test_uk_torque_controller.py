@@ -23,6 +23,9 @@ from climber_uk.messages import reading, writing
 pytestmark = pytest.mark.nodes
 
 NAME = "uk_torque_controller"
+UNGUARDED = [  # no torque moves what is told here
+    *("guard.max_disturbance:=0.0", "guard.stall_time:=0.0", "guard.response_time:=0.0")
+]
 CIRCLE = Trajectory(Circle(), ConstantRate(rate=0.5))
 
 
@@ -32,7 +35,7 @@ class Loop:
     def __init__(self, world, *parameters):
         self.world = world
         if NAME not in world.processes:
-            world.start_node(NAME, *parameters)
+            world.start_node(NAME, *UNGUARDED, *parameters)
         self.torques = world.listen(JointState, "wheel_torques")
         self.odometry = world.speak(Odometry, "odom")
         self.reference = world.speak(MultiDOFJointTrajectory, "reference")
@@ -96,7 +99,7 @@ def spoil_orientation(message):
         ({"spoil": spoil_frame}, "frame_id='map' must be 'odom'"),
         ({"spoil": spoil_child_frame}, "child_frame_id='base_footprint' must be 'base_link'"),
         ({"spoil": spoil_orientation}, "must be a unit turn about z"),
-        ({"age": 2_000_000_000}, "stamp is too far from the clock"),
+        ({"age": 2_000_000_000}, "from the clock, too far"),
     ],
     ids=["not finite", "wrong frame", "wrong child frame", "no orientation", "stale stamp"],
 )
@@ -156,7 +159,7 @@ def test_a_manager_of_nodes_decides_when_it_listens_and_when_it_follows(world):
         request = ChangeState.Request(transition=Transition(id=transition))
         assert world.call(ChangeState, f"{NAME}/change_state", request).success
 
-    world.start_node(NAME, "autostart:=false", "odometry_timeout:=1.0")
+    world.start_node(NAME, *UNGUARDED, "autostart:=false", "odometry_timeout:=1.0")
     response = world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=True))
     assert (response.success, response.message) == (False, "unconfigured")
     assert world.node.count_subscribers("odom") == 0

@@ -16,6 +16,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+OPTION = {False: "-p", True: "-r"}
 TIMEOUT = 60.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -108,9 +109,11 @@ class World:
         return self.processes[name]
 
     def start_node(self, name, *parameters, config=None):
-        """Start a node with parameters given as name:=value."""
+        """Start a node with parameters given as name:=value, topics renamed as /from:=/to."""
         file = ["--params-file", str(CONFIG / config)] if config else []
-        given = [part for parameter in parameters for part in ("-p", parameter)]
+        given = [
+            part for parameter in parameters for part in (OPTION[parameter[0] == "/"], parameter)
+        ]
         return self.start(name, "--ros-args", *file, *given)
 
     def log(self, name):

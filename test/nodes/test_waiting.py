@@ -1,0 +1,214 @@
+"""The reference waits for its climber, and nothing runs away: the three nodes in lock-step."""
+
+import math
+import signal
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState, TimeReference
+from std_srvs.srv import SetBool
+from test_faults import CONTROLLER, LOCK_STEP, PLANNER, PLANT, Climb, said
+from world import CONFIG
+
+from climber_uk.analysis.parameter_file import Values, read_file
+from climber_uk.mechanics import SECOND, plan
+from climber_uk.mechanics.climber import State
+from climber_uk.messages import reading, writing
+
+pytestmark = pytest.mark.nodes
+FASTEST = 0.26  # [m/s] of the reference in config/climber.yaml
+
+
+class Waiting(Climb):
+    """A climb of which is heard where on its reference it is."""
+
+    def __init__(self, world, changed=None):
+        changed = changed or {}
+        parameters = {name: [*LOCK_STEP[name], *changed.get(name, [])] for name in LOCK_STEP}
+        self.positions = []
+        super().__init__(world, parameters)
+        world.node.create_subscription(TimeReference, "reference_time", self.positions.append, 1000)
+
+    def enable(self, enabled):
+        self.world.call(SetBool, f"{CONTROLLER}/enable", SetBool.Request(data=enabled))
+
+    @property
+    def now(self):
+        """Time of the plant [s]."""
+        return reading.nanoseconds(self.odometry[-1].header.stamp) / SECOND
+
+    @property
+    def position(self):
+        """Time of the reference [s]."""
+        return reading.nanoseconds(self.positions[-1].time_ref) / SECOND
+
+    def passes(self, seconds):
+        until = self.now + seconds
+        self.world.wait(lambda: self.now >= until, f"{seconds} s of simulated time")
+
+    def mode(self):
+        return self.positions[-1].source
+
+    def is_in(self, mode):
+        self.world.wait(lambda: self.positions and self.mode() == mode, mode)
+
+    def fastest(self, since=0.0):
+        return max(
+            abs(m.twist.twist.linear.x)
+            for m in self.odometry
+            if reading.nanoseconds(m.header.stamp) >= since * SECOND
+        )
+
+    def off_the_path(self, since):
+        """Largest distance [m] from the path as a curve."""
+        path = plan.planned(Values(read_file(CONFIG / "climber.yaml", f"/{PLANNER}")).read)
+        curve = path.at(np.arange(0.0, 57.0, 0.01)).pose[:, :2]
+        places = [
+            (m.pose.pose.position.x, m.pose.pose.position.y)
+            for m in self.odometry
+            if reading.nanoseconds(m.header.stamp) >= since * SECOND
+        ]
+        return max(np.hypot(*(curve - place).T).min() for place in places[::20])
+
+
+def test_a_climber_enabled_late_follows_from_the_beginning(world):
+    climb = Waiting(world)
+    climb.enable(False)
+    climb.is_in("disabled")
+    climb.passes(30.0)
+    waits_at = climb.position
+    climb.passes(5.0)
+    assert climb.position == waits_at
+    begin = climb.now
+    climb.enable(True)
+    climb.is_in("following")
+    climb.passes(10.0)
+    assert climb.fastest(begin) <= 1.3 * FASTEST
+    assert climb.off_the_path(begin) < 0.02
+    assert climb.position == pytest.approx(waits_at + climb.now - begin, abs=0.5)
+
+
+def test_disabled_in_mid_course_it_goes_on_where_it_was(world):
+    climb = Waiting(world)
+    climb.is_in("following")
+    climb.passes(8.0)
+    climb.enable(False)
+    climb.is_in("disabled")
+    climb.passes(2.0)
+    waits_at, begin = climb.position, climb.now
+    climb.passes(20.0)
+    assert climb.position == waits_at
+    climb.enable(True)
+    climb.is_in("following")
+    climb.passes(5.0)
+    assert climb.fastest() <= 1.3 * FASTEST
+    assert climb.off_the_path(begin) < 0.02
+    assert climb.position < waits_at + 5.6
+
+
+@pytest.mark.parametrize("name", [CONTROLLER, PLANNER])
+def test_a_process_that_was_stopped_goes_on_where_it_was(world, name):
+    climb = Waiting(world)
+    climb.is_in("following")
+    climb.passes(5.0)
+    world.processes[name].send_signal(signal.SIGSTOP)
+    looks = iter(range(75))  # 1.5 s: the clock of a plant in lock-step stands still
+    world.wait(lambda: next(looks, None) is None, "a while")
+    world.processes[name].send_signal(signal.SIGCONT)
+    climb.passes(5.0)
+    assert climb.fastest() <= 1.3 * FASTEST
+    climb.is_on_path()
+
+
+def test_a_new_controller_goes_on_where_the_old_one_was(world):
+    climb = Waiting(world)
+    climb.is_in("following")
+    climb.passes(6.0)
+    before = climb.position
+    climb.kill(CONTROLLER)
+    climb.start(CONTROLLER)
+    climb.passes(5.0)
+    climb.is_on_path()
+    assert climb.fastest() <= 1.3 * FASTEST
+    assert before - 1.0 < climb.position <= climb.now
+
+
+def test_a_start_3_m_off_is_refused_in_words(world):
+    climb = Waiting(world, {PLANT: ["initial_y:=0.0"]})
+    climb.is_in("too_far")
+    climb.passes(2.0)
+    assert climb.fastest() < 1e-3
+    (line,) = said(world, CONTROLLER)
+    assert line.startswith("too far from the reference (3.00 m, from (0.00, 0.00) to (0.00, 3.00)")
+
+
+def test_a_start_3_m_off_that_is_allowed_is_approached_at_its_speed(world):
+    allowed = ["max_start_distance:=5.0", "approach_speed:=0.2"]
+    climb = Waiting(world, {PLANT: ["initial_y:=0.0"], CONTROLLER: allowed})
+    climb.is_in("approaching")
+    climb.is_in("following")
+    assert climb.fastest() < 0.21
+    begin = climb.now
+    climb.passes(5.0)
+    assert climb.off_the_path(begin) < 0.02
+
+
+def test_a_push_is_ridden_out(world):
+    climb = Waiting(world, {PLANT: ["push_timeout:=0.3"]})
+    climb.is_in("following")
+    climb.passes(6.0)
+    push = world.speak(WrenchStamped, "push")
+    wrench = WrenchStamped()
+    wrench.header.frame_id = "base_link"
+    wrench.wrench.force.x = -150.0  # for push_timeout
+    push.publish(wrench)
+    climb.is_in("too_fast")
+    climb.is_in("following")
+    climb.passes(10.0)
+    climb.is_on_path()
+    assert climb.fastest(climb.now - 5.0) <= 1.3 * FASTEST
+
+
+@pytest.mark.parametrize("side", [0, 1], ids=["left", "right"])
+def test_a_motor_that_dies_is_noticed_and_the_climber_comes_to_rest(world, side):
+    """A relay between controller and plant takes the torque of one wheel away."""
+    tracks = ["slip:=true", "locomotion:=tracked", "tracked.length:=0.44"]
+    tracks.append("tracked.scrub_friction_coefficient:=0.8")
+    to_plant = world.node.create_publisher(JointState, "applied_torques", 1000)
+    dies_at = [math.inf]
+
+    def relay(message):
+        if reading.nanoseconds(message.header.stamp) >= dies_at[0] * SECOND:
+            message.effort[side] = 0.0
+        to_plant.publish(message)
+
+    world.node.create_subscription(JointState, "wheel_torques", relay, 1000)
+    climb = Waiting(world, {PLANT: [*tracks, "/wheel_torques:=/applied_torques"]})
+    climb.is_in("following")
+    climb.passes(7.0)
+    dies_at[0] = climb.now
+    known = {"following", "approaching", "waiting"}
+    world.wait(lambda: climb.mode() not in known, "fault")
+    assert reading.nanoseconds(climb.positions[-1].header.stamp) / SECOND < dies_at[0] + 0.35
+    climb.passes(2.0)
+    assert climb.fastest() < 1.5 * FASTEST + 0.1
+    assert climb.fastest(climb.now - 0.5) < 0.01
+
+
+def test_what_comes_and_goes_is_said_a_few_times_only(world):
+    """A thousand odometries, every second one unfit."""
+    world.start_node(CONTROLLER, "odometry_timeout:=10.0", config="climber.yaml")
+    torques = world.listen(JointState, "wheel_torques")
+    odometry = world.speak(Odometry, "odom")
+    state = State(np.zeros(3), np.zeros(3))
+    for number in range(1000):
+        stamp = world.node.get_clock().now().nanoseconds
+        message = writing.odometry(state, stamp, "odom", "base_link")
+        if number % 2:
+            message.pose.pose.position.x = math.nan
+        odometry.publish(message)
+        world.executor.spin_once(timeout_sec=0.001)
+    world.wait(lambda: len(torques) > 100, "answers")
+    assert len(world.log(CONTROLLER).splitlines()) <= 20
