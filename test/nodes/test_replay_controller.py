@@ -193,10 +193,11 @@ def test_what_other_parameters_change_is_told_and_may_be_too_much(bag, replay, c
 
 
 def test_a_lower_limit_is_reached_more_often(bag, replay):
-    unguarded = "-p", "guard.stall_time:=0.0", "-p", "guard.response_time:=0.0"
+    checks = "stall_time", "response_time", "speed_margin", "yaw_rate_margin", "max_disturbance"
+    unguarded = [word for check in checks for word in ("-p", f"guard.{check}:=0.0")]
     wheels = replay(bag, "-p", "max_wheel_torque:=0.5", *unguarded)["wheels"]
-    shares = wheels["recorded at the limit [%]"], wheels["replayed at the limit [%]"]
-    assert all(before < after for before, after in zip(*shares, strict=True))
+    assert wheels["recorded at the limit [%]"] != [0.0, 0.0]
+    assert min(wheels["replayed at the limit [%]"]) > 10
 
 
 @pytest.mark.parametrize("topic", ["odom", "reference", "wheel_torques", f"{NAME}/parameters"])
