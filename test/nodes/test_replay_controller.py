@@ -196,8 +196,8 @@ def test_a_lower_limit_is_reached_more_often(bag, replay):
     checks = "stall_time", "response_time", "speed_margin", "yaw_rate_margin", "max_disturbance"
     unguarded = [word for check in checks for word in ("-p", f"guard.{check}:=0.0")]
     wheels = replay(bag, "-p", "max_wheel_torque:=0.5", *unguarded)["wheels"]
-    assert wheels["recorded at the limit [%]"] != [0.0, 0.0]
-    assert min(wheels["replayed at the limit [%]"]) > 10
+    # of what was recorded, what is beyond that limit counts
+    assert max(wheels["replayed at the limit [%]"]) > max(wheels["recorded at the limit [%]"]) > 0
 
 
 @pytest.mark.parametrize("topic", ["odom", "reference", "wheel_torques", f"{NAME}/parameters"])
