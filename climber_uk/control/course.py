@@ -8,7 +8,7 @@ import numpy as np
 from climber_uk.control.approach import Approach
 from climber_uk.control.constraints import Guidance
 from climber_uk.control.controller import Command
-from climber_uk.control.guard import Fastest
+from climber_uk.control.guard import STANDS, Expected, Rates
 from climber_uk.control.pacing import Progress, restarted
 from climber_uk.control.safety import Mode
 from climber_uk.control.tracker import Tracker
@@ -46,8 +46,8 @@ class Course:
         self.way: Preview | None = None  # to where it waits
         self._position: int | None = None  # [ns] time of the reference; None: not begun
         self._is_paused = True
-        # what was asked of `fastest` last: preview, number of `AROUND`, what it was
-        self._around: tuple[Preview, int, Fastest] | None = None
+        # what is followed, number of `AROUND`, and the fastest motion around it
+        self._around: tuple[Preview, int, tuple[float, float]] | None = None
         self._began_at = 0.0  # [m] from the reference, when it was begun to follow it
 
     @property
@@ -56,23 +56,31 @@ class Course:
         return self.way or self.preview
 
     @property
-    def fastest(self) -> tuple[Fastest, Fastest]:
-        """Of what is followed, and of what follows it as the constraints want."""
+    def target(self) -> Target | None:
+        """Where the climber should be at the last odometry; None if nothing is followed."""
         followed = self.followed
-        if followed is None:
-            return Fastest(0.0, 0.0), Fastest(math.inf, math.inf)
-        tracker = self.tracker
-        here = self.time_followed(tracker.stamp)
-        number = here // AROUND
+        if followed is None or self._is_paused:
+            return None
+        return followed.target(self.time_followed(self.tracker.stamp))
+
+    def expected(self, target: Target) -> Expected:
+        """What is expected of a climber that should be at `target`."""
+        tracker, followed = self.tracker, self.followed
+        assert followed is not None
+        number = self.time_followed(tracker.stamp) // AROUND
         if self._around is None or self._around[0] is not followed or self._around[1] != number:
             fastest = followed.fastest((number - 1) * AROUND, (number + 2) * AROUND)
-            self._around = followed, number, Fastest(*fastest)
-        reference = self._around[2]
+            self._around = followed, number, fastest
+        pace = tracker.progress.pace
+        hurry = 1 + (tracker.pacing.catch_up if pace.lag > 0 else 0.0)
         constraints = (
             self.approach_constraints if self._is_gentle else tracker.controller.constraints
         )
-        hurry = 1 + (tracker.pacing.catch_up if tracker.progress.pace.lag > 0 else 0.0)
-        return reference, Fastest(*constraints.fastest(*(hurry * rate for rate in reference)))
+        return Expected(
+            wanted=Rates(math.hypot(target.v_x, target.v_y), abs(target.yaw_rate)),
+            allowed=Rates(*constraints.fastest(*(hurry * rate for rate in self._around[2]))),
+            waits=pace.rate < STANDS,
+        )
 
     @property
     def _is_gentle(self) -> bool:
@@ -126,14 +134,8 @@ class Course:
         except (ValueError, ArithmeticError) as error:
             return Followed(Mode.NO_SOLUTION, str(error))
 
-    def strayed(self, motion: Motion | None) -> tuple[Mode, str] | None:
-        """Whether a climber that follows is too far from what it follows."""
-        followed = self.followed
-        if followed is None or motion is None or self._is_paused:
-            return None
-        target = followed.target(self.time_followed(self.tracker.stamp))
-        if target is None:
-            return None
+    def strayed(self, motion: Motion, target: Target) -> tuple[Mode, str] | None:
+        """Whether a climber is too far from where it should be."""
         distance = math.hypot(motion.x - target.x, motion.y - target.y)
         if distance <= STRAYED * self.options.max_distance:
             return None

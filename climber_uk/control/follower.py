@@ -12,7 +12,7 @@ from climber_uk.control.ages import Ages
 from climber_uk.control.approach import Approach
 from climber_uk.control.controller import Command
 from climber_uk.control.course import Course
-from climber_uk.control.guard import STANDS, Guard, GuardOptions
+from climber_uk.control.guard import Guard, GuardOptions, Observed
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.tracker import LONGEST_STEP, Tracker
 from climber_uk.control.twist_check import SUSPECTED, TwistCheck
@@ -216,24 +216,10 @@ class Follower:
         time = (stamp - tracker.stamp) / SECOND
         if self._fault is None:
             if self.mode in (Mode.FOLLOWING, Mode.APPROACHING) and time > 0:
-                reference, allowed = self.course.fastest
-                trouble = trouble or guard.watch(
-                    climber,
-                    last,
-                    motion,
-                    time,
-                    tracker.mean_torques(stamp),
-                    tracker.disturbance,
-                    reference,
-                    allowed,
-                    waits=tracker.progress.pace.rate < STANDS,
-                )
-                trouble = trouble or self.course.strayed(tracker.motion)
-                if trouble and trouble[0] is Mode.TOO_FAST:
-                    sign = self._twist.opposed(SUSPECTED * self.safety.max_twist_error)
-                    trouble = (Mode.SIGN_WRONG, sign) if sign else trouble
-                if trouble:
-                    self._fault, self._rested = trouble, 0.0
+                acted, disturbance = tracker.mean_torques(stamp), tracker.disturbance
+                observed = Observed(last, motion, time, acted, disturbance)
+                self._fault, self._rested = trouble or self._find_fault(observed), 0.0
+                if self._fault is not None:
                     guard.fault(stamp)
             return
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
@@ -243,6 +229,19 @@ class Follower:
             self._fault = None
             guard.restart()
             self._twist.restart()
+
+    def _find_fault(self, observed: Observed) -> Trouble | None:
+        """What the guard finds of a climber that follows."""
+        target = self.course.target
+        if target is None:
+            return None
+        climber, expected = self.tracker.controller.climber, self.course.expected(target)
+        fault = self.guard.watch(climber, observed, expected)
+        fault = fault or self.course.strayed(observed.before, target)
+        if fault is not None and fault[0] is Mode.TOO_FAST:
+            sign = self._twist.opposed(SUSPECTED * self.safety.max_twist_error)
+            return (Mode.SIGN_WRONG, sign) if sign else fault
+        return fault
 
     @property
     def _is_for_good(self) -> bool:

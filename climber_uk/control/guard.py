@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.climber import GRAVITY, Climber
+from climber_uk.mechanics.hold import Adhesion, Suction
 from climber_uk.mechanics.motion import Motion, Torques, Wrench
 from climber_uk.mechanics.parameter import check, parameter
 
@@ -61,11 +62,29 @@ UNGUARDED = GuardOptions(
 )
 
 
-class Fastest(NamedTuple):
-    """Fastest motion of a reference, or of what follows it."""
+class Rates(NamedTuple):
+    """Sizes of a speed and a yaw rate."""
 
     speed: float  # [m/s]
     yaw_rate: float  # [rad/s]
+
+
+class Observed(NamedTuple):
+    """What odometry tells, and what acted since the one before."""
+
+    before: Motion
+    after: Motion
+    time: float  # [s] between them
+    torques: Torques  # their mean
+    disturbance: Wrench
+
+
+class Expected(NamedTuple):
+    """What a climber is to do."""
+
+    wanted: Rates  # of the reference
+    allowed: Rates  # at most
+    waits: bool  # whether the reference does, as torque is missing
 
 
 class Variance:
@@ -111,8 +130,8 @@ class Wheel:
 class Guard:
     """Watches a climber that follows."""
 
-    def __init__(self, options: GuardOptions) -> None:
-        self.options = options
+    def __init__(self, options: GuardOptions, adhesion: Adhesion | None = None) -> None:
+        self.options, self.adhesion = options, adhesion or Suction()
         self.faults: deque[int] = deque()  # [ns] stamps
         self.restart()
 
@@ -127,31 +146,19 @@ class Guard:
         self._moved = 0.0  # [s]
 
     def watch(
-        self,
-        climber: Climber,
-        before: Motion,
-        after: Motion,
-        time: float,
-        torques: Torques,
-        disturbance: Wrench,
-        reference: Fastest,
-        allowed: Fastest,
-        waits: bool,
+        self, climber: Climber, observed: Observed, expected: Expected
     ) -> tuple[Mode, str] | None:
-        """What is wrong `time` [s] later, after mean `torques`; None if all is well.
-
-        `reference` is followed, no faster than `allowed`; it `waits` where torque is missing.
-        """
-        self._add_to_wheels(climber, before, after, time, torques)
-        too_fast = self._watch_rates(after, allowed)
+        """What is wrong with what is observed; None if all is well."""
+        self._add_to_wheels(climber, observed)
+        too_fast = self._watch_rates(observed.after, expected.allowed)
         return (
-            self._watch_wheels(climber, torques, SUSPECTED if too_fast else 1.0)
+            self._watch_wheels(climber, observed.torques, SUSPECTED if too_fast else 1.0)
             or too_fast
-            or self._watch_limit(climber, after, time, torques, reference, waits)
-            or self._watch_disturbance(climber, disturbance)
+            or self._watch_limit(climber, observed, expected)
+            or self._watch_disturbance(climber, observed.disturbance)
         )
 
-    def _watch_rates(self, motion: Motion, allowed: Fastest) -> tuple[Mode, str] | None:
+    def _watch_rates(self, motion: Motion, allowed: Rates) -> tuple[Mode, str] | None:
         options = self.options
         fastest = allowed.speed + options.speed_margin
         fastest_turn = allowed.yaw_rate + options.yaw_rate_margin
@@ -160,36 +167,29 @@ class Guard:
         self._too_fast = self._too_fast + 1 if is_fast or is_turning else 0
         if self._too_fast < IN_A_ROW:
             return None
-        if is_fast:
-            return Mode.TOO_FAST, f"{motion.speed:.2f} m/s, at most {fastest:.2f} are asked for"
-        return Mode.TOO_FAST, (
-            f"{motion.yaw_rate:.2f} rad/s, at most {fastest_turn:.2f} are asked for"
-        )
+        told, most, unit = motion.speed, fastest, "m/s"
+        if not is_fast:
+            told, most, unit = motion.yaw_rate, fastest_turn, "rad/s"
+        return Mode.TOO_FAST, f"{told:.2f} {unit}, at most {most:.2f} are asked for"
 
     def _watch_limit(
-        self,
-        climber: Climber,
-        motion: Motion,
-        time: float,
-        torques: Torques,
-        reference: Fastest,
-        waits: bool,
+        self, climber: Climber, observed: Observed, expected: Expected
     ) -> tuple[Mode, str] | None:
-        largest = max(abs(torques.right), abs(torques.left))
+        largest, motion, wanted = max(map(abs, observed.torques)), observed.after, expected.wanted
         share = largest / climber.max_wheel_torque
-        if reference.speed > MOVES:
-            stands = abs(motion.speed) < STANDS * reference.speed
+        if wanted.speed > MOVES:
+            stands = abs(motion.speed) < STANDS * wanted.speed
         else:  # it turns in place, or rests
-            stands = abs(motion.yaw_rate) < STANDS * reference.yaw_rate
-        is_stalled = (stands and share >= STRONG) or (waits and share >= AT_LIMIT)
-        self._stalled = self._stalled + time if is_stalled else 0.0
+            stands = abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
+        is_stalled = (stands and share >= STRONG) or (expected.waits and share >= AT_LIMIT)
+        self._stalled = self._stalled + observed.time if is_stalled else 0.0
         if not 0 < self.options.stall_time < self._stalled:
             return None
         return Mode.STALLED, f"{largest:.2f} N m for {self._stalled:.2f} s"
 
     def _watch_disturbance(self, climber: Climber, disturbance: Wrench) -> tuple[Mode, str] | None:
-        adhesion = climber.suction_pressure * climber.suction_area
-        most = self.options.max_disturbance * (adhesion + climber.mass * 9.81)
+        explained = self.adhesion.force(climber) + climber.mass * GRAVITY
+        most = self.options.max_disturbance * explained
         moment = most * climber.half_track
         if most == 0 or (abs(disturbance.drive) <= most and abs(disturbance.turn) <= moment):
             return None
@@ -198,10 +198,9 @@ class Guard:
             f"explained are {most:.0f} N, {moment:.0f} N m"
         )
 
-    def _add_to_wheels(
-        self, climber: Climber, before: Motion, after: Motion, time: float, torques: Torques
-    ) -> None:
+    def _add_to_wheels(self, climber: Climber, observed: Observed) -> None:
         """See `Wheel`; (11) and (15) tell the force that acted on each."""
+        before, after, time, torques, _ = observed
         response_time = self.options.response_time
         if response_time == 0 or min(abs(before.speed), abs(after.speed)) < MOVES:
             self._forget_wheels()

@@ -64,5 +64,7 @@ def new_follower(parameters: Parameters, pressure: float | None) -> Follower:
     """Follower as the parameters say, that has seen nothing yet."""
     read, tracker = parameters.read, Tracker(*settings(parameters, pressure))
     follower = Follower(tracker, read(Safety), read(Approach), read(GuardOptions, "guard."))
+    name = read(Choice).adhesion
+    follower.guard.adhesion = read(ADHESION[name], f"{name}.")
     follower.course.approach_constraints = read(Guidance, "guidance.")
     return follower
