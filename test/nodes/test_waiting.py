@@ -45,6 +45,7 @@ class Waiting(Climb):
         return reading.nanoseconds(self.positions[-1].time_ref) / SECOND
 
     def passes(self, seconds):
+        self.world.wait(lambda: self.odometry, "odometry")
         until = self.now + seconds
         self.world.wait(lambda: self.now >= until, f"{seconds} s of simulated time")
 
