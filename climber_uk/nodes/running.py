@@ -3,6 +3,7 @@
 import gc
 import math
 import re
+import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -38,6 +39,7 @@ RELIABLE = QoSProfile(depth=10)
 SENT = QoSProfile(depth=1000)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
+LONGEST_END = 4  # [s] from a signal to the end of the process, whatever hangs
 SLOW = SECOND // 20  # [ns] from one message to the next of what need not be told each time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LINES, LINES_PERIOD = 6, 10.0  # [s]: of the log, on one subject
@@ -216,7 +218,12 @@ def run(
     """
     nodes: Sequence[ClimberNode] = ()
     end = Future()
-    on_end(lambda *_: end.set_result(None))
+
+    def stop(*_: object) -> None:
+        signal.alarm(LONGEST_END)  # by the kernel: the middleware may not come back
+        end.set_result(None)
+
+    on_end(stop)
     try:
         ParameterFiles(sys.argv, "")  # rcl would not say where a file is wrong
         chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})

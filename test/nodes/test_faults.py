@@ -107,7 +107,7 @@ def test_odometry_that_stops_gets_the_safe_output_until_it_comes_back(world):
 
 
 def test_odometry_that_jumps_gets_the_safe_output_for_a_few_messages(world):
-    loop = Loop(world, "odometry_timeout:=1.0")
+    loop = Loop(world, "odometry_timeout:=1.0", "max_distance:=2.0")
 
     def elsewhere(message):
         message.pose.pose.position.y += 1.0
