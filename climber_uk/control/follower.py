@@ -103,9 +103,8 @@ class Follower:
         self._enabled = enabled
         self._moved_without_twist = 0.0
         if enabled:
-            self._fault, self._last_fault = None, None
-            self.guard.faults.clear()
-            self._fault_times.clear()
+            self._fault = None
+            self._forget_when()
 
     def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
         """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
@@ -160,9 +159,16 @@ class Follower:
             self._heard = min(self._heard, now)
         # stamps of before the step are no newer ones
         self._stamp, self._waiting_since = 0, None
+        self._forget_when()
         self.tracker.restart()
         if back > CLOCK_STEP:
             self.course.preview = None
+
+    def _forget_when(self) -> None:
+        """Forget when what was: it counts no more, or times of before mean nothing."""
+        self.guard.forgive()
+        self._last_fault, self._braked, self._coasts_until = None, None, 0
+        self._fault_times.clear()
 
     # What odometry says
 

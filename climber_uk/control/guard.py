@@ -135,6 +135,10 @@ class Guard:
         self.faults: deque[int] = deque()  # [ns] stamps
         self.restart()
 
+    def forgive(self) -> None:
+        """Forget the faults there were."""
+        self.faults.clear()
+
     def restart(self) -> None:
         """Watch from now on."""
         self._too_fast = 0

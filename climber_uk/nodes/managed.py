@@ -113,10 +113,12 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         return self.on_cleanup(state)
 
     def on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """Become active or inactive."""
+        """Become active or inactive; what is active already, and may have given up, begins anew."""
         wanted = ACTIVE if request.data else INACTIVE
         try:
-            if self.life != wanted:
+            if self.life == wanted:
+                self.act(bool(request.data))
+            else:
                 self.trigger_activate() if request.data else self.trigger_deactivate()
         except RCLError:  # not from this state
             self.get_logger().warning(f"cannot become {wanted}: {self.life}")

@@ -171,6 +171,21 @@ def test_a_clock_that_went_back_by_a_little_is_ridden_out(loop, back):
     assert loop.follower.course.position(loop.follower.stamp) == here + 2 * PERIOD
 
 
+def test_a_clock_that_was_set_back_holds_the_climber_as_before():
+    loop = Loop(safe_output="hold")
+    loop.plan()
+    loop.tell(times=20)
+    loop.follower.enable(False)
+    loop.tell()
+    real = loop.state
+    loop.state = lambda stamp: State(real(stamp).pose, 2 * real(stamp).velocity)
+    loop.tell(times=10)
+    assert is_safe(loop)  # it lets go of what the safe output seems to push
+    loop.now -= 100 * MILLISECOND
+    loop.tell(times=10)
+    assert loop.answer.torques.any()
+
+
 def test_odometry_that_stops_with_a_clock_set_back_is_noticed(loop):
     loop.now -= 3600 * SECOND
     loop.look()

@@ -196,6 +196,9 @@ def test_a_motor_that_dies_is_noticed_and_the_climber_comes_to_rest(world, side)
     climb.passes(2.0)
     assert climb.fastest() < 1.5 * FASTEST + 0.1
     assert climb.fastest(climb.now - 0.5) < 0.01
+    dies_at[0] = math.inf  # it was mended
+    climb.enable(True)
+    climb.is_in("following")
 
 
 def test_what_comes_and_goes_is_said_a_few_times_only(world):
