@@ -16,10 +16,11 @@ import numpy as np
 from limit import Limit, climber_numbers, controller_numbers
 from side_by_side import in_turns, rate, table, timed
 
-from climber_uk.analysis.closed_loop import sampled
-from climber_uk.analysis.closed_loops import BLOCK, Course, Loops
+from climber_uk.closed_loop.batch import BLOCK, Course, Loops
+from climber_uk.closed_loop.simulate import sampled
+from climber_uk.closed_loop.unicycle import Plain, advanced_often
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.controller import Controller, Law
+from climber_uk.control.control_law import Controller, Law
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.many import keep_what_is_freed
@@ -27,7 +28,6 @@ from climber_uk.mechanics.motion import Motion, Wrench
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.simulation.plain import Plain, advanced_often
 
 PAPER = Climber()
 ELLIPSE = Trajectory(Ellipse(), ConstantRate())
@@ -63,7 +63,7 @@ def open_loop(limit: Limit | None, with_numba: bool) -> dict[str, Way]:
     steps = OPEN * STEPS
     run = {"numpy": timed(lambda: advanced_often(body, motion, wrench, STEP, STEPS))}
     if with_numba:
-        from climber_uk.simulation import compiled
+        from climber_uk.closed_loop import compiled
 
         run["numba"] = timed(lambda: compiled.advanced(body, motion, wrench, STEP, STEPS))
     if limit is not None:

@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from climber_uk.analysis.campaign.campaign import Campaign, read
-from climber_uk.analysis.campaign.parts import PART, Store, computed
+from climber_uk.campaign.campaign import Campaign, read
+from climber_uk.campaign.parts import PART, Store, computed
 
 ROOT = Path(__file__).parents[1]
 MEBIBYTE = 1 << 10  # KiB

@@ -1,6 +1,6 @@
 /* The controller's law and the plain climber once more, in C: the limit for `bench/tick.py` and
  * `bench/batch.py`. Guidance, observer and limits as in climber_uk/control, the step as in
- * climber_uk/simulation/plain.py; both benchmarks refuse to run if it gives something else. */
+ * climber_uk/closed_loop/unicycle.py; both benchmarks refuse to run if it gives something else. */
 #include <math.h>
 
 typedef struct { double x, y, heading, cosine, sine, speed, yaw_rate; } Motion;

@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from robustness import ELLIPSE, IN_MOTION, PAPER, RAMPED, ours
 
-from climber_uk.analysis.closed_loop import Run, simulate
+from climber_uk.closed_loop.simulate import Run, simulate
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.mechanics.climber import State
 

@@ -11,8 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import numpy as np
-
-from climber_uk.analysis.identification_experiments import (
+from identification_experiments import (
     OFF,
     SCENARIOS,
     as_identified,

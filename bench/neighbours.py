@@ -28,7 +28,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 from sensor_msgs.msg import JointState
 
-from climber_uk.nodes.transport import RANGE, TRANSPORTS
+from climber_uk.ros.transport import RANGE, TRANSPORTS
 
 Process = subprocess.Popen[bytes]
 BIN = Path(sys.executable).parent

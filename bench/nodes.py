@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 import climber_uk
-from climber_uk.analysis.recorded_run import read_run
+from climber_uk.bags.recorded_run import read_run
 
 BIN = Path(sys.executable).parent
 CONFIG = Path(__file__).parents[1] / "config" / "climber.yaml"
@@ -37,7 +37,7 @@ import rclpy.lifecycle, diagnostic_msgs.msg, geometry_msgs.msg, nav_msgs.msg, ro
 import sensor_msgs.msg, std_msgs.msg, std_srvs.srv, trajectory_msgs.msg
 others = time.time()
 from climber_uk.nodes.{module} import {name}
-from climber_uk.nodes.transport import use_udp
+from climber_uk.ros.transport import use_udp
 ours = time.time()
 use_udp()
 rclpy.init(args=["--ros-args", "--params-file", sys.argv[1]])

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-
-from climber_uk.analysis.plant_experiments import (
+from plant_experiments import (
     EDGED,
     PUBLISHED,
     errors_by_step,
@@ -21,19 +20,20 @@ from climber_uk.analysis.plant_experiments import (
     stick_slip_period,
     swinging,
 )
+
+from climber_uk.mechanics.adhesion import Grip, NoAdhesion, Suction
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Coulomb, LuGre, Stribeck, Viscous
-from climber_uk.mechanics.hold import Grip, NoAdhesion, Suction
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import Cylinder
 from climber_uk.simulation.inputs import FellOff
-from climber_uk.simulation.machine import Machine, Parts, Physics
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
+from climber_uk.simulation.simulated_robot import Machine, Parts, Physics
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

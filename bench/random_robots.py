@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from robustness import AT_REST, BUILT, EIGHT, SLOW_GUIDANCE, ours
 
-from climber_uk.analysis.closed_loop import Link, simulate
-from climber_uk.analysis.driver.evidence import Arrival, motion_of
-from climber_uk.analysis.driver.response import respond
-from climber_uk.analysis.driver.trial import Bounds, Trial
-from climber_uk.control.follower import Answer
+from climber_uk.closed_loop.simulate import Link, simulate
+from climber_uk.control.controller import Answer
+from climber_uk.driver_check.evidence import Arrival, motion_of
+from climber_uk.driver_check.response import respond
+from climber_uk.driver_check.trial import Bounds, Trial
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Stribeck

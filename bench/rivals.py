@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from climber_uk.analysis.closed_loop import Link
+from climber_uk.closed_loop.simulate import Link
 from climber_uk.control.constraints import ConstraintSet, Guidance, demanded, tracking_error
-from climber_uk.control.controller import Command
-from climber_uk.control.follower import Answer
-from climber_uk.control.tracker import Tracker
+from climber_uk.control.control_law import Command
+from climber_uk.control.controller import Answer
+from climber_uk.control.sampled_controller import Tracker
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import arctan, cos, sin

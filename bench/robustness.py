@@ -9,21 +9,21 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from identification_experiments import SCENARIOS
 from rivals import AdaptiveGains, AdaptiveRobust, Kanayama, KanayamaGains
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
-from climber_uk.analysis.closed_loop import Controlling, Link, Run, as_commanded, simulate
-from climber_uk.analysis.identification_experiments import SCENARIOS
+from climber_uk.closed_loop.simulate import Controlling, Link, Run, as_commanded, simulate
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import ConstraintSet, Exact, Guidance
-from climber_uk.control.controller import Controller, Law
-from climber_uk.control.follower import Follower
+from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.controller import Follower
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
-from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
-from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import RestToRest

@@ -14,12 +14,12 @@ import numpy as np
 from limit import Limit, controller_numbers
 from scipy.linalg import sqrtm
 
-from climber_uk.analysis.closed_loop import sampled
+from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.constraints import CONSTRAINTS, rows
-from climber_uk.control.controller import Controller, Law, Situation
+from climber_uk.control.control_law import Controller, Law, Situation
 from climber_uk.control.model import Observer
-from climber_uk.control.pacing import Pacing
-from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State, across, along
 from climber_uk.mechanics.motion import Demand, Motion, Target, Torques, Wrench

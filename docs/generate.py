@@ -12,13 +12,13 @@ from typing import Any
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from climber_uk.analysis.metrics import GROUPS
-from climber_uk.nodes.driver_node import DriverNode
+from climber_uk.driver_check.node import DriverNode
 from climber_uk.nodes.markers import Markers
 from climber_uk.nodes.plant_simulator import PlantSimulator
-from climber_uk.nodes.running import ClimberNode
 from climber_uk.nodes.trajectory_publisher import TrajectoryPublisher
 from climber_uk.nodes.uk_torque_controller import UkTorqueController
+from climber_uk.report.metrics import GROUPS
+from climber_uk.ros.running import ClimberNode
 
 NODES: list[Callable[[], ClimberNode]] = [
     TrajectoryPublisher,

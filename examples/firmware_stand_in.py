@@ -26,15 +26,15 @@ from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import writing
-from climber_uk.nodes import plant_parts
-from climber_uk.nodes.plant_time import ASK_AGAIN, TICK
-from climber_uk.nodes.running import ClimberNode, Rhythm
-from climber_uk.nodes.transport import use_udp
+from climber_uk.parameters.declaration import check, parameter
+from climber_uk.ros import plant_parts
+from climber_uk.ros.plant_time import ASK_AGAIN, TICK
+from climber_uk.ros.running import ClimberNode, Rhythm
+from climber_uk.ros.transport import use_udp
 from climber_uk.simulation.inputs import FellOff
-from climber_uk.simulation.machine import Machine
 from climber_uk.simulation.options import Options
+from climber_uk.simulation.simulated_robot import Machine
 
 CUT, LIMITED = 1, 2  # flags
 SIGNS = np.array(MOUNTED)

@@ -22,7 +22,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace
 from launch_ros.parameter_descriptions import ParameterValue
 
-from climber_uk.analysis.parameter_file import read_file, similar
+from climber_uk.parameters.parameter_file import read_file, similar
 
 SHARE = Path(__file__).parents[1]  # of the package
 ARGUMENTS = {

@@ -13,7 +13,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 with suppress(ImportError):
     import rclpy  # noqa: F401
 
-    from climber_uk.nodes.transport import use_udp
+    from climber_uk.ros.transport import use_udp
 
     use_udp()
 

@@ -1,6 +1,7 @@
-"""Imports run downwards only, and ROS stays where the nodes are."""
+"""Imports run downwards only, in no circle, and ROS stays where the nodes are."""
 
 import ast
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -8,39 +9,56 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / "climber_uk"
+# what each room may import; docs/architecture.md draws it
+MATHEMATICS = {"parameters", "mechanics"}
+DATA = MATHEMATICS | {"control", "simulation", "messages", "closed_loop"}
 BELOW = {
     "system": set(),
-    "mechanics": set(),
-    "control": {"mechanics"},
-    "simulation": {"mechanics"},
-    "messages": {"mechanics"},
-    "analysis": {"system", "mechanics", "control", "simulation", "messages"},
-    "nodes": {"system", "mechanics", "control", "simulation", "messages", "analysis"},
+    "parameters": set(),
+    "mechanics": {"parameters"},
+    "control": MATHEMATICS,
+    "simulation": MATHEMATICS,
+    "messages": MATHEMATICS,
+    "closed_loop": MATHEMATICS | {"control", "simulation"},
+    "bags": MATHEMATICS | {"control", "messages"},
+    "ros": MATHEMATICS | {"system", "control", "simulation", "messages"},
+    "report": DATA | {"system", "bags"},
+    "identification": DATA | {"system", "bags", "report"},
+    "replay": DATA | {"system", "bags", "report"},
+    "campaign": DATA | {"system", "bags", "report"},
+    "paper": DATA | {"system", "bags", "report"},
+    "driver_check": DATA | {"system", "ros"},
+    "nodes": DATA | {"system", "ros", "bags"},
+    "demo": DATA | {"system", "ros"},
 }
-ROS_ALLOWED = {"nodes", "messages"}
+ROS_ALLOWED = {"ros", "nodes", "driver_check", "demo", "messages"}
 # what a node has no use for: importing it would make every start longer
+TOOLS = "closed_loop", "bags", "report", "identification", "campaign", "paper"
 UNUSED = {
-    "trajectory_publisher": ["control", "simulation", "analysis", "mechanics.hold"],
-    "uk_torque_controller": ["simulation", "analysis", "mechanics.shapes", "mechanics.contact"],
-    "plant_simulator": ["control", "analysis", "mechanics.shapes", "mechanics.preview"],
+    "trajectory_publisher": ["control", "simulation", "mechanics.adhesion", *TOOLS],
+    "uk_torque_controller": ["simulation", "mechanics.shapes", "mechanics.contact", *TOOLS],
+    "plant_simulator": ["control", "mechanics.shapes", "mechanics.preview", *TOOLS],
 }
+FILES = sorted(PACKAGE.rglob("*/*.py"))
+
+
+def name(file):
+    """Dotted name of the module in a file."""
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name(file) for file in PACKAGE.rglob("*.py")}
 
 
 def imported(file):
-    """Modules that `file` imports when it runs; what is for type checkers only does not count."""
-    tree = ast.parse(file.read_text())
-    checked = [
-        n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.dump(n.test)
-    ]
-    skipped = {inner for outer in checked for inner in ast.walk(outer)}
-    for node in ast.walk(tree):
-        if node in skipped:
-            continue
+    """Modules that a file imports, those for type checkers included."""
+    for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            inner = [f"{node.module}.{alias.name}" for alias in node.names]
+            yield from [m for m in inner if m in MODULES] or [node.module]
 
 
 def is_ros(module):
@@ -48,7 +66,7 @@ def is_ros(module):
     return root == "rclpy" or root.endswith(("_msgs", "_interfaces", "_srvs"))
 
 
-@pytest.mark.parametrize("file", sorted(PACKAGE.rglob("*/*.py")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", FILES, ids=name)
 def test_imports_run_downwards(file):
     room = file.relative_to(PACKAGE).parts[0]
     modules = set(imported(file))
@@ -58,20 +76,37 @@ def test_imports_run_downwards(file):
         assert not [m for m in modules if is_ros(m)]
 
 
-@pytest.mark.parametrize("file", sorted((PACKAGE / "nodes").glob("*.py")), ids=lambda f: f.stem)
+def test_rooms_are_those_of_the_table():
+    assert {file.relative_to(PACKAGE).parts[0] for file in FILES} == set(BELOW)
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    # a room's own __init__ may gather what its modules have
+    rooms = {name(file) for file in PACKAGE.rglob("__init__.py")}
+    uses = {
+        name(file): {m for m in imported(file) if m in MODULES - rooms}
+        for file in PACKAGE.rglob("*.py")
+    }
+    tuple(graphlib.TopologicalSorter(uses).static_order())  # raises CycleError
+
+
+@pytest.mark.parametrize("file", sorted((PACKAGE / "nodes").glob("*.py")), ids=name)
 def test_nodes_do_not_import_nodes(file):
-    names = "running", "parameters", "parameter_files", "plant_topics", "plant_time", "managed"
-    names = *names, "margins", "plant_parts", "driver_node", "driver_graph", "parameter_paths"
-    names = *names, "offered_qos", "transport"
-    shared = {f"climber_uk.nodes.{name}" for name in names}
-    nodes = {m for m in imported(file) if m.startswith("climber_uk.nodes.")}
-    assert {m for m in nodes if m.count(".") == 2} <= shared
+    assert not [m for m in imported(file) if m.startswith("climber_uk.nodes.")]
 
 
-@pytest.mark.parametrize("name", UNUSED)
-def test_a_node_imports_only_what_it_uses(name):
-    code = f"import sys, climber_uk.nodes.{name}; print(*sys.modules)"
+def test_no_room_is_more_than_a_fifth_of_the_house():
+    lines = {
+        room: sum(len(f.read_text().splitlines()) for f in (PACKAGE / room).rglob("*.py"))
+        for room in BELOW
+    }
+    assert max(lines.values()) <= 0.2 * sum(lines.values()), lines
+
+
+@pytest.mark.parametrize("node", UNUSED)
+def test_a_node_imports_only_what_it_uses(node):
+    code = f"import sys, climber_uk.nodes.{node}; print(*sys.modules)"
     command = [sys.executable, "-c", code]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-    assert f"climber_uk.nodes.{name}" in said
-    assert not {f"climber_uk.{unused}" for unused in UNUSED[name]} & set(said)
+    assert f"climber_uk.nodes.{node}" in said
+    assert not {f"climber_uk.{unused}" for unused in UNUSED[node]} & set(said)

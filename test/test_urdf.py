@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.hold import Grip
 
 ROBOT = ElementTree.parse(Path(__file__).parents[1] / "urdf" / "climber.urdf").getroot()
 JOINTS = {joint.get("name"): joint for joint in ROBOT.iter("joint")}
@@ -38,7 +38,7 @@ def bodies():
 
 
 def test_joints_and_links_have_the_names_that_the_nodes_use():
-    names = pytest.importorskip("climber_uk.nodes.running").Names()
+    names = pytest.importorskip("climber_uk.ros.running").Names()
     assert [names.left_wheel_joint, names.right_wheel_joint] == list(WHEELS.values())
     assert set(WHEELS.values()) < set(JOINTS)
     assert names.base_frame in LINKS

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 pytest.importorskip("rclpy")
-from climber_uk.nodes.running import Names
+from climber_uk.ros.running import Names
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "config"

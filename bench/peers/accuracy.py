@@ -11,11 +11,11 @@ import numpy as np
 from scipy.integrate import ode
 from side_by_side import in_turns, table, timed
 
-from climber_uk.analysis.paper.consistent import PAPER_PATH
-from climber_uk.analysis.paper.drift import METHODS
-from climber_uk.analysis.paper.motion import DURATION, PRINTED_TOLERANCE, START, dormand_prince
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.paper import PrintedSystem
+from climber_uk.paper.consistent import PAPER_PATH
+from climber_uk.paper.drift import METHODS
+from climber_uk.paper.motion import DURATION, PRINTED_TOLERANCE, START, dormand_prince
+from climber_uk.paper.printed import PrintedSystem
 
 SLOW = 5  # of the rounds asked for, one in so many: as printed it takes seconds
 MOST = 1e-10  # [m] that a consistent climber may be off

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from climber_uk.control.controller import Controller
+from climber_uk.control.control_law import Controller
 from climber_uk.mechanics.elementary import tanh
 from climber_uk.mechanics.motion import Demand, Motion
 

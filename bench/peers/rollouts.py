@@ -11,12 +11,12 @@ import numpy as np
 from peers import mujoco_climber
 from side_by_side import in_turns, rate, table, timed
 
-from climber_uk.analysis.paper.consistent import PAPER_PATH, ConsistentSystem
-from climber_uk.analysis.paper.motion import DURATION, START
+from climber_uk.closed_loop.unicycle import Plain, advanced
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import State, across
 from climber_uk.mechanics.motion import Motion, Wrench, forces
-from climber_uk.simulation.plain import Plain, advanced
+from climber_uk.paper.consistent import PAPER_PATH, ConsistentSystem
+from climber_uk.paper.motion import DURATION, START
 from climber_uk.simulation.plant import Plant
 
 CONSISTENT = ConsistentSystem()

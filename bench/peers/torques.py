@@ -14,10 +14,10 @@ from side_by_side import in_turns, table, timed
 from tick import PERIOD, TICKS, WARM, WithMatrices, bare, ticks, ways, with_known_targets
 
 from climber_uk.control.constraints import CONSTRAINTS
-from climber_uk.control.controller import Controller, Law, Situation
+from climber_uk.control.control_law import Controller, Law, Situation
 from climber_uk.control.model import Observer
-from climber_uk.control.pacing import Pacing
-from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.motion import Torques, Wrench

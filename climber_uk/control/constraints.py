@@ -16,8 +16,8 @@ from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import State, across, along, no_slip
 from climber_uk.mechanics.elementary import cos, select, sin, wrapped
 from climber_uk.mechanics.motion import Demand, Motion, Target
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.reference import Reference
+from climber_uk.parameters.declaration import check, parameter
 
 REACH = 0.2  # [m] from the path, within which the exact set is expected to stay
 REST_SPEED = 1e-3  # [m/s] below which a heading cannot be told from the way a climber moves

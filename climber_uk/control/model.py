@@ -21,7 +21,7 @@ from climber_uk.mechanics.elementary import (
     wrapped,
 )
 from climber_uk.mechanics.motion import Motion, named
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.parameters.declaration import check, parameter
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
 REST = 1e-3  # [m/s] of an expected speed that is none

@@ -13,7 +13,7 @@ import numpy as np
 from climber_uk.mechanics import Array, motion, pack, unpack
 from climber_uk.mechanics.elementary import cos, sin
 from climber_uk.mechanics.motion import Bounds, Motion
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.parameters.declaration import check, parameter
 
 GRAVITY = 9.81  # [m/s²]
 DEGREE = math.pi / 180  # [rad]

@@ -6,9 +6,9 @@ A new kind of locomotion is one class and one entry. Everything broadcasts.
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from climber_uk.mechanics.adhesion import Hold
 from climber_uk.mechanics.friction import Coulomb, Friction
-from climber_uk.mechanics.hold import Hold
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.parameters.declaration import check, parameter
 
 
 class Locomotion(Protocol):

@@ -11,8 +11,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.waypoints import Waypoints
+from climber_uk.parameters.declaration import check, parameter
 
 
 class Shape(Protocol):

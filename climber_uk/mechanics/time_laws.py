@@ -11,8 +11,8 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.shapes import Shape
+from climber_uk.parameters.declaration import check, parameter
 
 
 class TimeLaw(Protocol):

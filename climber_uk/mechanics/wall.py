@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY
 from climber_uk.mechanics.elementary import cos, sin
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.parameters.declaration import check, parameter
 
 
 class Wall(Protocol):

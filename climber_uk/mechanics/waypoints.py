@@ -8,10 +8,10 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.mechanics.rounding import Rounded, rounded
 from climber_uk.mechanics.slowing import Limits, Slowed, slowed
 from climber_uk.mechanics.waypoint_file import read_waypoints
+from climber_uk.parameters.declaration import check, parameter
 
 STATIONS = 2001
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from climber_uk.mechanics.parameter import parameter
+from climber_uk.parameters.declaration import parameter
 
 
 @dataclass(frozen=True)

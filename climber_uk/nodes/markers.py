@@ -17,10 +17,10 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
-from climber_uk.nodes.running import BEST_EFFORT, RELIABLE, SLOW, ClimberNode, Rhythm, run
+from climber_uk.parameters.declaration import check, parameter
+from climber_uk.ros.running import BEST_EFFORT, RELIABLE, SLOW, ClimberNode, Rhythm, run
 
 T = TypeVar("T")
 REFERENCE, TORQUES = "reference", "wheel_torques"

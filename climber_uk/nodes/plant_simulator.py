@@ -8,18 +8,18 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.hold import Alarm
+from climber_uk.mechanics.adhesion import Alarm
 from climber_uk.messages import reading
-from climber_uk.nodes import plant_parts
-from climber_uk.nodes.margins import Margins
-from climber_uk.nodes.plant_time import PlantTime
-from climber_uk.nodes.plant_topics import PlantTopics
-from climber_uk.nodes.running import ClimberNode, run
+from climber_uk.ros import plant_parts
+from climber_uk.ros.margins import Margins
+from climber_uk.ros.plant_time import PlantTime
+from climber_uk.ros.plant_topics import PlantTopics
+from climber_uk.ros.running import ClimberNode, run
+from climber_uk.simulation.command_buffer import Schedule
 from climber_uk.simulation.inputs import FellOff, NotFinite
-from climber_uk.simulation.machine import NONE, Machine, Physics, Push
 from climber_uk.simulation.options import Options
-from climber_uk.simulation.schedule import Schedule
 from climber_uk.simulation.sensors import Sensors
+from climber_uk.simulation.simulated_robot import NONE, Machine, Physics, Push
 
 HEARD = "odom", "joint_states", "wheel_torques", "reference"  # of plant, controller and planner
 

@@ -15,12 +15,12 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.parameter import check, parameter
-from climber_uk.mechanics.plan import KINDS, Plan, planned
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
+from climber_uk.mechanics.trajectory_parameters import KINDS, Plan, planned
 from climber_uk.messages import reading, writing
-from climber_uk.nodes.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
+from climber_uk.parameters.declaration import check, parameter
+from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
 
 STANDSTILL = 0.2  # [s] of wall-clock time after which a clock that does not go on stands still
 ODOMETRY_AGE = 1.0  # [s] of an odometry that is too old to start at

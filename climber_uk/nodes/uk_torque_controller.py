@@ -15,18 +15,18 @@ from sensor_msgs.msg import FluidPressure, JointState, TimeReference
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+from climber_uk.control.build import KINDS, Choice, new_follower, settings
 from climber_uk.control.constraints import tracking_error
-from climber_uk.control.controller import Command
-from climber_uk.control.follower import Answer
+from climber_uk.control.control_law import Command
+from climber_uk.control.controller import Answer
 from climber_uk.control.safety import Mode
-from climber_uk.control.settings import KINDS, Choice, new_follower, settings
+from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip, Hold
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.hold import ADHESION, Alarm, Grip, Hold
-from climber_uk.mechanics.parameter import check, parameter
 from climber_uk.messages import reading, reading_reference, writing
-from climber_uk.nodes.managed import ManagedNode
-from climber_uk.nodes.margins import Margins
-from climber_uk.nodes.running import BEST_EFFORT, LATCHED, RELIABLE, SLOW, WALL_CLOCK, Rhythm, run
+from climber_uk.parameters.declaration import check, parameter
+from climber_uk.ros.managed import ManagedNode
+from climber_uk.ros.margins import Margins
+from climber_uk.ros.running import BEST_EFFORT, LATCHED, RELIABLE, SLOW, WALL_CLOCK, Rhythm, run
 
 LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points: to read one takes a quarter of a second
 

@@ -11,7 +11,7 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import clipped
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.parameters.declaration import check, parameter
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.parameters.declaration import check, parameter
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY, Climber, State
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.wall import Plane, Wall
-from climber_uk.simulation.body import Body, forward_speed
 from climber_uk.simulation.inputs import NO_PUSH, FellOff, Given, NotFinite, PlantState
+from climber_uk.simulation.rigid_body import Body, forward_speed
 from climber_uk.simulation.rolling import Rolling
 from climber_uk.simulation.sliding import Sliding
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.friction import LuGre
-from climber_uk.simulation.body import SETTLED, Body, forward_speed
 from climber_uk.simulation.inputs import Given
+from climber_uk.simulation.rigid_body import SETTLED, Body, forward_speed
 
 # More changes between sticking and sliding than this within one step are not followed.
 MAX_CHANGES_IN_A_STEP = 8

@@ -13,7 +13,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import rotated
 from climber_uk.mechanics.motion import Motion
-from climber_uk.mechanics.parameter import check, parameter
+from climber_uk.parameters.declaration import check, parameter
 
 
 @dataclass(frozen=True)

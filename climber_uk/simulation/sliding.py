@@ -15,9 +15,9 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.friction import LuGre, Stribeck
-from climber_uk.simulation.body import Body, forward_speed
 from climber_uk.simulation.cones import Cone, opposed
 from climber_uk.simulation.inputs import Given
+from climber_uk.simulation.rigid_body import Body, forward_speed
 
 PARTS = 8  # of a step
 AT_REST = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds

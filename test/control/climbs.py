@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from climber_uk.analysis.closed_loop import sampled
-from climber_uk.analysis.parameter_file import Values, read_file
+from climber_uk.closed_loop.simulate import sampled
+from climber_uk.control.build import new_follower
 from climber_uk.control.safety import Mode
-from climber_uk.control.settings import new_follower
-from climber_uk.mechanics import SECOND, plan
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics import trajectory_parameters as plan
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.contact import Contact, Tracked
+from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.simulation.inputs import NO_PUSH
 from climber_uk.simulation.plant import Plant
 

@@ -5,172 +5,343 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from climber_uk.control.constraints import Exact, Guidance, demanded, rows
-from climber_uk.control.controller import Controller, Law, Situation
-from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, limited
-from climber_uk.mechanics.shapes import Ellipse
+from climber_uk.closed_loop.simulate import sampled
+from climber_uk.control.constraints import Guidance
+from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.controller import Follower
+from climber_uk.control.guard import UNGUARDED
+from climber_uk.control.model import Observer
+from climber_uk.control.safety import Mode, Safety
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.motion import Wrench
+from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.mechanics.udwadia_kalaba import constraint_force
-from climber_uk.simulation.plant import Plant
 
-PAPER = Trajectory(Ellipse(), ConstantRate())
-START = State(np.array([0.0, 6.0, 0.0]), np.array([10.0, 0.0, -0.6]))
-PERIOD = 0.005  # [s]
+CIRCLE = Trajectory(Circle(), ConstantRate(rate=0.5))
+MILLISECOND = SECOND // 1000
+PERIOD = 5 * MILLISECOND
 
 
-def situation(state, held=(0.0, 0.0), disturbance=(0.0, 0.0)):
-    return Situation(state.motion, Torques(*held), Wrench(*disturbance), PERIOD)
+class Loop:
+    """A climber that is always where it should be, on a clock that the test turns."""
+
+    def __init__(self, observer=None, **safety):
+        controller = Controller(Climber(), Guidance(), Law())
+        tracker = Tracker(controller, observer or Observer(), Timing(), Pacing())
+        # it is moved by no torque
+        guard = replace(UNGUARDED, speed_margin=0.05, yaw_rate_margin=1.0)
+        self.follower = Follower(tracker, Safety(**safety), guard=guard)
+        self.now = SECOND
+        self.answer = None
+
+    def plan(self, trajectory=CIRCLE):
+        self.answer = self.follower.on_reference(self.now, sampled(trajectory, 10.0))
+
+    def state(self, stamp):
+        reference = CIRCLE.at((stamp - SECOND) / SECOND)
+        return State(reference.pose, reference.velocity)
+
+    def tell(self, stamp=None, moved=(0.0, 0.0, 0.0), times=1):
+        for _ in range(times):
+            self.now += PERIOD
+            at = self.now if stamp is None else stamp
+            state = self.state(at)
+            state = State(state.pose + np.array(moved), state.velocity)
+            self.answer = self.follower.on_odometry(self.now, at, state)
+        return self.follower.mode
+
+    def look(self, after=PERIOD):
+        self.now += after
+        self.answer = self.follower.look(self.now)
+        return self.follower.mode
 
 
-@settings(max_examples=50, deadline=None)
-@given(
-    st.floats(0, 20),
-    st.floats(-0.1, 0.1),
-    st.floats(-0.1, 0.1),
-    st.floats(5, 12),
-    st.tuples(st.floats(-30, 30), st.floats(-3, 3)),
+@pytest.fixture
+def loop():
+    loop = Loop()
+    loop.plan()
+    assert loop.tell() is Mode.FOLLOWING
+    return loop
+
+
+def is_safe(loop):
+    return loop.answer.command is None and not loop.answer.torques.any()
+
+
+def test_it_follows_odometry_and_answers_with_its_stamp(loop):
+    assert loop.answer.stamp == loop.now
+    assert loop.answer.torques.any()
+    assert loop.answer.command is not None
+
+
+def test_the_same_odometry_again_gets_the_same_answer(loop):
+    before = loop.answer
+    assert loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now)) is before
+
+
+def test_odometry_waits_for_a_reference_then_is_safe_then_is_answered():
+    loop = Loop()
+    assert loop.tell() is Mode.WAITING
+    assert loop.answer is None
+    assert loop.tell(times=25) is Mode.NO_REFERENCE
+    assert is_safe(loop)
+    loop.plan()
+    assert loop.follower.mode is Mode.FOLLOWING
+    assert loop.answer.stamp == loop.now
+
+
+def test_a_clock_that_stands_still_waits_for_the_reference_for_ever():
+    loop = Loop()
+    for _ in range(100):
+        assert loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now)) is None
+    loop.plan()
+    assert loop.answer.command is not None
+
+
+def test_a_reference_that_ends_is_missed_after_its_timeout(loop):
+    loop.follower.on_reference(loop.now, sampled(CIRCLE, -1.0))  # to 2 s
+    assert loop.tell(times=180) is Mode.FOLLOWING
+    assert loop.tell(times=30) is Mode.NO_REFERENCE
+    assert is_safe(loop)
+
+
+def test_a_reference_that_begins_later_is_no_fault(loop):
+    later = sampled(CIRCLE, 10.0)
+    begin = loop.now + SECOND
+    shifted = type(later)(
+        later.times - SECOND + begin, later.pose + 1.0, later.velocity, later.acceleration
+    )
+    loop.follower.on_reference(loop.now, shifted)
+    assert loop.tell() is Mode.NOT_BEGUN
+    assert is_safe(loop)
+    assert not loop.follower.mode.is_fault
+
+
+def test_odometry_that_stops_is_noticed_and_followed_when_it_is_back(loop):
+    assert loop.look(50 * MILLISECOND) is Mode.FOLLOWING
+    assert loop.answer is None
+    assert loop.look(60 * MILLISECOND) is Mode.NO_ODOMETRY
+    assert is_safe(loop)
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_odometry_that_never_comes_is_noticed():
+    loop = Loop()
+    assert loop.look() is Mode.WAITING
+    assert loop.look(200 * MILLISECOND) is Mode.NO_ODOMETRY
+
+
+@pytest.mark.parametrize("age", [-200, 200], ids=["future", "past"])
+def test_a_stamp_far_from_the_clock_is_refused(loop, age):
+    assert loop.tell(stamp=loop.now - age * MILLISECOND) is Mode.BAD_ODOMETRY
+    assert is_safe(loop)
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_an_odometry_that_was_overtaken_is_ignored(loop):
+    loop.tell(times=3)
+    stamp = loop.answer.stamp
+    assert loop.tell(stamp=stamp - 7 * MILLISECOND) is Mode.FOLLOWING
+    assert loop.answer is None
+    assert loop.tell() is Mode.FOLLOWING
+    assert loop.answer.stamp > stamp
+
+
+def test_a_clock_that_went_back_starts_anew(loop):
+    loop.tell(times=100)
+    loop.now = SECOND
+    assert loop.tell() is Mode.WAITING  # for a reference of the new time
+    loop.plan()
+    assert loop.tell() is Mode.FOLLOWING
+
+
+@pytest.mark.parametrize("back", [1, 20, 150])
+def test_a_clock_that_went_back_by_a_little_is_ridden_out(loop, back):
+    loop.tell(times=100)
+    position = loop.follower.course.position(loop.follower.stamp)
+    loop.now -= back * MILLISECOND
+    assert loop.tell() is Mode.FOLLOWING
+    here = loop.follower.course.position(loop.follower.stamp)
+    assert position <= here < position + PERIOD
+    loop.tell(times=2)
+    assert loop.follower.course.position(loop.follower.stamp) == here + 2 * PERIOD
+
+
+def test_a_clock_that_was_set_back_holds_the_climber_as_before():
+    loop = Loop(safe_output="hold")
+    loop.plan()
+    loop.tell(times=20)
+    loop.follower.enable(False)
+    loop.tell()
+    real = loop.state
+    loop.state = lambda stamp: State(real(stamp).pose, 2 * real(stamp).velocity)
+    loop.tell(times=10)
+    assert is_safe(loop)  # it lets go of what the safe output seems to push
+    loop.now -= 100 * MILLISECOND
+    loop.tell(times=10)
+    assert loop.answer.torques.any()
+
+
+def test_odometry_that_stops_with_a_clock_set_back_is_noticed(loop):
+    loop.now -= 3600 * SECOND
+    loop.look()
+    assert loop.look(200 * MILLISECOND) is Mode.NO_ODOMETRY
+
+
+def test_bad_odometry_is_safe_at_once(loop):
+    answer = loop.follower.on_bad_odometry(loop.now, "nan")
+    assert answer.command is None
+    assert (loop.follower.mode, loop.follower.detail) == (Mode.BAD_ODOMETRY, "nan")
+    assert loop.tell() is Mode.FOLLOWING
+
+
+@pytest.mark.parametrize("moved", [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)], ids=["place", "heading"])
+def test_a_jump_is_safe_until_odometry_agrees_with_itself(loop, moved):
+    modes = [loop.tell(moved=moved) for _ in range(5)]
+    assert modes == 4 * [Mode.JUMPED] + [Mode.FOLLOWING]
+    assert np.abs(loop.answer.torques).max() <= 20.0
+
+
+def test_a_single_wrong_odometry_never_reaches_the_wheels(loop):
+    assert loop.tell(moved=(1.0, 0.0, 0.0)) is Mode.JUMPED
+    assert is_safe(loop)
+    assert loop.tell() is Mode.JUMPED  # back again is a jump, too
+    assert loop.tell(times=4) is Mode.FOLLOWING
+
+
+def test_a_fault_forgets_what_was_learnt(loop):
+    loop.follower.tracker.disturbance = Wrench(5.0, 1.0)
+    loop.tell(moved=(1.0, 0.0, 0.0))
+    np.testing.assert_array_equal(loop.follower.tracker.disturbance, 0)
+
+
+def test_a_twist_of_zero_while_the_pose_moves_is_a_fault_until_there_is_one():
+    loop = Loop()
+    loop.plan()
+    real = loop.state
+    loop.state = lambda stamp: State(real(stamp).pose, np.zeros(3))
+    while loop.tell() is Mode.FOLLOWING:
+        assert loop.now < 2 * SECOND
+    assert loop.follower.mode is Mode.NO_TWIST
+    assert loop.tell() is Mode.NO_TWIST
+    loop.state = real
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_disabled_it_is_safe_until_it_is_enabled(loop):
+    loop.follower.enable(False)
+    assert loop.tell() is Mode.DISABLED
+    assert is_safe(loop)
+    assert not loop.follower.mode.is_fault
+    loop.follower.enable(True)
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_without_a_clock_it_follows_for_a_moment_only(loop):
+    assert loop.follower.mode is Mode.FOLLOWING
+    for _ in range(30):
+        answer = loop.follower.look(0)
+    assert loop.follower.mode is Mode.NO_CLOCK
+    assert answer.command is None
+
+
+def test_a_clock_that_comes_right_after_the_first_odometry_is_in_time():
+    loop = Loop()
+    for _ in range(30):
+        loop.follower.look(0)
+    assert loop.follower.mode is Mode.NO_CLOCK
+    # a safe output would be an answer, with which lock-step would go on
+    assert loop.follower.on_odometry(0, loop.now, loop.state(loop.now)) is None
+
+
+def test_hold_carries_the_weight_brakes_and_lets_the_brake_go_when_it_must_have_stopped():
+    loop = Loop(safe_output="hold")
+    loop.plan()
+    loop.tell(times=20)
+    weight = loop.follower.tracker.controller.climber.weight_along_wall
+    heading = loop.state(loop.now).heading
+    loop.follower.enable(False)
+    loop.tell()
+    braking = loop.answer.torques.sum() / 0.027
+    assert braking < weight * np.sin(heading) - 1.0
+    loop.look(SECOND)
+    held = loop.answer.torques.sum() / 0.027
+    assert held == pytest.approx(weight * np.sin(heading), abs=2.0)
+
+
+def test_a_new_reference_elsewhere_is_followed_within_the_limits(loop):
+    loop.plan(Trajectory(Circle(), ConstantRate(rate=0.5), origin=(0.2, 0.1)))
+    assert loop.tell() is Mode.FOLLOWING
+    assert np.abs(loop.answer.torques).max() <= 20.0
+
+
+def test_a_reference_far_away_is_refused_in_words_until_one_is_near(loop):
+    loop.plan(Trajectory(Circle(), ConstantRate(rate=0.5), origin=(3.0, 4.0)))
+    assert loop.tell() is Mode.TOO_FAR
+    assert loop.follower.mode.is_fault
+    assert is_safe(loop)
+    assert loop.follower.detail.startswith("5.00 m, from (1.00, 0.0")
+    loop.plan()
+    assert loop.tell() is Mode.FOLLOWING
+
+
+size = st.one_of(st.floats(-10, 10), st.floats(-1e6, 1e6))
+vector = st.tuples(size, size, size).map(np.array)
+event = st.one_of(
+    st.tuples(st.just("odometry"), st.integers(-(10**9), 10**9), vector, vector),
+    st.tuples(st.just("reference"), st.integers(-(10**9), 10**9), vector, vector),
+    st.tuples(st.sampled_from(["good", "look", "bad", "enable", "disable"])),
 )
-def test_the_closed_form_is_the_udwadia_kalaba_force(time, offset, turned, v, disturbance):
-    """At 1e-12: A is orthonormal and M weighs x and y alike, so Qc = M Aᵀ b - Q."""
-    climber = Climber(max_wheel_torque=1e9)
-    reference = PAPER.at(time)
-    state = State.rolling(reference.pose + np.array([offset, -offset, turned]), v, turned)
-    for constraints in (Guidance(), Exact()):
-        command = Controller(climber, constraints, Law(predict=False)).command(
-            situation(state, disturbance=disturbance), reference.target
-        )
-        A, b = rows(state, demanded(constraints, state, reference))
-        pushed = State.rolling(np.array([0.0, 0.0, state.heading]), disturbance[0], disturbance[1])
-        Q = climber.applied_force(state.heading, 1.0) + pushed.velocity
-        Qc = constraint_force(climber.mass_matrix, Q, A, b)
-        expected = [along(state.heading, Qc), across(state.heading, Qc), Qc[2]]
-        scale = 1 + np.abs(Qc).max()
-        np.testing.assert_allclose(command.constraint_force, expected, atol=1e-12 * scale)
-        torques = climber.wheel_torques(expected[0], expected[2])
-        np.testing.assert_allclose(command.torques, torques, atol=1e-12 * scale)
-        np.testing.assert_allclose(command.missing, 0, atol=1e-12 * scale)
 
 
-bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[0] + b[1]))
+@settings(deadline=None, max_examples=200)
+@given(st.lists(event, min_size=1, max_size=20), st.sampled_from(["odometry", "pose"]))
+def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source):
+    loop = Loop(Observer(velocity_source=source), safe_output="hold")
+    loop.plan()
+    for kind, *details in events:
+        loop.now += PERIOD
+        answer = None
+        if kind == "odometry":
+            shift, pose, velocity = details
+            answer = loop.follower.on_odometry(
+                loop.now, loop.now + shift // 10, State(pose, velocity)
+            )
+        elif kind == "reference":
+            shift, pose, velocity = details
+            preview = sampled(CIRCLE, 1.0)
+            moved = type(preview)(
+                preview.times + shift,
+                preview.pose + pose,
+                preview.velocity + velocity,
+                preview.acceleration,
+            )
+            answer = loop.follower.on_reference(loop.now, moved)
+        elif kind == "good":
+            answer = loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now))
+        elif kind == "look":
+            answer = loop.follower.look(loop.now)
+        elif kind == "bad":
+            answer = loop.follower.on_bad_odometry(loop.now, "bad")
+        else:
+            loop.follower.enable(kind == "enable")
+        if answer is not None:
+            assert np.abs(answer.torques).max() <= 20.0  # and not nan
 
 
-@given(st.floats(-50, 50), st.floats(-50, 50), bounds, bounds)
-def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
-    climber = Climber()
-    wrench = forces(climber, right, left)
-    *done, one, other = limited(climber, *wrench, right_bounds, left_bounds)
-    got = one, other
-    np.testing.assert_allclose(done, forces(climber, *got), atol=1e-9)
-    for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
-        assert low <= torque <= high  # not beyond it by as little as rounding
-    turn, drive = (right - left) / 2, (right + left) / 2
-    # the nearest turn that any torques within the bounds give, then the nearest drive beside it
-    turns = [(a - b) / 2 for a in right_bounds for b in left_bounds]
-    best_turn = np.clip(turn, min(turns), max(turns))
-    assert (got[0] - got[1]) / 2 == pytest.approx(best_turn, abs=1e-9)
-    lowest = max(right_bounds[0] - best_turn, left_bounds[0] + best_turn)
-    highest = min(right_bounds[1] - best_turn, left_bounds[1] + best_turn)
-    assert (got[0] + got[1]) / 2 == pytest.approx(np.clip(drive, lowest, highest), abs=1e-9)
-
-
-@settings(max_examples=300, deadline=None)
-@given(
-    st.floats(0.01, 50),
-    st.sampled_from([0.0, 30.0, 400.0]),
-    st.sampled_from([0.0, 3.0, 1000.0]),
-    st.tuples(st.floats(-12, 12), st.floats(-30, 30), st.floats(-300, 300), st.floats(-300, 300)),
-    st.tuples(st.floats(-1, 1), st.floats(-1, 1)),
-    st.booleans(),
-)
-def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
-    limit, no_load, rate, motion, shares, many
-):
-    climber = Climber(max_wheel_torque=limit, no_load_wheel_rate=no_load)
-    controller = Controller(climber, Guidance(), Law(max_torque_rate=rate))
-    v, omega, drive, turn = (np.full(3, x) for x in motion) if many else motion
-    pose = np.zeros((3, 3) if many else 3)
-    at = State.rolling(pose, v, omega)
-    held = limit * np.array(shares)
-    if many:
-        held = np.repeat(held[:, None], 3, axis=1)
-    of = Situation(at.motion, Torques(*held), Wrench(drive, turn), PERIOD)
-    for wheels in controller.command(of, PAPER.at(0.0).target).wheels, controller.holding(of, 5.0):
-        bounds = climber.torque_bounds(at)
-        for torque, before, (low, high) in zip(wheels, held, bounds, strict=True):
-            assert np.all(np.abs(torque) <= limit)
-            assert np.all((low <= torque) & (torque <= high))
-            if rate > 0:  # where the motor can hold what it held
-                nearest = np.clip(before, low, high)
-                assert np.all(np.abs(torque - nearest) <= rate * PERIOD * (1 + 1e-12) + 1e-14)
-
-
-def test_what_the_limits_take_away_is_told():
-    reference = PAPER.at(0.0)
-    for limit, is_cut in ((20.0, False), (0.2, True)):
-        controller = Controller(Climber(max_wheel_torque=limit), Guidance(), Law())
-        command = controller.command(situation(START), reference.target)
-        assert np.abs(command.torques).max() <= limit
-        assert bool(np.abs(command.missing).max() > 1e-9) is is_cut
-        demanded = controller.climber.drive_and_turn(command.torques) + command.missing
-        force = command.constraint_force
-        np.testing.assert_allclose(demanded, [force[0], force[2]], atol=1e-9)
-
-
-def test_a_dc_motor_has_less_torque_the_faster_its_wheel_and_full_torque_to_brake():
-    climber = Climber(no_load_wheel_rate=400.0)  # START turns its wheels at 364 and 377 rad/s
-    controller = Controller(climber, Guidance(), Law())
-    uphill = replace(PAPER.at(0.0), acceleration=np.array([500.0, 0.0, 0.0]))
-    torques = controller.command(situation(START), uphill.target).torques
-    rates = climber.wheel_rates(START)
-    assert (torques <= 20.0 * (1 - rates / 400.0) + 1e-12).all()
-    assert (torques > 0).all()
-    braking = replace(PAPER.at(0.0), acceleration=np.array([-500.0, 0.0, 0.0]))
-    torques = controller.command(situation(START), braking.target).torques
-    assert torques.min() == -20.0
-
-
-def test_a_torque_changes_no_faster_than_its_limit():
-    law = Law(max_torque_rate=40.0)
-    controller = Controller(Climber(), Guidance(), law)
-    hard = replace(PAPER.at(0.0), acceleration=np.array([200.0, 0.0, 50.0]))
-    held = np.array([0.3, -0.1])
-    torques = controller.command(situation(START, held), hard.target).torques
-    assert np.abs(torques - held).max() == pytest.approx(40.0 * PERIOD)
-
-
-def test_holding_torques_keep_the_climber_where_it_is():
-    climber = Climber(seal_friction_coefficient=0.0)
-    controller, plant = Controller(climber, Guidance(), Law()), Plant(climber, 0.0025)
-    state = State.rolling(np.array([0.0, 0.0, 1.0]), 0.3, 0.4)
-    for _ in range(1000):
-        torques = controller.holding(situation(state), 5.0)
-        state = plant.advance(state, np.array(torques), steps=2)
-    np.testing.assert_allclose(state.velocity, 0, atol=1e-6)
-
-
-@pytest.mark.parametrize("constraints", [Guidance(), Exact()], ids=["guidance", "exact"])
-@pytest.mark.parametrize("limit", [1.2, 20.0])
-def test_one_call_serves_many_climbers(constraints, limit):
-    random, n = np.random.default_rng(9), 40
-    climber = Climber(max_wheel_torque=limit)
-    controller = Controller(climber, constraints, Law(max_torque_rate=1000.0))
-    reference = PAPER.at(1.0)
-    pose = reference.pose + random.normal(size=(n, 3)) * 0.1
-    motion = State.rolling(pose, 8 + random.normal(size=n), random.normal(size=n)).motion
-    held, disturbance = random.normal(size=(2, n)), 10 * random.normal(size=(2, n))
-    many = Situation(motion, Torques(*held), Wrench(*disturbance), PERIOD)
-    together = controller.command(many, reference.target)
-    for i in range(n):
-        one = Situation(
-            Motion(*(float(number[i]) for number in motion)),
-            Torques(*held[:, i].tolist()),
-            Wrench(*disturbance[:, i].tolist()),
-            PERIOD,
-        )
-        alone = controller.command(one, reference.target)
-        for name in ("torques", "constraint_force", "missing"):
-            expected = getattr(alone, name)
-            got = getattr(together, name)[i]
-            np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * 100)
+def test_too_little_suction_stops_the_climber_until_it_is_back():
+    loop = Loop(least_pressure=2000.0)
+    loop.plan()
+    tracker = loop.follower.tracker
+    whole = tracker.controller
+    assert loop.tell() is Mode.FOLLOWING
+    tracker.controller = replace(whole, climber=replace(whole.climber, suction_pressure=1999.0))
+    assert loop.tell() is Mode.LOW_PRESSURE
+    assert loop.follower.mode.is_fault
+    assert is_safe(loop)
+    tracker.controller = whole
+    assert loop.tell() is Mode.FOLLOWING

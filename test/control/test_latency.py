@@ -4,19 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from identification_experiments import SCENARIOS
 
-from climber_uk.analysis.closed_loop import Link, simulate
-from climber_uk.analysis.identification_experiments import SCENARIOS
+from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.controller import Controller, Law
-from climber_uk.control.follower import Follower
+from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.controller import Follower
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
 from climber_uk.control.model import Observer
-from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
 
 BUILT = SCENARIOS["climber.yaml"]
 ENCODERS = Link(encoder_counts=4096, delay=0.005, torque_lag=0.005)

@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from climber_uk.analysis.closed_loop import sampled
+from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.controller import Controller, Law
-from climber_uk.control.follower import Follower
+from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.controller import Follower
 from climber_uk.control.model import Observer
-from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import SPEED_TIME, Mode, Safety
-from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.shapes import Circle

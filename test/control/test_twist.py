@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from identification_experiments import SCENARIOS
 
-from climber_uk.analysis.closed_loop import Link, simulate
-from climber_uk.analysis.identification_experiments import SCENARIOS
-from climber_uk.control.controller import Controller, Law
-from climber_uk.control.follower import Follower
+from climber_uk.closed_loop.simulate import Link, simulate
+from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.controller import Follower
 from climber_uk.control.model import Observer
-from climber_uk.control.pacing import Pacing
 from climber_uk.control.safety import Safety
-from climber_uk.control.tracker import Timing, Tracker
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.twist import mean_twist
 from climber_uk.mechanics.climber import State
 

@@ -1,6 +1,6 @@
 import pytest
 
-from climber_uk.mechanics.hold import Alarm
+from climber_uk.mechanics.adhesion import Alarm
 
 OK, WARNING, ERROR = 0, 1, 2
 

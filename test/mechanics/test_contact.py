@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from climber_uk.mechanics.adhesion import Grip, Hold, Magnetic
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import LOCOMOTION, Contact, Tracked
-from climber_uk.mechanics.hold import Grip, Hold, Magnetic
 
 
 def test_tracks_resist_turning_as_their_scrubbing_integrated():

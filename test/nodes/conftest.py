@@ -3,7 +3,7 @@ import json
 import pytest
 from world import World
 
-from climber_uk.analysis import replay_controller
+from climber_uk.replay import replay_controller
 
 
 @pytest.fixture

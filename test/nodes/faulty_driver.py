@@ -13,8 +13,8 @@ from std_msgs.msg import Float64MultiArray
 
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.plant_simulator import PlantSimulator
-from climber_uk.nodes.running import BEST_EFFORT, run
-from climber_uk.simulation.schedule import Schedule
+from climber_uk.ros.running import BEST_EFFORT, run
+from climber_uk.simulation.command_buffer import Schedule
 
 
 class Driver(PlantSimulator):

@@ -13,8 +13,8 @@ from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from world import CONFIG, TIMEOUT, executable
 
-from climber_uk.analysis.driver import timing
-from climber_uk.nodes.driver_node import DriverNode
+from climber_uk.driver_check import timing
+from climber_uk.driver_check.node import DriverNode
 
 pytestmark = pytest.mark.nodes
 

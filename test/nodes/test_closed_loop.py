@@ -10,12 +10,12 @@ from evo.core import metrics
 from evo.tools import file_interface
 from world import CONFIG, World, executable, inhabitants
 
-from climber_uk.analysis import export_tum
-from climber_uk.analysis.bag import read_messages
-from climber_uk.analysis.recorded_run import read_run
-from climber_uk.analysis.trajectory_errors import absolute_errors, relative_errors, way
+from climber_uk.bags.bag import read_messages
+from climber_uk.bags.recorded_run import read_run
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
+from climber_uk.report import export_tum
+from climber_uk.report.trajectory_errors import absolute_errors, relative_errors, way
 
 pytestmark = pytest.mark.nodes
 

@@ -7,8 +7,8 @@ import pytest
 from rcl_interfaces.srv import GetParameters
 from world import CONFIG, executable
 
-from climber_uk.analysis.changed_parameters import write_changed
-from climber_uk.analysis.parameter_file import read_file
+from climber_uk.parameters.changed_parameters import write_changed
+from climber_uk.parameters.parameter_file import read_file
 
 pytestmark = pytest.mark.nodes
 

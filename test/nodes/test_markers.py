@@ -12,7 +12,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.reference import Reference
 from climber_uk.messages import reading, writing
-from climber_uk.nodes.running import SLOW
+from climber_uk.ros.running import SLOW
 
 pytestmark = pytest.mark.nodes
 NAMESPACE, FRAMES = "climber_1", ("climber_1/odom", "climber_1/base_link")

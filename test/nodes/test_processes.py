@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from world import CONFIG, TIMEOUT, executable
 
-from climber_uk.analysis.recorded_run import read_run
+from climber_uk.bags.recorded_run import read_run
 
 pytestmark = pytest.mark.nodes
 

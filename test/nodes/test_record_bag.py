@@ -28,8 +28,8 @@ from std_msgs.msg import Float64MultiArray, Header, Int64, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 from world import new_domain
 
-from climber_uk.analysis.bag import read_messages
-from climber_uk.nodes.offered_qos import is_compatible, request_for
+from climber_uk.bags.bag import read_messages
+from climber_uk.ros.offered_qos import is_compatible, request_for
 
 # the wheels' generator of message types, which rclpy imports, uses deprecated modules
 pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")

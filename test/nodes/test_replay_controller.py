@@ -12,9 +12,9 @@ from std_srvs.srv import SetBool
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from world import World
 
-from climber_uk.analysis.bag import read_messages
-from climber_uk.analysis.bag_writer import BagWriter
-from climber_uk.analysis.storage import TYPESTORE
+from climber_uk.bags.bag import read_messages
+from climber_uk.bags.bag_writer import BagWriter
+from climber_uk.bags.storage import TYPESTORE
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.shapes import Circle

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from world import CONFIG, executable
 
-from climber_uk.analysis.bag import read_messages
-from climber_uk.analysis.campaign.campaign import read
-from climber_uk.analysis.campaign.parts import computed
+from climber_uk.bags.bag import read_messages
+from climber_uk.campaign.campaign import read
+from climber_uk.campaign.parts import computed
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from climber_uk.nodes.transport import LOCALHOST, ONLY_LOCAL, PROFILES, RANGE, TRANSPORTS, use_udp
+from climber_uk.ros.transport import LOCALHOST, ONLY_LOCAL, PROFILES, RANGE, TRANSPORTS, use_udp
 
 UDP, LOCAL = {TRANSPORTS: "UDPv4"}, {RANGE: "SUBNET", PROFILES: str(LOCALHOST)}
 SHARED_MEMORY = "/dev/shm/fastrtps"

@@ -12,10 +12,11 @@ from std_srvs.srv import SetBool
 from test_faults import CONTROLLER, LOCK_STEP, PLANNER, PLANT, Climb, said
 from world import CONFIG
 
-from climber_uk.analysis.parameter_file import Values, read_file
-from climber_uk.mechanics import SECOND, plan
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics import trajectory_parameters as plan
 from climber_uk.mechanics.climber import State
 from climber_uk.messages import reading, writing
+from climber_uk.parameters.parameter_file import Values, read_file
 
 pytestmark = pytest.mark.nodes
 FASTEST = 0.26  # [m/s] of the reference in config/climber.yaml

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.hold import Grip
 from climber_uk.mechanics.wall import Plane
-from climber_uk.simulation.body import Body
 from climber_uk.simulation.inputs import Given
+from climber_uk.simulation.rigid_body import Body
 from climber_uk.simulation.rolling import STIFF, Rolling
 
 RADIUS = 0.1  # [m] of the ring

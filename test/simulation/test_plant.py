@@ -7,18 +7,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from climber_uk.mechanics.adhesion import ADHESION, Grip, Magnetic
 from climber_uk.mechanics.climber import Climber, State, no_slip
 from climber_uk.mechanics.contact import LOCOMOTION, Contact, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION, Coulomb, LuGre, Stribeck, Viscous
-from climber_uk.mechanics.hold import ADHESION, Grip, Magnetic
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.udwadia_kalaba import constrained_acceleration, velocity_correction
 from climber_uk.mechanics.wall import WALLS, Cylinder, Plane
-from climber_uk.simulation.body import Body
 from climber_uk.simulation.inputs import NO_PUSH, FellOff, Given, NotFinite, PlantState
 from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.rigid_body import Body
 
 PAPER = Climber()
 UPRIGHT = State(np.array([0.0, 6.0, np.pi / 2]), np.zeros(3))

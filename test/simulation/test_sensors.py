@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from climber_uk.mechanics.adhesion import NoAdhesion
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.hold import NoAdhesion
-from climber_uk.simulation.machine import Machine, Parts, Physics
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Odometer, Sensors
+from climber_uk.simulation.simulated_robot import Machine, Parts, Physics
 
 CLIMBER = Climber()
 START = State.rolling(np.array([1.0, 2.0, 0.5]), 0.3, 0.2)

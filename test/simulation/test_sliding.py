@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from climber_uk.mechanics.adhesion import Grip, Magnetic, NoAdhesion
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION
-from climber_uk.mechanics.hold import Grip, Magnetic, NoAdhesion
 from climber_uk.mechanics.wall import Plane
-from climber_uk.simulation.body import Body
 from climber_uk.simulation.inputs import NO_PUSH, Given, PlantState
 from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.rigid_body import Body
 from climber_uk.simulation.sliding import Sliding
 
 PAPER = Climber()

@@ -1,1 +1,0 @@
-"""From a recorded bag to tables and figures."""

@@ -1,0 +1,1 @@
+"""Bags: opened, repaired, decoded, and read into runs; written."""

@@ -1,0 +1,127 @@
+"""All that a bag tells of its climbers, read in one go."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from tqdm import tqdm
+
+from climber_uk.bags import events, topics
+from climber_uk.bags.bag import Bag
+from climber_uk.bags.batches import Batch, read_batches
+from climber_uk.bags.events import Event
+from climber_uk.bags.joints import Joints
+from climber_uk.bags.recorded import Part, in_order
+from climber_uk.bags.reference import Points
+from climber_uk.bags.restarts import windows
+from climber_uk.bags.taking import TAKEN
+from climber_uk.bags.topics import Topics
+
+PATIENCE = 2.0  # [s] after which progress is told
+
+
+class Collected:
+    """What was read so far of one climber."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, list[Part]] = defaultdict(list)
+        self.joints: dict[str, list[Joints]] = defaultdict(list)
+        self.reference: list[Points] = []
+        self.parameters: list[tuple[int, dict[str, Any]]] = []  # with the log time [ns]
+        self.frames: dict[str, str] = {}  # of poses, by the topic's name
+        self.lost_previews = 0
+        self.begin, self.end = -math.inf, math.inf  # log times [ns] of its run
+
+    def take(self, name: str, batch: Batch) -> None:
+        """Take the numbers of a batch; `KeyError` or `ValueError` if it has not what it should."""
+        if name == topics.REFERENCE:
+            self.reference.append(points := Points.of(batch))
+            self.lost_previews += len(batch) - len(points.arrivals)
+        elif name == topics.PARAMETERS:
+            self.parameters += _parameters(batch)
+        elif name in (topics.TORQUES, topics.JOINTS):
+            self.joints[name].append(Joints.of(batch))
+        else:
+            self.frames.setdefault(name, batch.strings["header.frame_id"])
+            self.parts[name].append((batch.stamps, batch.log_times, *TAKEN[name](batch)))
+
+    def runs(self) -> list["Collected"]:
+        """What belongs to each run: they differ where the odometry's time starts again."""
+        stamps, arrivals, _, faults = in_order(self.parts[topics.ODOMETRY])
+        found = windows(stamps[faults == 0], arrivals[faults == 0])
+        return [self.within(*window) for window in found] if len(found) > 1 else [self]
+
+    def within(self, begin: float, end: float) -> "Collected":
+        """What was recorded between two log times [ns], with the parameters known by the end."""
+        chosen = Collected()
+        chosen.begin, chosen.end = begin, end
+        chosen.frames, chosen.lost_previews = self.frames, self.lost_previews
+        for name, parts in self.parts.items():
+            for part in parts:
+                stamps, arrivals, values, faults = part
+                mask = (begin <= arrivals) & (arrivals < end)
+                chosen.parts[name].append(
+                    (stamps[mask], arrivals[mask], values[mask], faults[mask])
+                )
+        for name, joints in self.joints.items():
+            chosen.joints[name] = [
+                part.where((begin <= part.arrivals) & (part.arrivals < end)) for part in joints
+            ]
+        chosen.reference = [
+            points.where((begin <= points.arrivals) & (points.arrivals < end))
+            for points in self.reference
+        ]
+        chosen.parameters = [told for told in self.parameters if told[0] < end]
+        return chosen
+
+
+def collect(
+    bag: Bag, names: Topics, namespaces: Sequence[str]
+) -> tuple[dict[str, Collected], list[Event]]:
+    """Return what a bag tells of the climbers in some namespaces, and all events."""
+    collected = {namespace: Collected() for namespace in namespaces}
+    takers = {
+        topic: (name, found)
+        for namespace, found in collected.items()
+        for topic, name in names.of(namespace)
+    }
+    texts = {
+        names.full(topics.DIAGNOSTICS, ""): events.statuses,
+        names.full(topics.LOG, ""): events.warnings,
+    }
+    wanted = [topic for topic in bag.types if topic in takers or topic in texts]
+    told: list[Event] = []
+    with tqdm(
+        total=bag.count(wanted), unit=" messages", delay=PATIENCE, leave=False, disable=None
+    ) as progress:
+        for topic, batch in read_batches(bag, wanted):
+            progress.update(len(batch))
+            try:
+                if topic in texts:
+                    told += texts[topic](batch)
+                else:
+                    name, found = takers[topic]
+                    found.take(name, batch)
+            except (KeyError, IndexError, ValueError) as error:
+                bag.lose(f"{topic}: messages are not what they should be ({error})")
+    return collected, told
+
+
+def _parameters(batch: Batch) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Log time [ns] and values by name, of messages with all of a node's parameters."""
+    for row, log_time in enumerate(batch.log_times.tolist()):
+        told: dict[str, Any] = {}
+        for i in range(batch.lengths["new_parameters"]):
+            place = f"new_parameters.{i}"
+            name, value = batch.strings[f"{place}.name"], f"{place}.value"
+            match int(batch[f"{value}.type"][row]):
+                case 1:
+                    told[name] = bool(batch[f"{value}.bool_value"][row])
+                case 2:
+                    told[name] = int(batch[f"{value}.integer_value"][row])
+                case 3:
+                    told[name] = float(batch[f"{value}.double_value"][row])
+                case 4:
+                    told[name] = batch.strings[f"{value}.string_value"]
+        yield log_time, told

@@ -1,0 +1,152 @@
+"""A campaign as its file tells it: everything is checked before anything runs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from climber_uk.campaign import names
+from climber_uk.campaign.distributions import (
+    Distribution,
+    Uniform,
+    distribution,
+    drawn,
+    extremes,
+)
+from climber_uk.campaign.limits import Limit
+from climber_uk.campaign.names import (
+    CONSTRAINT_SET,
+    LOSS_TIME,
+    NODES,
+    PARAMETERS,
+    PLANT,
+    SEED,
+)
+from climber_uk.campaign.scenario import Node, Scenario
+from climber_uk.mechanics import Array
+from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.parameter_file import given, load, nothing_for, read_sections, similar
+from climber_uk.simulation.options import Options
+
+SEEDS = Uniform(0, 2**31)  # that a node takes, rounded down
+
+
+@dataclass(frozen=True)
+class Size:
+    """How many runs of what length."""
+
+    runs: int = parameter(10_000, "", "how many", at_least=1)
+    seed: int = parameter(0, "", "of all that is random", at_least=0)
+    duration: float = parameter(20.0, "s", "of each", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Run k is drawn from the seed and k, whatever runs before, beside or after it."""
+
+    base: Path  # parameter file of the nodes
+    size: Size
+    scenario: Scenario
+    drawn: Mapping[str, Distribution]  # by the parameter's name
+    limits: tuple[Limit, ...]
+
+    def __post_init__(self) -> None:
+        self.scenario.course()
+        ends = {name: np.round(extremes(of), 12) for name, of in self.drawn.items()}
+        self.scenario.loops({**ends, SEED: np.zeros(2, int)})  # bounds hold between, too
+
+    def columns(self, first: int, number: int) -> dict[str, Array]:
+        """What runs from `first` on have of their own, (number,) by the parameter's name."""
+        own: dict[str, Any] = {
+            name: drawn(of, self.size.seed, name, first, number) for name, of in self.drawn.items()
+        }
+        if LOSS_TIME in own:
+            own[LOSS_TIME] = self._on_grid(own[LOSS_TIME])
+        own[SEED] = drawn(SEEDS, self.size.seed, SEED, first, number).astype(int)
+        return own
+
+    def described(self) -> dict[str, str]:
+        """All that the results depend on."""
+        size, shared = vars(self.size), self.scenario.values
+        return {
+            "climber_uk": version("climber_uk"),
+            **{name: repr(value) for name, value in {**size, **shared, **self.drawn}.items()},
+            "limits": ", ".join(map(str, self.limits)),
+        }
+
+    def _on_grid(self, times: Array) -> Array:
+        """Times [s] at which a control period begins: nodes and closed loops then agree on them."""
+        period = Node(PLANT, self.scenario.values).read(Options).control_period
+        return np.round(np.ceil(times / period) * period, 9)
+
+
+def read(path: Path, runs: int | None = None) -> Campaign:
+    """Campaign of a file, with so many `runs` if that is given.
+
+    Raises `ValueError` or `OSError` naming the file, and what is wrong in it.
+    """
+    try:
+        tree = load(path.read_text(encoding="utf-8"))
+        return _campaign(tree, path.parent, {} if runs is None else {"runs": runs})
+    except (yaml.YAMLError, ValueError) as error:
+        raise ValueError(f"{path}: {' '.join(str(error).split())}") from None
+
+
+def _campaign(tree: Any, directory: Path, instead: dict[str, int]) -> Campaign:
+    if not isinstance(tree, dict):
+        raise ValueError("must have base, parameters and limits")
+    given = {**tree, **instead}
+    base = directory / str(given.pop("base", "base is missing"))
+    parameters = given.pop("parameters", {})
+    limits = given.pop("limits", [])
+    if not (isinstance(parameters, dict) and isinstance(limits, list) and limits):
+        raise ValueError("parameters must be names with values, limits a list with one at least")
+    size = _size(given)
+    shared, own = _read_base(base), {}
+    for name, value in parameters.items():
+        if not isinstance(value, dict) or [*value] == ["fixed"]:
+            plain = value["fixed"] if isinstance(value, dict) else value
+            shared[name] = names.fixed(name, plain)
+            continue
+        try:
+            own[name] = distribution(value)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    constraints = shared.get(CONSTRAINT_SET, PARAMETERS[CONSTRAINT_SET].default)
+    for name in own:
+        names.check_drawn(name, constraints)
+    scenario = Scenario(shared, size.duration)
+    return Campaign(base, size, scenario, own, tuple(Limit.read(text) for text in limits))
+
+
+def _size(given: dict[str, Any]) -> Size:
+    for name, value in given.items():
+        if name not in Size.__dataclass_fields__:
+            raise ValueError(f"{name} is not one of base, runs, seed, duration, parameters, limits")
+        default = getattr(Size, name)
+        given[name] = names.typed(name, value, default)
+    return Size(**given)
+
+
+def _read_base(path: Path) -> dict[str, Any]:
+    """Parameters of all nodes that matter, by full name."""
+    found = {}
+    sections = read_sections(path)
+    for node in NODES:
+        here = given(sections, f"/{node}")
+        if not here:
+            raise ValueError(nothing_for(f"/{node}", path, sections))
+        for name, (value, is_shared) in here.items():
+            if f"{node}.{name}" in PARAMETERS:
+                found[f"{node}.{name}"] = value
+            elif not is_shared and name.split(".")[0] not in names.NODES_ONLY:
+                meant = similar(f"{node}.{name}", PARAMETERS)
+                raise ValueError(f"{path}: {node}.{name} is not a parameter of it{meant}")
+    return found

@@ -1,0 +1,78 @@
+"""What is told of each run, and the limits within which it is a success."""
+
+import operator
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from climber_uk.closed_loop.outcome import Outcome
+from climber_uk.mechanics import Array
+
+METRICS: dict[str, tuple[str, Callable[[Outcome], Array]]] = {
+    "rms_distance": ("m", lambda outcome: outcome.rms),
+    "max_distance": ("m", lambda outcome: outcome.worst),
+    "end_distance": ("m", lambda outcome: outcome.last),
+    "settling_time": ("s", lambda outcome: outcome.settled),
+    "peak_torque": ("N m", lambda outcome: outcome.peak_torque),
+    "saturation": ("%", lambda outcome: 100 * outcome.saturated),
+    "lowest_slip_margin": ("", lambda outcome: outcome.slip_margin),
+    "lowest_tip_margin": ("", lambda outcome: outcome.tip_margin),
+    "fell": ("", lambda outcome: np.isfinite(outcome.fell).astype(float)),
+    "fall_time": ("s", lambda outcome: outcome.fell),
+}
+RELATIONS: dict[str, Callable[[Any, Any], Any]] = {
+    "<=": operator.le,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "<": operator.lt,
+    ">": operator.gt,
+}
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A metric, and the bound within which it must be."""
+
+    metric: str
+    relation: str
+    bound: float
+
+    @classmethod
+    def read(cls, text: Any) -> "Limit":
+        """Limit as a file tells it; `ValueError` if it does not."""
+        found = re.fullmatch(r"\s*(\w+)\s*([<>=]+)\s*(\S+)\s*", str(text))
+        try:
+            metric, relation, bound = found.groups() if found else ("", "", "")
+            limit = cls(metric, relation, float(bound))
+        except ValueError:
+            raise ValueError(f"{text!r} must be like 'max_distance < 0.05'") from None
+        if metric not in METRICS:
+            raise ValueError(f"{metric} of {text!r} must be one of {', '.join(METRICS)}")
+        if relation not in RELATIONS or not np.isfinite(limit.bound):
+            raise ValueError(f"{text!r} must have one of {' '.join(RELATIONS)}, and a number")
+        return limit
+
+    def __str__(self) -> str:
+        return f"{self.metric} {self.relation} {self.bound:.12g}"
+
+    def holds(self, values: Array) -> Any:
+        """Whether each of some values (n,) of the metric is within; nan is not."""
+        return RELATIONS[self.relation](values, self.bound)
+
+    def excess(self, values: Array) -> Array:
+        """How far each of some values (n,) is on the wrong side; nan is furthest."""
+        over = values - self.bound
+        over = {"<": over, ">": -over, "=": np.abs(over)}[self.relation[0]]
+        return np.where(np.isnan(over), np.inf, over)
+
+
+def verdicts(limits: tuple[Limit, ...], metrics: dict[str, Array]) -> list[str]:
+    """Of each run: 'ok', or the limits that it broke."""
+    held = np.array([limit.holds(metrics[limit.metric]) for limit in limits])
+    return [
+        "; ".join(str(limit) for limit, holds in zip(limits, run, strict=True) if not holds) or "ok"
+        for run in held.T
+    ]

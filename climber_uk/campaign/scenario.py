@@ -1,0 +1,105 @@
+"""Closed loops of what the parameters of the nodes say."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from climber_uk.campaign.names import (
+    CONTROLLER,
+    PARAMETERS,
+    PLANNER,
+    PLANT,
+    REQUIRED,
+    SEED,
+    WITHOUT,
+)
+from climber_uk.closed_loop.batch import Change, Course, Loops
+from climber_uk.control.build import settings
+from climber_uk.mechanics.adhesion import Grip
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.trajectory_parameters import planned
+from climber_uk.parameters.parameter_file import Values
+from climber_uk.simulation.options import Options
+from climber_uk.simulation.sensors import Sensors
+from climber_uk.simulation.simulated_robot import Physics
+
+T = TypeVar("T")
+GAUGE = 0.05  # [s] between two messages on `suction_pressure`
+
+
+@dataclass(frozen=True)
+class Node:
+    """Parameters of one node; `read` raises `ValueError` naming parameter, value and bound."""
+
+    name: str
+    values: Mapping[str, Any]  # by full name, of all nodes
+
+    def read(self, kind: type[T], prefix: str = "") -> T:
+        """Instance of `kind`."""
+        own = f"{self.name}."
+        mine = {n.removeprefix(own): v for n, v in self.values.items() if n.startswith(own)}
+        try:
+            return Values(mine).read(kind, prefix)
+        except ValueError as error:
+            raise ValueError(f"{own}{error}") from None
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What all runs share; raises `ValueError` if closed loops by the thousand cannot have it."""
+
+    values: Mapping[str, Any]  # of parameters, by full name
+    duration: float  # [s]
+
+    def __post_init__(self) -> None:
+        defaults = {name: PARAMETERS[name].default for name in REQUIRED} | WITHOUT
+        for name, wanted in (REQUIRED | WITHOUT).items():
+            value = self.values.get(name, defaults[name])
+            if value != wanted:
+                raise ValueError(f"{name}={value!r} must be {wanted!r} in a campaign")
+
+    def course(self) -> Course:
+        """Where to, for how long and how often; raises as `Node.read` does."""
+        options = Node(PLANT, self.values).read(Options)
+        trajectory = planned(Node(PLANNER, self.values).read)
+        return Course(trajectory, self.duration, options.control_period, options.steps)
+
+    def loops(self, own: Mapping[str, Any]) -> Loops:
+        """Loops with their `own` values (n,) of some parameters; raises as `Node.read` does."""
+        values = {**self.values, **own}
+        plant = Node(PLANT, values)
+        climber, number = plant.read(Climber), len(own[SEED])
+        controller, observer, timing, _ = settings(Node(CONTROLLER, values), pressure=None)
+        return Loops(
+            start=_start(plant.read(Options), number),
+            climber=climber,
+            controller=controller,
+            observer=observer,
+            sensors=plant.read(Sensors),
+            seeds=own[SEED],
+            changes=_changes(climber, plant.read(Physics), number),
+            timing=timing,
+            contact=Contact(grip=plant.read(Grip)),
+            gauge=GAUGE,
+        )
+
+
+def _start(options: Options, number: int) -> Motion:
+    x, y, heading, speed, yaw_rate = (
+        np.zeros(number) + getattr(options, f"initial_{name}")
+        for name in ("x", "y", "heading", "speed", "yaw_rate")
+    )
+    return Motion(x, y, heading, np.cos(heading), np.sin(heading), speed, yaw_rate)
+
+
+def _changes(climber: Climber, physics: Physics, number: int) -> tuple[Change, ...]:
+    time = np.zeros(number) + physics.pressure_loss_time
+    if not time.any():
+        return ()
+    lost = replace(climber, suction_pressure=physics.pressure_loss_level)
+    return (Change(np.where(time == 0, math.inf, time), lost),)

@@ -1,0 +1,1 @@
+"""Controller and simulated robot in one process: one, or thousands at once."""

@@ -1,0 +1,163 @@
+"""Controller and plant in one process, with what lies between them: lock-step without messages.
+
+The same `Follower` and `Machine` that the nodes run, on a grid of the plant's step. Everything
+random comes from one seed.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from climber_uk.control.constraints import tracking_error
+from climber_uk.control.controller import Answer
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.simulation.motors import Motors
+from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.sensors import Sensors
+from climber_uk.simulation.simulated_robot import Machine, Parts, Physics
+
+
+@dataclass(frozen=True)
+class Link:
+    """What lies between a climber and its controller; times are multiples of `step`."""
+
+    step: float = 0.0025  # [s] of the plant
+
+    period: float = 0.005  # [s] from one odometry to the next
+    delay: float = 0.0  # [s] of a torque on its way to the wheels: no clock shows it
+    jitter: float = 0.0  # [s] most that an odometry is late; none overtakes another
+    loss: float = 0.0  # share of odometry messages that never arrive
+    position_noise: float = 0.0  # [m], standard deviation
+    heading_noise: float = 0.0  # [rad]
+    speed_noise: float = 0.0  # [m/s] forward, and of each wheel in turning
+    with_twist: bool = True
+    torque_lag: float = 0.0  # [s] of the motors, of first order
+    encoder_counts: int = 0  # a turn, of the wheels that odometry is counted from; 0: it is exact
+
+    def parts(self, plant: Plant) -> Parts:
+        """The plant with such motors and sensors."""
+        sensors = Sensors()
+        if self.encoder_counts > 0:
+            resolution = 2 * np.pi / self.encoder_counts
+            sensors = Sensors(odometry_source="wheels", encoder_resolution=resolution)
+        return Parts(plant, Motors(torque_lag=self.torque_lag), sensors, Physics())
+
+
+class Controlling(Protocol):
+    """Whatever answers odometry with torques: a `Follower`, or a rival."""
+
+    def on_reference(self, now: int, preview: Preview) -> Answer | None:
+        """Keep a reference."""
+
+    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+        """Answer an odometry."""
+
+
+def as_commanded(state: State, command: Array) -> Array:
+    """Torques of motors that do as they are told."""
+    return command
+
+
+@dataclass(frozen=True)
+class Run:
+    """What happened at n times at which odometry was due."""
+
+    time: Array  # (n,) [s]
+    pose: Array  # (n, 3) the true one
+    velocity: Array  # (n, 3)
+    error: Array  # (n, 3) along-track [m], cross-track [m], heading [rad]
+    torques: Array  # (n, 2) that acted, right, left [N m]
+
+    @property
+    def distance(self) -> Array:
+        """Distance from the reference (n,) [m]."""
+        return np.hypot(self.error[:, 0], self.error[:, 1])
+
+    def rms(self, after: float = 0.0) -> float:
+        """Root mean square of the distance from the reference, `after` [s] [m]."""
+        return float(np.sqrt(np.mean(self.distance[self.time >= after] ** 2)))
+
+    def chatter(self, after: float = 0.0) -> float:
+        """Root mean square of the torques' changes from one odometry to the next [N m]."""
+        return float(np.sqrt(np.mean(np.diff(self.torques[self.time >= after], axis=0) ** 2)))
+
+
+def simulate(
+    trajectory: Trajectory,
+    start: State,
+    duration: float,
+    controlling: Controlling,
+    climber: Climber | Callable[[float], Climber],
+    link: Link = Link(),
+    motors: Callable[[State, Array], Array] = as_commanded,
+    seed: int = 0,
+    plant_of: Callable[[Climber, float], Plant] = Plant,
+) -> Run:
+    """Run of `duration` [s] from `start`; `climber` may change with time.
+
+    `plant_of` makes the plant of a climber and a step. `motors` turn the state and what was
+    answered last into torques, at every step. A climber that starts in motion starts with the first
+    answer.
+    """
+    random = np.random.default_rng(seed)
+    climber_at = climber if callable(climber) else lambda _: climber
+    controlling.on_reference(0, sampled(trajectory, duration))
+    arriving: deque[tuple[int, int, State]] = deque()  # step of arrival, stamp, odometry
+    commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
+    acting: Array | None = None
+    rows, now_it_is = [], climber_at(0.0)
+    machine = Machine(link.parts(plant_of(now_it_is, link.step)), start, link.period)
+    every, late = round(link.period / link.step), round(link.delay / link.step)
+    for step in range(round(duration / link.step) + 1):
+        now = SECOND + round(step * link.step * SECOND)
+        if step % every == 0:
+            state = machine.state
+            error = np.array(tracking_error(state.pose, trajectory.at(step * link.step)))
+            rows.append([step * link.step, *state.pose, *state.velocity, *error, *machine.torques])
+            if step > 0:
+                machine.measure()
+            if random.random() >= link.loss:
+                arrival = step + round(random.uniform(0, link.jitter) / link.step)
+                arrival = max(arrival, arriving[-1][0]) if arriving else arrival
+                _, seen = machine.odometer.latest()
+                arriving.append((arrival, now, measured(seen, link, random)))
+        while arriving and arriving[0][0] <= step:
+            _, stamp, odometry = arriving.popleft()
+            answer = controlling.on_odometry(now, stamp, odometry)
+            if answer is not None:
+                acting = answer.torques if acting is None and start.velocity.any() else acting
+                commanded.append((step + late, answer.torques))
+        while commanded and commanded[0][0] <= step:
+            _, acting = commanded.popleft()
+        before, now_it_is = now_it_is, climber_at(step * link.step)
+        if now_it_is is not before:
+            machine.take(link.parts(plant_of(now_it_is, link.step)))
+        machine.advance(np.zeros(2) if acting is None else motors(machine.state, acting))
+    table = np.array(rows)
+    return Run(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10:12])
+
+
+def sampled(trajectory: Trajectory, duration: float) -> Preview:
+    """Preview of a whole trajectory that starts at 1 s, with points every 0.05 s."""
+    times = np.arange(0.0, duration + 2.0, 0.05)
+    reference = trajectory.at(times)
+    stamps = SECOND + np.round(times * SECOND).astype(np.int64)
+    return Preview(stamps, reference.pose, reference.velocity, reference.acceleration)
+
+
+def measured(state: State, link: Link, random: np.random.Generator) -> State:
+    """State as odometry tells it, with its noise."""
+    x, y, heading, faster, turning = random.normal(size=5)
+    offset = np.array([x, y, 0.0]) * link.position_noise
+    offset[2] = heading * link.heading_noise
+    pose = state.pose + offset
+    if not link.with_twist:
+        return State(pose, np.zeros(3))
+    speed = state.forward_speed + faster * link.speed_noise
+    return State.rolling(pose, speed, state.yaw_rate + turning * link.speed_noise)

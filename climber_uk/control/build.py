@@ -1,0 +1,70 @@
+"""The controller as its parameters say, whoever reads them: a node, or a replay of its bag."""
+
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
+
+from climber_uk.control.approach import Approach
+from climber_uk.control.constraints import CONSTRAINTS, Guidance
+from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.controller import Follower
+from climber_uk.control.guard import GuardOptions
+from climber_uk.control.model import Observer
+from climber_uk.control.safety import Safety
+from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.time_scaling import Pacing
+from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
+from climber_uk.mechanics.climber import Climber
+from climber_uk.parameters.declaration import check, parameter
+
+T = TypeVar("T")
+
+
+class Parameters(Protocol):
+    """Where parameters come from."""
+
+    def read(self, kind: type[T], prefix: str = "") -> T:
+        """Instance of `kind`; raises `ValueError` naming parameter, value and bound."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which constraints are followed, and what kind of climber follows them."""
+
+    constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
+    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+KINDS: list[tuple[type, str]] = [
+    *((kind, "") for kind in (Choice, Climber, Law, Timing, Safety, Approach)),
+    *((kind, f"{name}.") for name, kind in CONSTRAINTS.items()),
+    (Observer, "observer."),
+    (Pacing, "pacing."),
+    (GuardOptions, "guard."),
+]
+"""All that is read, with the prefix of its parameters."""
+
+
+def settings(
+    parameters: Parameters, pressure: float | None
+) -> tuple[Controller, Observer, Timing, Pacing]:
+    """What the parameters, and the measured pressure [Pa], say now."""
+    read = parameters.read
+    choice = read(Choice)
+    name, climber = choice.constraints, with_its_seal(read(Climber), choice.adhesion)
+    if pressure is not None:
+        climber = replace(climber, suction_pressure=pressure)
+    controller = Controller(climber, read(CONSTRAINTS[name], f"{name}."), read(Law))
+    return controller, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
+
+
+def new_follower(parameters: Parameters, pressure: float | None) -> Follower:
+    """Follower as the parameters say, that has seen nothing yet."""
+    read, tracker = parameters.read, Tracker(*settings(parameters, pressure))
+    follower = Follower(tracker, read(Safety), read(Approach), read(GuardOptions, "guard."))
+    name = read(Choice).adhesion
+    follower.guard.adhesion = read(ADHESION[name], f"{name}.")
+    follower.course.approach_constraints = read(Guidance, "guidance.")
+    return follower

@@ -1,0 +1,1 @@
+"""`run_demo`: all nodes and a recorder, once."""

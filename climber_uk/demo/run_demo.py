@@ -1,0 +1,303 @@
+"""`run_demo --config FILE`: the nodes and a recorder, in processes of their own, once.
+
+All of it happens on this machine, in a ROS domain of its own unless ROS_DOMAIN_ID is set.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import FluidPressure, JointState
+from std_srvs.srv import Trigger
+
+from climber_uk.mechanics import SECOND
+from climber_uk.messages import reading
+from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.parameter_file import read_file
+from climber_uk.ros.running import ClimberNode
+from climber_uk.ros.transport import use_udp
+from climber_uk.system.command_line import Parser
+from climber_uk.system.processes import die_with, dies_with_me, end
+from climber_uk.system.signals import ignore_end, on_end
+
+# One topic of each node that only the recorder subscribes, and does once it has found the node.
+FOUND = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")
+FELL = "fell off"
+Processes = dict[str, "subprocess.Popen[bytes]"]
+START_TIMEOUT = 60.0  # [s]
+STOP_TIMEOUT = 20.0  # [s] for the recorder, and then for the nodes
+HURRIED = 3.8, 1.0  # [s] the same, once more than one signal has come
+
+
+class Ended(RuntimeError):  # noqa: N818 - it is what happened
+    """A process, of a `name`, ended that should go on."""
+
+    def __init__(self, name: str, status: int) -> None:
+        super().__init__(f"{name} ended with status {status}")
+        self.name = name
+
+
+class Interrupted(Exception):  # noqa: N818 - as above
+    """A signal came."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How long the demonstration takes."""
+
+    duration: float = parameter(20.0, "s", "of the trajectory that is run", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Demo(ClimberNode):
+    """Starts the trajectories once everybody listens, and watches the time go by."""
+
+    def __init__(
+        self, climbers: Sequence[str], signals: Sequence[int], arguments: Sequence[str]
+    ) -> None:
+        super().__init__("run_demo", arguments=arguments)
+        self.climbers, self.signals = climbers, signals
+        self.processes: Processes = {}  # that have to go on
+        self.has_begun = False
+        self.parameters.declare(Options)
+        self.parameters.refuse_unknown()
+        self.duration = self.parameters.read(Options).duration
+        self.time: float | None = None  # [s] of the plant
+        self.fall = ""  # what the plant said of it
+        self.subscription(FluidPressure, f"{climbers[0]}/suction_pressure", self.on_pressure)
+        self.subscription(DiagnosticArray, "/diagnostics", self.on_diagnostics)
+        self.starters = [
+            self.create_client(Trigger, f"{climber}/trajectory_publisher/start")
+            for climber in climbers
+        ]
+
+    def on_pressure(self, message: FluidPressure) -> None:
+        """Keep the time of what is published least often."""
+        self.time = reading.nanoseconds(message.header.stamp) / SECOND
+
+    def on_diagnostics(self, message: DiagnosticArray) -> None:
+        """Note that the climber fell."""
+        for status in message.status:
+            if FELL in status.message:
+                self.fall = status.message
+
+    def recorder_has_found_all(self) -> bool:
+        """Whether the recorder knows every node, and there are starts to ask for."""
+        topics = [f"{climber}/{topic}" for climber in self.climbers for topic in FOUND]
+        return all(starter.service_is_ready() for starter in self.starters) and all(
+            self.count_publishers(topic) and self.count_subscribers(topic) for topic in topics
+        )
+
+    def wait(self, condition: Callable[[], bool], what: str) -> None:
+        """Spin until `condition()`.
+
+        Raises `RuntimeError` if a process ends, or time runs out; `Interrupted` by a signal.
+        """
+        until = time.monotonic() + START_TIMEOUT
+        while not condition():
+            rclpy.spin_once(self, timeout_sec=0.1)
+            if self.signals:
+                raise Interrupted
+            for name, process in self.processes.items():
+                if process.poll() is not None:
+                    raise Ended(name, process.returncode)
+            if time.monotonic() > until:
+                raise RuntimeError(f"waited {START_TIMEOUT:.0f} s in vain for {what}")
+
+    def start(self, simulated: bool) -> None:
+        """Start every trajectory, once everybody has found everybody; raises as `wait` does."""
+        self.wait(self.recorder_has_found_all, "the recorder to find the nodes")
+        for climber in [] if simulated else self.climbers:  # in lock-step none answers before
+            answered: list[JointState] = []
+            topic = f"{climber}/wheel_torques"
+            answers = self.subscription(JointState, topic, answered.append)
+            self.wait(partial(has_answered, answered), f"an answer on {topic}")
+            self.destroy_subscription(answers)
+        started = [starter.call_async(Trigger.Request()) for starter in self.starters]
+        self.has_begun = True
+        self.wait(lambda: all(start.done() for start in started), "the trajectories to start")
+
+    def run(self) -> None:
+        """Watch the trajectories for their duration; raises as `wait` does."""
+        self.wait(lambda: self.time is not None, "the plant")
+        first = self.time or 0.0
+        begin = shown = time.monotonic()
+        while (passed := (self.time or 0.0) - first) < self.duration and not self.fall:
+            self.wait(lambda: (self.time or 0.0) - first > passed or bool(self.fall), "the plant")
+            now = time.monotonic()
+            if now > shown + 0.5:
+                shown = now
+                print(f"\r{self.progress(passed, now - begin)}", end="", flush=True)
+        print(f"\r{self.progress(passed, time.monotonic() - begin)}")
+        if self.fall:
+            print(self.fall)
+
+    def progress(self, passed: float, wall_time: float) -> str:
+        """Return a line about the time [s] that has passed, and on the wall clock."""
+        speed = passed / wall_time
+        return f"{passed:6.1f} of {self.duration:.1f} s, {speed:4.1f} × real time"
+
+
+def has_answered(torques: list[JointState]) -> bool:
+    """Whether one of the torques answers an odometry: the safe output without one has stamp 0."""
+    return any(reading.nanoseconds(message.header.stamp) for message in torques)
+
+
+@contextmanager
+def running(
+    commands: dict[str, list[str]], logs: Path, signals: Sequence[int]
+) -> Iterator[Processes]:
+    """Processes of some commands, all ended whatever happens, the first one, a recorder, first."""
+    processes: Processes = {}
+    try:
+        for name, command in commands.items():
+            with log_of(name, logs).open("wb") as log:
+                # a session of their own: Ctrl-C comes to them from here, in good order
+                processes[name] = subprocess.Popen(
+                    command,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                    preexec_fn=dies_with_me(),
+                )
+        yield processes
+    finally:
+        # what a node sent last would be lost where its end is heard of first
+        groups = [*processes.values()][:1], [*processes.values()][1:]
+        for group, hurried in zip(groups, HURRIED, strict=True):
+            end(group, partial(patience, signals, hurried))
+
+
+def patience(signals: Sequence[int], hurried: float) -> float:
+    """How long [s] processes may take to end, or `hurried` if more than one signal has come."""
+    return hurried if len(signals) > 1 else STOP_TIMEOUT
+
+
+def log_of(name: str, logs: Path) -> Path:
+    """File that has what a process says."""
+    return logs / f"{name}.log"
+
+
+def executable(name: str, *arguments: str) -> list[str]:
+    """Command that starts an executable of this package."""
+    return [str(Path(sys.argv[0]).parent / name), *arguments]
+
+
+def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dict[str, list[str]]:
+    """Commands of the nodes by the names of their logs; climbers share one plant, and its time."""
+
+    def ros(*parameters: str, namespace: str = "") -> list[str]:
+        given = [part for parameter in parameters for part in ("-p", parameter)]
+        where = ["-r", f"__ns:={namespace}"] if namespace else []
+        return ["--ros-args", "--params-file", str(config), *where, *given]
+
+    use_sim_time = f"use_sim_time:={str(simulated).lower()}"
+    # on the wall clock a climber that starts in motion needs everybody ready
+    delay = f"start_delay:={0.0 if simulated else 0.2}"
+    commands = {}
+    for climber in climbers:
+        prefix = f"{climber.strip('/')}." if climber else ""
+        commands[prefix + "trajectory_publisher"] = executable(
+            "trajectory_publisher", *ros(use_sim_time, "autostart:=false", delay, namespace=climber)
+        )
+        commands[prefix + "uk_torque_controller"] = executable(
+            "uk_torque_controller", *ros(use_sim_time, namespace=climber)
+        )
+    commands["plant_simulator"] = executable(
+        "plant_simulator",
+        *(["--climbers", *climbers] if any(climbers) else []),
+        *ros(f"simulated_time:={str(simulated).lower()}"),
+    )
+    return commands
+
+
+def parse() -> argparse.Namespace:
+    """Return the options of the command line."""
+    parser = Parser("run_demo", __doc__)
+    parser.add_argument("--config", type=Path, required=True, help="parameter file of all nodes")
+    parser.add_argument("--output", "-o", type=Path, required=True, help="new directory")
+    parser.add_argument("--duration", type=float, help="[s] (default: that of the config)")
+    parser.add_argument(
+        "--climbers", type=int, help="how many, in namespaces climber_1, ... (default: one in none)"
+    )
+    parser.add_argument("--clock", choices=("sim", "wall"), default="sim", help="lock-step or not")
+    parser.add_argument(
+        "--with-parent", action="store_true", help="end when what started it does, as make demo"
+    )
+    return parser.arguments()
+
+
+def main() -> None:
+    """Run the demonstration; the bag is complete however it ends."""
+    options = parse()
+    signals: list[int] = []
+    on_end(lambda number, _: signals.append(number))
+    if options.with_parent:
+        die_with(os.getppid())
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    use_udp()  # the nodes and the recorder inherit it
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
+    try:
+        for node in ("trajectory_publisher", "uk_torque_controller", "plant_simulator"):
+            for climber in climbers:
+                read_file(options.config, f"{climber}/{node}")
+        options.output.mkdir(parents=True)
+    except ValueError as error:
+        sys.exit(f"run_demo: {error}")
+    except OSError as error:
+        sys.exit(f"run_demo: {error.strerror}: {error.filename}")
+    try:
+        record(options, climbers, signals)
+    finally:
+        ignore_end()
+        rclpy.try_shutdown()
+    print(f"recorded: {options.output / 'bag'}")
+
+
+def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequence[int]) -> None:
+    """Run nodes and recorder into a new directory, which is removed if nothing has begun."""
+    bag, simulated = options.output / "bag", options.clock == "sim"
+    commands = {
+        "record_bag": executable("record_bag", "--output", str(bag)),
+        **node_commands(climbers, options.config, simulated),
+    }
+    duration = ["-p", f"duration:={options.duration}"] if options.duration else []
+    arguments = ["--ros-args", "--params-file", str(options.config), *duration]
+    demo, said = None, ""
+    try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        demo = Demo(climbers, signals, arguments)
+        with running(commands, options.output, signals) as demo.processes:
+            print(f"{options.config} in ROS domain {os.environ['ROS_DOMAIN_ID']}")
+            demo.start(simulated)
+            demo.run()
+    except Interrupted:
+        said = "interrupted"
+    except Ended as error:
+        lines = log_of(error.name, options.output).read_text(errors="replace").splitlines()
+        said = f"{error}" + (f": {lines[-1]}" if lines else "")
+    except (RuntimeError, ValueError, OSError) as error:
+        said = str(error)
+    finally:
+        if demo is not None:
+            demo.destroy_node()
+    if not said:
+        return
+    if demo is not None and demo.has_begun:
+        sys.exit(f"\nrun_demo: {said}; recorded so far, and the logs: {options.output}")
+    shutil.rmtree(options.output)
+    sys.exit(f"run_demo: {said}")

@@ -1,0 +1,212 @@
+"""Checks whatever publishes `odom`, row by row, and with `--move` how it takes torques.
+
+Parameters are those of the controller: its sections of the parameter files hold here as well.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
+import rclpy
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.exceptions import ParameterException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from climber_uk.driver_check import checks, report
+from climber_uk.driver_check.evidence import Expected
+from climber_uk.driver_check.graph import is_known, others_commanding
+from climber_uk.driver_check.node import DriverNode
+from climber_uk.driver_check.trial import Bounds
+from climber_uk.mechanics.climber import Climber
+from climber_uk.messages.names import Names
+from climber_uk.parameters.changed_parameters import write_sections
+from climber_uk.parameters.parameter_file import Section, nothing_for, read_sections
+from climber_uk.parameters.parameter_files import paths
+from climber_uk.ros.running import in_a_line
+from climber_uk.ros.transport import use_udp
+from climber_uk.system.command_line import Parser
+from climber_uk.system.signals import on_end
+
+NODE, CONTROLLER = "check_driver", "uk_torque_controller"
+PATIENCE = 10.0  # [s] for a publisher to be found
+COPIES = 3  # of an odometry that waits for torques
+CATCH_UP = 0.2  # [s] to hear what came while the first report was made, and is old
+
+
+class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
+    """A signal came."""
+
+
+@contextmanager
+def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
+    """Arguments of ROS, with a file of this node's own in the place of the controller's files.
+
+    Raises `OSError`, or `ValueError` if a file has nothing for either.
+    """
+    known = {field.name for kind in (Names, Climber, Expected) for field in fields(kind)}
+    as_controller: list[Section] = []
+    own: list[Section] = []
+    files = list(paths(arguments))
+    for path in files:
+        sections = read_sections(path)
+        for section in sections:
+            where, _, node = section.name.rpartition("/")
+            if node == CONTROLLER:
+                given = {name: value for name, value in section.values.items() if name in known}
+                as_controller.append(Section(f"{where}/{NODE}", given))
+            elif node == NODE or section.is_shared:
+                own.append(section)
+        if not (as_controller or own):
+            raise ValueError(nothing_for(CONTROLLER, path, sections))
+    with NamedTemporaryFile("w", suffix=".yaml") as file:
+        write_sections([*as_controller, *own], Path(file.name))
+        first = ["--ros-args", "--params-file", file.name, "--"] if files else []
+        yield [*first, *without_files(arguments)]
+
+
+def without_files(arguments: Sequence[str]) -> Iterator[str]:
+    """Arguments but for parameter files."""
+    skipped = False
+    for word in arguments:
+        if not skipped and word != "--params-file":
+            yield word
+        skipped = word == "--params-file"
+
+
+class Spinner:
+    """Lets a node work; raises `Interrupted` once `ended()`."""
+
+    def __init__(self, node: DriverNode, ended: Callable[[], bool]) -> None:
+        self.executor, self.ended = SingleThreadedExecutor(), ended
+        self.executor.add_node(node)
+
+    def once(self) -> None:
+        """Do one thing."""
+        self.executor.spin_once(timeout_sec=0.1)
+        if self.ended():
+            raise Interrupted
+
+    def until(self, condition: Callable[[], bool], timeout: float) -> None:
+        """Go on until a condition holds, or for a time [s]."""
+        begin = time.monotonic()
+        while not condition() and time.monotonic() < begin + timeout:
+            self.once()
+
+
+def check(
+    options: argparse.Namespace, arguments: Sequence[str], ended: Callable[[], bool]
+) -> report.Report:
+    """Listen, move if wanted, and look at what was seen; raises `Interrupted`."""
+    node = DriverNode(arguments)
+    for remark in node.parameters.remarks:
+        say(remark)
+    spin = Spinner(node, ended)
+    try:
+        if options.move:
+            say(plan(node.parameters.read(Climber), node.parameters.read(Bounds)))
+        listen(node, spin, options)
+        if options.move and checks.may_move(checks.report(node.evidence())):
+            move(node, spin)
+        return checks.report(node.evidence())
+    finally:
+        node.let_go()
+        spin.executor.shutdown()
+        node.destroy_node()
+
+
+def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None:
+    """Hear odometry for a while, by the wall clock or by its stamps."""
+    spin.until(lambda: bool(node.count_publishers("odom")), PATIENCE)
+    if not node.count_publishers("odom"):
+        return
+    spin.until(lambda: node.hears, PATIENCE / 2)
+    node.arrivals.clear()  # when they came says nothing
+    if options.move and node.has_clock():
+        spin.until(lambda: node.simulated_for > 0 or len(node.arrivals) > COPIES, PATIENCE / 2)
+        if node.simulated_for == 0:  # in lock-step, and nobody answers
+            node.speak()
+    duration = options.duration
+    longest = max(duration, PATIENCE / 2) if node.has_clock() else duration
+    spin.until(lambda: node.simulated_for > duration or node.disturbs, longest)
+    if node.disturbs:
+        node.hush()
+        spin.until(lambda: node.simulated_for > duration, longest)
+
+
+def move(node: DriverNode, spin: Spinner) -> None:
+    """Try the driver."""
+    if node.torques is None and node.simulated_for > 0:  # whoever answers may not be found yet
+        spin.until(lambda: any(is_known(n) for n in others_commanding(node)), PATIENCE / 2)
+    node.speak()
+    spin.until(lambda: node.is_heard, PATIENCE / 2)
+    spin.until(lambda: False, CATCH_UP)
+    trial = node.begin_trial()
+    while trial.stage is not None:
+        spin.once()
+        node.watch(trial)
+
+
+def plan(climber: Climber, bounds: Bounds) -> str:
+    """What is going to happen to the climber."""
+    return (
+        "the climber is going to turn left, drive forward, back and turn right, some 0.1 rad and "
+        f"1 cm, by torques that rise until it moves, to {bounds.torque_share:g} of "
+        f"{climber.max_wheel_torque:g} N m at most. It is stopped at {bounds.max_travel:g} m or "
+        f"{bounds.max_turn:g} rad. Ctrl-C stops it at once."
+    )
+
+
+def say(text: str) -> None:
+    """Print a line that is no part of the report."""
+    print(f"check_driver: {text}", file=sys.stderr, flush=True)
+
+
+def positive(text: str) -> float:
+    """Number above zero."""
+    if not 0 < (value := float(text)) < float("inf"):
+        raise ValueError
+    return value
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the options of the command line."""
+    parser = Parser(
+        "check_driver",
+        __doc__,
+        "Exit status: 0 nothing failed, 1 something did, 2 it could not be checked.",
+    )
+    parser.add_argument("--move", action="store_true", help="try small torques: the climber moves")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+    parser.add_argument(
+        "--duration", type=positive, default=3.0, metavar="SECONDS", help="to listen (default: 3)"
+    )
+    return parser.arguments(arguments)
+
+
+def main() -> None:
+    """Print the report and exit with its status."""
+    caught: list[int] = []
+    on_end(lambda number, _: caught.append(number))
+    try:
+        use_udp()
+        options = parse(remove_ros_args(sys.argv)[1:])
+        with as_the_controller(sys.argv) as arguments:
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            found = check(options, arguments, lambda: bool(caught))
+    except Interrupted:
+        say("interrupted")
+        sys.exit(2)
+    except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
+        say(in_a_line(error))
+        sys.exit(2)
+    finally:
+        rclpy.try_shutdown()
+    print(report.as_json(found) if options.json else report.as_text(found))
+    sys.exit(int(report.has_failed(found)))

@@ -1,0 +1,205 @@
+"""What was seen of a driver: who publishes, what arrived and when, and which torques it was given.
+
+Stamps and times of arrival are integers in nanoseconds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from climber_uk.control.twist import TwistKind
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.motion import Motion as Rolling
+from climber_uk.messages import reading
+from climber_uk.parameters.declaration import check, parameter
+
+if TYPE_CHECKING:
+    from nav_msgs.msg import Odometry
+
+Times = NDArray[np.int64]
+PLANAR = 0, 7, 35  # x, y and about z, on the diagonal of a covariance
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What the controller is told of the driver; the same names as there."""
+
+    control_period: float = parameter(
+        0.005, "s", "from an odometry to the next", above=0, at_most=1
+    )
+    odometry_timeout: float = parameter(0.1, "s", "age at which odometry is stale", above=0)
+    transport_delay: float = parameter(
+        0.0, "s", "from a torque's publication to its action", at_least=0
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Endpoint(NamedTuple):
+    """Who publishes or subscribes a topic."""
+
+    node: str
+    kind: str  # the type's full name
+    fits: bool  # whether its QoS goes with that of the controller
+    reliable: bool
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Who is there."""
+
+    topic: str  # full name of odom
+    odometry: Sequence[Endpoint]  # publishers
+    commanded: Sequence[Endpoint]  # subscribers of wheel_torques
+    elsewhere: Sequence[str]  # other topics with odometry
+    has_clock: bool  # whether somebody publishes /clock
+
+
+class Arrival(NamedTuple):
+    """An odometry, and what the clocks said when the middleware received it [ns]."""
+
+    message: "Odometry"
+    wall: int
+    boot: int  # since the computer started
+    simulated: int  # 0: no /clock
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Odometry in numbers: n messages, each stamp once."""
+
+    stamp: Times  # (n,)
+    pose: Array  # (n, 3) x [m], y [m], θ [rad], continuous
+    twist: Array  # (n, 3) forward, to the left [m/s], about z [rad/s]
+
+    @cached_property
+    def time(self) -> Array:
+        """Time (n,) [s] since the first one."""
+        time: Array = (self.stamp - self.stamp[:1]) / SECOND
+        return time
+
+    @cached_property
+    def period(self) -> float:
+        """The usual time between two of them [s]."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+
+    @cached_property
+    def tells_means(self) -> bool:
+        """Whether twists are means of the period before, as of encoders; see `TwistKind`."""
+        kind, motions = TwistKind(), self._motions()
+        for before, now, time in zip(motions, motions[1:], np.diff(self.time), strict=False):
+            kind.learn(before, now, float(time))
+        return kind.is_mean
+
+    def _motions(self) -> list[Rolling]:
+        columns = [*self.pose.T, *np.cos(self.pose[:, 2:]).T, *np.sin(self.pose[:, 2:]).T]
+        rows = zip(*(column.tolist() for column in (*columns, *self.reaction.T)), strict=True)
+        return [Rolling(*row) for row in rows]
+
+    @cached_property
+    def reaction(self) -> Array:
+        """What torques change (n, 2): forward speed [m/s], yaw rate [rad/s]."""
+        return self.twist[:, [0, 2]]
+
+
+class Command(NamedTuple):
+    """Torques from a time on."""
+
+    time: int
+    torques: Array  # (2,) right, left [N m]
+
+
+class Pulse(NamedTuple):
+    """When a pair of torques rose and fell."""
+
+    turns: bool  # τR = -τL, else τR = τL
+    begin: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What the driver was told to do."""
+
+    pulses: Sequence[Pulse]
+    commands: Sequence[Command]
+    highest: float  # [N m] torque a wheel may have been given
+    silence: tuple[int, int] | None = None  # in which it was told nothing
+    trouble: str = ""  # why it was stopped before the end
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that was seen."""
+
+    climber: Climber
+    expected: Expected
+    frames: tuple[str, str]  # that odometry should have
+    use_sim_time: bool
+    graph: Graph
+    arrivals: Sequence[Arrival]
+    trial: Trial | None = None
+
+    @cached_property
+    def stamps(self) -> Times:
+        """Stamps of all that arrived."""
+        return np.array(
+            [reading.nanoseconds(a.message.header.stamp) for a in self.arrivals], np.int64
+        )
+
+    @cached_property
+    def errors(self) -> list[str]:
+        """What is wrong with the numbers of messages."""
+        errors = []
+        for arrival in self.arrivals:
+            try:
+                _state(arrival.message)
+            except ValueError as error:
+                errors.append(str(error))
+        return errors
+
+    @cached_property
+    def covariances(self) -> Array:
+        """Planar ones (n, 6): of x, y, θ, and of their rates."""
+        return np.array(
+            [
+                [
+                    covariance[i]
+                    for covariance in (m.pose.covariance, m.twist.covariance)
+                    for i in PLANAR
+                ]
+                for m in (a.message for a in self.arrivals)
+            ]
+        ).reshape(-1, 6)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Poses and twists, of messages that are good."""
+        return motion_of(self.arrivals)
+
+
+def motion_of(arrivals: Sequence[Arrival]) -> Motion:
+    """Motion of what arrived, if all of it is good."""
+    found = {}
+    for arrival in arrivals:
+        message = arrival.message
+        state = _state(message)
+        twist = message.twist.twist
+        found[reading.nanoseconds(message.header.stamp)] = (
+            *state.pose.tolist(),
+            *(twist.linear.x, twist.linear.y, twist.angular.z),
+        )
+    table = np.array([found[stamp] for stamp in sorted(found)]).reshape(-1, 6)
+    pose = table[:, :3].copy()
+    pose[:, 2] = np.unwrap(pose[:, 2])
+    return Motion(np.array(sorted(found), np.int64), pose, table[:, 3:])
+
+
+def _state(message: "Odometry") -> State:
+    return reading.state(message, message.header.frame_id, message.child_frame_id)

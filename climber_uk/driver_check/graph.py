@@ -1,0 +1,60 @@
+"""Who publishes odometry and who listens to torques, and whether the controller would meet them."""
+
+from rclpy.duration import Infinite
+from rclpy.node import Node
+from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, ReliabilityPolicy
+from rclpy.qos import qos_check_compatible as compatibility
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from climber_uk.driver_check import listening
+from climber_uk.driver_check.evidence import Endpoint, Graph
+from climber_uk.ros.running import BEST_EFFORT
+
+# the controller's offer of torques, as the middleware knows it
+OFFERED = QoSProfile(
+    depth=10,
+    deadline=Infinite,
+    liveliness=LivelinessPolicy.AUTOMATIC,
+    liveliness_lease_duration=Infinite,
+)
+
+
+def graph(node: Node, topic: str) -> Graph:
+    """Who is there now besides `node`, which has subscribed `topic` as odom."""
+    odometry = node.get_publishers_info_by_topic("odom")
+    commanded = node.get_subscriptions_info_by_topic("wheel_torques")
+    return Graph(
+        topic=topic,
+        odometry=[_endpoint(info, info.qos_profile, BEST_EFFORT) for info in odometry],
+        commanded=[_endpoint(info, OFFERED, info.qos_profile) for info in commanded],
+        elsewhere=[
+            name
+            for name, kinds in node.get_topic_names_and_types()
+            if listening.ODOMETRY in kinds and name != topic
+        ],
+        has_clock=bool(node.count_publishers("/clock")),
+    )
+
+
+def others_commanding(node: Node) -> list[str]:
+    """Names of those that publish torques besides `node`."""
+    names = map(_name, node.get_publishers_info_by_topic("wheel_torques"))
+    return [name for name in names if name != node.get_fully_qualified_name()]
+
+
+def is_known(name: str) -> bool:
+    """Whether it is a node's name, not what stands for one that is not yet known."""
+    return "_NODE_NAME_UNKNOWN_" not in name
+
+
+def _name(info: TopicEndpointInfo) -> str:
+    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+
+
+def _endpoint(info: TopicEndpointInfo, offered: QoSProfile, wanted: QoSProfile) -> Endpoint:
+    return Endpoint(
+        node=_name(info),
+        kind=info.topic_type,
+        fits=compatibility(offered, wanted)[0] != QoSCompatibility.ERROR,
+        reliable=info.qos_profile.reliability == ReliabilityPolicy.RELIABLE,
+    )

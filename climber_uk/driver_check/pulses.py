@@ -1,0 +1,142 @@
+"""Pairs of wheel torques that move a climber a little, whatever it is made of.
+
+    τ = k t until it moves, then τ falls at the same rate until it stops
+
+so that nobody has to know how much friction and weight there are, and none gets more than it takes.
+Times are in seconds.
+"""
+
+from typing import Protocol
+
+import numpy as np
+
+from climber_uk.driver_check.response import PAIR, expected_gain
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.elementary import clipped, wrapped
+
+GOALS = np.array([0.05, 0.2])  # [m/s], [rad/s] at which torques fall again: some 1 cm, 0.1 rad
+PLACES = np.array([0.01, 0.05])  # [m], [rad] at which they do if no speed is told
+# [s] from the first motion to those goals, by the model: friction helps to stop a drive
+RISE_TIMES = 0.06, 0.1
+RISE_PERIODS = 4.0  # and at least so many odometry messages
+LOWEST = 1.5  # times the highest level: √2 stops what nothing else brakes
+STOPPED = 0.1  # of the highest speed, at which what is left is damped
+RUNAWAY = 4.0  # of the goals, of which 2 are reached: damp at once
+DAMPING_TIME, REST_TIME = 0.1, 1.0  # [s] of the motion that is left, and the longest
+AT_REST = 0.05  # of the goals
+PUSH_TIME, PUSHED_BY = 0.15, 0.5  # [s], [rad/s²]: a turn that is left alone
+LOOK_TIME = 0.25  # [s] for which it is looked at after the watchdog's time
+
+
+class Stage(Protocol):
+    """What is commanded for a while."""
+
+    def torques(self, time: float, state: State) -> Array | None:
+        """Torques (2,) right, left [N m] at a time since the stage's begin; None: say nothing."""
+
+    def finish(self) -> None:
+        """Do nothing more but damp what motion there is."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the stage is over."""
+
+
+class Pulse:
+    """A pair of torques that rises, falls and damps what motion is left."""
+
+    def __init__(
+        self, turns: bool, sign: float, climber: Climber, period: float, limit: float
+    ) -> None:
+        self.turns, self.direction, self.limit = turns, sign * PAIR[int(turns)], limit
+        channel = int(turns)
+        rise_time = max(RISE_TIMES[channel], RISE_PERIODS * period)
+        self.goals = GOALS * min(1.0, RISE_TIMES[channel] / rise_time)
+        needed = self.goals / expected_gain(climber)  # [N m s] to come to the goals
+        self.rate = float(2 * needed[channel]) / rise_time**2  # k [N m/s]
+        # at a goal [N m]
+        self.damping = float(needed[channel]) / max(DAMPING_TIME, RISE_PERIODS * period)
+        self.longest_step, self.last = 2 * period, 0.0
+        self.start: State | None = None
+        self.rests, self.rested_at = False, 0.0
+        self.top = self.level = self.highest = 0.0
+        self.reacts, self.sign = int(turns), sign  # which speed reacts, and which way
+        self.falls = self.done = False
+
+    def torques(self, time: float, state: State) -> Array:
+        """Torques of now."""
+        self.start = self.start or state
+        # what was missed is not made up for: nobody saw what the torque did meanwhile
+        step, self.last = min(time - self.last, self.longest_step), time
+        shares = np.array([float(state.forward_speed), float(state.yaw_rate)]) / self.goals
+        if self.rests:
+            level = self.rest(shares)
+        elif self.falls:
+            level = self.fall(shares, step)
+        else:
+            level = self.rise(state, shares, step)
+        self.level = clipped(level, -self.limit, self.limit)
+        return self.level * self.direction
+
+    def rise(self, state: State, shares: Array, step: float) -> float:
+        """Level until something moves, or the limit is reached."""
+        assert self.start is not None
+        way = state.pose - self.start.pose
+        places = np.array([np.hypot(*way[:2]), abs(wrapped(float(way[2])))])
+        moves = np.abs(shares).max() >= 1 or (places >= PLACES).any()
+        if moves or self.level >= self.limit:
+            self.falls, self.top = True, self.level
+            self.reacts = int(np.argmax(np.abs(shares)))
+            self.sign = float(np.sign(shares[self.reacts])) or self.sign
+            return self.level if moves else self.rest(shares)
+        return self.level + self.rate * step
+
+    def fall(self, shares: Array, step: float) -> float:
+        """Level until it has almost stopped."""
+        share = self.sign * float(shares[self.reacts])
+        self.highest = max(self.highest, share)
+        level = self.level - self.rate * step
+        stopped = share <= STOPPED * self.highest or np.abs(shares).max() > RUNAWAY
+        return self.rest(shares) if stopped or level < -LOWEST * self.top else level
+
+    def finish(self) -> None:
+        """Do nothing more but damp what motion there is."""
+        self.top = max(self.top, abs(self.level))
+        self.rests = True
+
+    def rest(self, shares: Array) -> float:
+        """Level that takes away what motion is left, little by little."""
+        self.finish()
+        self.rested_at = self.rested_at or self.last
+        at_rest = bool(np.abs(shares).max() < AT_REST)
+        self.done = at_rest or self.last - self.rested_at > REST_TIME
+        level = -self.sign * float(shares[self.reacts]) * self.damping
+        return 0.0 if self.done else clipped(level, -self.top, self.top)
+
+
+class Silence:
+    """A small turning torque, then none is commanded any more; at last the turn is damped."""
+
+    def __init__(self, torque: float, watchdog_time: float, after: Pulse) -> None:
+        self.torque, self.after = torque, after
+        self.after.top = self.after.damping
+        self.speaks_at = PUSH_TIME + watchdog_time + LOOK_TIME
+
+    def torques(self, time: float, state: State) -> Array | None:
+        """Torques of now."""
+        if time < min(PUSH_TIME, self.speaks_at):
+            return self.torque * PAIR[1]
+        if time < self.speaks_at:
+            return None
+        self.after.finish()
+        return self.after.torques(time - self.speaks_at, state)
+
+    def finish(self) -> None:
+        """Do nothing more but damp what motion there is."""
+        self.speaks_at = 0.0
+
+    @property
+    def done(self) -> bool:
+        """Whether the stage is over."""
+        return self.after.done

@@ -1,0 +1,159 @@
+"""A trial: one stage after the other, from odometry to odometry, within bounds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from climber_uk.driver_check import evidence, thresholds
+from climber_uk.driver_check.evidence import Arrival, Command, motion_of
+from climber_uk.driver_check.pulses import PUSHED_BY, Pulse, Silence, Stage
+from climber_uk.driver_check.response import expected_gain, respond
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.climber import Climber, State, along
+from climber_uk.mechanics.elementary import wrapped
+from climber_uk.messages import reading
+from climber_uk.parameters.declaration import check, parameter
+
+RECENT = 20  # messages that tell whether it stands
+ORDER = True, False, False, True  # whether each pulse turns
+LATE = (
+    0.02  # [s] or periods of odometry, whichever is more, that odometry may come later than usual
+)
+LATE_PERIODS = 4
+TRIES = 20  # of stages in all, of which a busy machine spoils some
+BACK = 0.005, 0.02  # [m], [rad] from its start at which the next pulse leads back
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """How far a trial may go."""
+
+    torque_share: float = parameter(
+        0.5, "", "of `max_wheel_torque` that a trial may command", above=0, at_most=1
+    )
+    max_travel: float = parameter(0.15, "m", "from its start, at which a trial is stopped", above=0)
+    max_turn: float = parameter(0.6, "rad", "from its start, at which a trial is stopped", above=0)
+    watchdog_time: float = parameter(
+        0.5, "s", "after which a torque must have ended if no other came", above=0
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Trial:
+    """Turns left, drives forward, back, turns right, and is silent while it turns a little.
+
+    A stage in which odometry came late, on the wall clock, is ended and tried again: nobody knows
+    from when on its torques acted.
+    """
+
+    def __init__(
+        self,
+        climber: Climber,
+        bounds: Bounds,
+        heard: Sequence[Arrival],
+        period: float,
+        on_wall_clock: bool,
+    ) -> None:
+        self.climber, self.bounds, self.heard, self.period = climber, bounds, heard, period
+        self.on_wall_clock = on_wall_clock
+        self.limit = bounds.torque_share * climber.max_wheel_torque
+        self.late = round(max(LATE, LATE_PERIODS * period) * SECOND)
+        ages = [a.wall - reading.nanoseconds(a.message.header.stamp) for a in heard]
+        self.usual_age = float(np.median(ages))  # [ns]
+        self.commands: list[Command] = []
+        self.pulses: list[evidence.Pulse] = []
+        self.silence: tuple[int, int] | None = None
+        self.trouble = ""
+        self.start: State | None = None
+        self.way = np.zeros(2)  # forward [m], turned [rad] since the start
+        self.stage: Stage | None = self.pulse(ORDER[0])
+        self.tries, self.spoilt = 1, False
+        self.begun_at = self.last = 0  # [ns] stamps: at which the stage began; the last one
+
+    def next_stage(self) -> Stage | None:
+        """The first stage that is not yet done, or none."""
+        self.tries, self.spoilt, self.begun_at = self.tries + 1, False, 0
+        if self.tries > TRIES:
+            self.stop(f"odometry came late in {TRIES - len(self.pulses)} of {TRIES} pulses")
+        if self.trouble:
+            return None
+        if len(self.pulses) < len(ORDER):
+            return self.pulse(ORDER[len(self.pulses)])
+        return self.turn_left_alone() if self.on_wall_clock and self.silence is None else None
+
+    def pulse(self, turns: bool) -> Pulse:
+        """Pulse to the left or forward at first, then to the right or back, but never far away."""
+        way, back = self.way[int(turns)], BACK[int(turns)]
+        is_second = len(self.pulses) >= len(ORDER) / 2
+        sign = -1.0 if way > back or (is_second and way > -back) else 1.0
+        return Pulse(turns, sign, self.climber, self.period, self.limit)
+
+    def turn_left_alone(self) -> Silence | None:
+        """Silence in a turn, if it is known which torque turns it."""
+        response = respond(motion_of(self.heard), self.record(), self.climber)
+        name, likeness = response.wiring
+        gain, offset = response.gains[1, 1], response.offsets[1, 1]
+        if name or likeness < thresholds.LIKENESS or not gain > 0:
+            return None
+        torque = float((PUSHED_BY - offset) / (gain * expected_gain(self.climber)[1]))
+        after = Pulse(True, 1.0, self.climber, self.period, self.limit)
+        return Silence(torque, self.bounds.watchdog_time, after) if torque <= self.limit else None
+
+    def record(self) -> evidence.Trial:
+        """What was done so far."""
+        return evidence.Trial(self.pulses, self.commands, self.limit, self.silence, self.trouble)
+
+    def stop(self, why: str) -> None:
+        """Say nothing more but zero, at once."""
+        self.stage, self.trouble = None, self.trouble or why
+
+    def torques(self, stamp: int, now: int, state: State) -> Array | None:
+        """Torques (2,) right, left [N m] that answer an odometry; None: say nothing."""
+        self.keep_within_bounds(state)
+        is_late = self.on_wall_clock and (
+            now - stamp > self.usual_age + self.late or 0 < self.last < stamp - self.late
+        )
+        self.last = stamp
+        torques: Array | None = np.zeros(2)
+        if self.stage is not None and (self.begun_at or not is_late):
+            self.begun_at = self.begun_at or stamp
+            if is_late:
+                self.spoilt = True
+                self.stage.finish()
+            torques = self.go_on(self.stage, stamp, state)
+        if torques is not None:
+            self.commands.append(Command(max(stamp, now), torques))
+        return torques
+
+    def keep_within_bounds(self, state: State) -> None:
+        """Do not begin if it moves; if it has gone too far, only damp what motion there is."""
+        if self.start is None:
+            self.start = state
+            speed, rate = np.median(np.abs(motion_of(self.heard[-RECENT:]).reaction), axis=0)
+            if speed > thresholds.STANDING_SPEED or rate > thresholds.STANDING_RATE:
+                self.stop(f"it moves already, with {speed:.2f} m/s and {rate:.2f} rad/s")
+        way = state.pose - self.start.pose
+        gone, turned = float(np.hypot(*way[:2])), wrapped(float(way[2]))
+        self.way = np.array([along(self.start.heading, way), turned])
+        if gone > self.bounds.max_travel:
+            self.trouble = self.trouble or f"it moved {gone:.3f} m, more than max_travel"
+        elif abs(turned) > self.bounds.max_turn:
+            self.trouble = self.trouble or f"it turned {abs(turned):.3f} rad, more than max_turn"
+        if self.trouble and self.stage is not None:
+            self.stage.finish()
+
+    def go_on(self, stage: Stage, stamp: int, state: State) -> Array | None:
+        """Torques of a stage, which may be its last."""
+        torques = stage.torques((stamp - self.begun_at) / SECOND, state)
+        if torques is None:
+            self.silence = self.silence[0] if self.silence else stamp, stamp
+        if stage.done:
+            if self.spoilt and isinstance(stage, Silence):
+                self.silence = None
+            elif not self.spoilt and isinstance(stage, Pulse):
+                self.pulses.append(evidence.Pulse(stage.turns, self.begun_at, stamp))
+            self.stage = self.next_stage()
+        return torques

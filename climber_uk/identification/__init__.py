@@ -1,0 +1,1 @@
+"""`identify`: parameters of a climber from a recorded motion."""

@@ -1,0 +1,111 @@
+"""Parameters and their intervals, from the coefficients that were fitted.
+
+a = (1/(m r), μ/m, c/m)      b = (d/(J r), C/J, D/J)      and with wheel angles  r  and  r/d
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from climber_uk.identification.identified import (
+    DRIVE,
+    HEADING,
+    NAMES,
+    NOTHING,
+    OF_TURNING,
+    TURN,
+    WAY,
+    Choice,
+    Identified,
+    Widths,
+)
+from climber_uk.identification.window_fit import WindowFit
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import Climber
+
+FIRST = {DRIVE: 0, TURN: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
+VISCOUS, LATE = 2, 3  # columns of (11) and (15)
+QUANTILE = 0.975  # of intervals of 95 %
+KNOWN = 0.1  # of a value, or of all that drives: the widest interval that is of use
+SURE = 2.0  # half widths of its interval, of a friction that is not left to chance
+Columns = Mapping[str, tuple[int, ...]]
+
+
+def parameters(
+    fits: Mapping[str, WindowFit], columns: Columns, climber: Climber, track: float | None = None
+) -> tuple[Array, Widths, Choice]:
+    """Values, widths, and which were sought; `track` is that of the contacts, if it is known."""
+    r, d = climber.wheel_radius, climber.half_track
+    coefficients = np.array([np.nan, 0, 0, np.nan, 0, 0, r, r / d])
+    sought, chosen = np.zeros(len(NAMES), bool), {}
+    for kind, fit in fits.items():
+        chosen[kind] = [FIRST[kind] + column for column in columns[kind] if column != LATE]
+        coefficients[chosen[kind]] = fit.coefficients[: len(chosen[kind])]
+        sought[chosen[kind]] = True
+    values, slopes = _parameters(coefficients, track), _slopes(coefficients, track)
+    squares, white, bias = [], np.zeros(len(NAMES)), np.zeros(len(NAMES))
+    freedom = np.full(len(NAMES), np.inf)  # windows more than coefficients
+    for kind, fit in fits.items():
+        own = np.zeros((len(NAMES), fit.design.shape[1]))
+        own[:, : len(chosen[kind])] = slopes[:, chosen[kind]]
+        count, spare = len(fit.ends), max(1, len(fit.ends) - fit.design.shape[1])
+        freedom = np.where(own.any(axis=1), np.minimum(freedom, spare), freedom)
+        squares.append((count - 1) / count * (fit.changes @ own.T) ** 2)
+        white += np.einsum("pi,ij,pj->p", own, fit.covariance, own)
+        bias += fit.bias(own)
+    spread = _interval(np.concatenate(squares), freedom)
+    widths = spread, student.ppf(QUANTILE, freedom) * np.sqrt(white), bias
+    known = np.isfinite(values)
+    return values, Widths(*(np.where(known, width, np.inf) for width in widths)), sought
+
+
+def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identified:
+    """The same where wheels scrub, or may: they overstate the track; moments need the contacts'.
+
+    That is the climber's; by how much it is off if it is the other one goes into the intervals.
+    """
+    number = NAMES.index("turning_friction")
+    scrubs = found.values[number] > SURE * found.half_widths[number]
+    is_told = TURN in found.fits and found.uncertainty[number] <= KNOWN
+    if HEADING not in found.fits or (is_told and not scrubs):
+        return found
+    track, effective = climber.half_track, found["half_track"]
+    values, widths, _ = parameters(found.fits, columns, climber, track)
+    known = np.isin(NAMES, OF_TURNING) & np.isfinite(values) & np.isfinite(effective)
+    bias = widths.bias.copy()
+    bias[known] += abs(effective / track - 1) * np.abs(values[known])
+    values[-1] = effective
+    wider = widths._replace(bias=bias)
+    return replace(found, values=values, widths=wider, has_effective_track=True)
+
+
+def _parameters(coefficients: Array, track: float | None) -> Array:
+    """Parameters (8,) of coefficients (8,)."""
+    a_1, a_2, a_3, b_1, b_2, b_3, r, per_track = coefficients
+    with np.errstate(all="ignore"):  # what nothing tells is not finite
+        d = r / per_track
+        m, J = 1 / (r * a_1), (track or d) / (r * b_1)
+        return np.array([m, a_2 * m, a_3 * m, J, b_2 * J, b_3 * J, r, d])
+
+
+def _slopes(coefficients: Array, track: float | None) -> Array:
+    """Of the parameters by the coefficients (8, 8); exact, by a complex step."""
+    step = 1e-20
+    moved = [_parameters(coefficients + 1j * step * unit, track) for unit in np.eye(len(NAMES))]
+    slopes = np.stack(moved, axis=1).imag / step
+    return np.where(np.isfinite(slopes), slopes, 0.0)
+
+
+def _interval(squares: Array, most: Array) -> Array:
+    """Half widths (p,) of intervals, from squares (n, p) that sum up to variances.
+
+    With as many degrees of freedom as they have if they are those of normal numbers, each with a
+    variance of its own: E x⁴ = 3 (E x²)²; `most` (p,) are possible.
+    """
+    variance = squares.sum(axis=0)
+    ratio = variance**2 / np.maximum((squares**2).sum(axis=0), NOTHING)
+    freedom = np.clip(3 * ratio - 2, 1, most)
+    half: Array = student.ppf(QUANTILE, freedom) * np.sqrt(variance)
+    return half

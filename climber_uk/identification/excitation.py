@@ -1,0 +1,135 @@
+"""A trajectory that shows a climber's mass, inertia and friction as well as limits allow.
+
+Of each candidate the torques follow from the model, and from the `integral_equations` the widths of
+the intervals that odometry with 1 mm, 1 mrad and 10 mm/s of noise would leave; the best is the one
+whose worst interval is narrowest.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from climber_uk.identification.estimation import CUT, LEAST_WINDOWS, SITE, predicted
+from climber_uk.identification.identified import DRIVE, NAMES, TURN, Identified
+from climber_uk.identification.integral_equations import Site
+from climber_uk.identification.recorded_motion import RecordedMotion
+from climber_uk.mechanics import Array, unpack
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.elementary import sign, sin
+from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line, Shape
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.parameters.declaration import check, parameter
+
+PERIOD = 0.02  # [s]
+AMPLE = 1.6  # times as many windows as there must be
+RAMPS = (0.5, 1.0, 2.0, 4.0)  # [s]
+SHOWN = ~np.isin(NAMES, ("wheel_radius", "half_track"))  # need wheel angles, and no plan
+SOUGHT = np.isin(NAMES, ("mass", "seal_friction_coefficient", "yaw_inertia"))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the trajectory may take."""
+
+    size: float = parameter(2.0, "m", "side of the square that it stays in", above=0)
+    speed: float = parameter(0.3, "m/s", "highest speed", above=0)
+    torque: float = parameter(4.0, "N m", "highest torque of a wheel", above=0)
+    duration: float = parameter(60.0, "s", "longest time", above=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A trajectory, and what it would tell."""
+
+    name: str  # of the shape
+    trajectory: Trajectory
+    tells: Identified
+
+    @property
+    def is_short(self) -> bool:
+        """Whether it has hardly windows enough, should a few be lost to noise."""
+        return min(len(self.tells.windows[kind]) for kind in (DRIVE, TURN)) < AMPLE * LEAST_WINDOWS
+
+    @property
+    def worst(self) -> float:
+        """Of the uncertainties; without end if it does not show all there may be."""
+        shown = np.where(self.tells.sought, self.tells.uncertainty, np.inf)
+        return float(shown[SHOWN].max())
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Those of `trajectory_publisher`."""
+        shape, law = asdict(self.trajectory.shape), asdict(self.trajectory.law)  # type: ignore[call-overload]
+        values = {f"{self.name}.{name}": value for name, value in shape.items()}
+        values |= {f"rest_to_rest.{name}": value for name, value in law.items()}
+        return {"shape": self.name, "time_law": "rest_to_rest", "reverse_gear": False, **values}
+
+
+def plan(
+    climber: Climber, limits: Limits, origin: tuple[float, float] = (0.0, 0.0), site: Site = SITE
+) -> Plan:
+    """The best of the candidates within the limits; `ValueError` if there is none."""
+    found = list(_plans(climber, limits, origin, site))
+    if not found:
+        raise ValueError(f"no trajectory keeps within {limits}")
+    return min(found, key=lambda one: (one.is_short, one.worst))
+
+
+def _plans(
+    climber: Climber, limits: Limits, origin: tuple[float, float], site: Site
+) -> Iterator[Plan]:
+    for name, shape in _shapes(limits.size):
+        for ramp_time in RAMPS:
+            trajectory = Trajectory(shape, _law(shape, ramp_time, limits), origin=origin)
+            if trajectory.duration > limits.duration:
+                continue
+            motion, torques = driven(trajectory, climber)
+            is_long = len(CUT.windows(motion)) >= LEAST_WINDOWS
+            if is_long and np.abs(torques).max() <= limits.torque:
+                yield Plan(name, trajectory, predicted(motion, climber, site=site))
+
+
+def _shapes(size: float) -> Iterator[tuple[str, Shape]]:
+    """Names and shapes that fit into a square of side `size` [m]."""
+    half = size / 2
+    yield "line", Line(size, np.pi / 2)
+    for share in (1.0, 0.5, 0.25):
+        yield "circle", Circle(share * half)
+        yield "ellipse", Ellipse(half, share * half)
+        yield "lemniscate", Lemniscate(half, share * half)
+        yield "lemniscate", Lemniscate(share * half, half)
+
+
+def _law(shape: Shape, ramp_time: float, limits: Limits) -> RestToRest:
+    """From rest to the highest speed and back, as often as there is time for."""
+    _, slope, *_ = shape.derivatives(np.linspace(0, shape.length, 1000))
+    rate = limits.speed / float(np.linalg.norm(slope, axis=-1).max())
+    once = RestToRest(rate=rate, ramp_time=ramp_time, pause=0.5)
+    runs = (limits.duration + once.pause) / (once.duration(shape) + once.pause)
+    return RestToRest(rate=rate, ramp_time=ramp_time, pause=0.5, runs=max(1, int(runs)))
+
+
+def driven(trajectory: Trajectory, climber: Climber) -> tuple[RecordedMotion, Array]:
+    """Motion along a trajectory, and the torques (n, 2) [N m] that (11) and (15) ask for."""
+    time = np.arange(0.0, trajectory.duration, PERIOD)
+    reference = trajectory.at(time)
+    heading, speed = np.unwrap(reference.heading), reference.speed
+    resisted = climber.seal_friction * sign(speed) + climber.weight_along_wall * sin(heading)
+    turn = climber.yaw_inertia * unpack(reference.acceleration)[2]
+    torques = climber.wheel_torques(climber.mass * reference.speed_rate + resisted, turn)
+    motion = RecordedMotion(
+        time=time,
+        pose=np.column_stack([reference.pose[:, :2], heading]),
+        rates=np.column_stack([speed, reference.yaw_rate]),
+        impulse=cumulative_trapezoid(torques, time, axis=0, initial=0),
+        pressure=np.full(len(time), climber.suction_pressure),
+        stretch=np.zeros(len(time), int),
+    )
+    return motion, torques

@@ -1,0 +1,161 @@
+"""What an identification found: parameters with intervals, and of what is not told, why."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from climber_uk.identification.integral_equations import Site
+from climber_uk.identification.recorded_motion import Indices
+from climber_uk.identification.window_fit import WindowFit
+from climber_uk.mechanics import Array
+
+Choice = NDArray[np.bool_]
+UNITS = {
+    "mass": "kg",
+    "seal_friction_coefficient": "",
+    "viscous_friction": "N s/m",
+    "yaw_inertia": "kg m²",
+    "turning_friction": "N m",
+    "turning_resistance": "N m s",
+    "wheel_radius": "m",
+    "half_track": "m",
+}
+NAMES = tuple(UNITS)
+OF_TURNING = ("yaw_inertia", "turning_friction", "turning_resistance")
+DRIVE, TURN, WAY, HEADING = "drive", "turn", "way", "heading"  # kinds of equations
+IN_TIME = (0.0, 0.0)
+NOTHING = 1e-100
+WORTH_A_WORD = 0.01  # of all that drives: least that is said not to fit
+SLIGHT = 5e-4  # the same of a weight that is not as assumed: it shows less than it is wrong
+WEIGHT = ("the weight's part across the heading", "the height")  # what pulls is not as assumed
+WORDS = {
+    DRIVE: ("the drive", "N"),
+    TURN: ("the moment", "N m"),
+    WAY: ("the wheels' way", "m/s"),
+    HEADING: ("the wheels' turn", "rad/s"),
+}
+HINTS = {
+    WEIGHT[0]: "is the wall tilted, or the centre of mass beside the centre?",
+    WEIGHT[1]: "is the wall round?",
+    "the yaw rate": "do wheels or a seal scrub?",
+    "the speed": "is friction neither Coulomb's nor viscous?",
+    "the side it turns to": "are the wheels, or their motors, unlike?",
+    "the time": "does something wear, warm up or leak?",
+}
+
+
+class Extent(NamedTuple):
+    """What drove a climber and how it moved, root mean squares of the windows' means."""
+
+    drive: float  # [N]
+    turn: float  # [N m]
+    load: float  # [N] of the seal; 1 N without one
+    speed: float  # [m/s]
+    yaw_rate: float  # [rad/s]
+    speed_spread: float  # [m/s] standard deviation of the windows' speeds
+    yaw_rate_spread: float  # [rad/s]
+
+
+class Widths(NamedTuple):
+    """How far each parameter (8,) may be off, by cause; half widths of intervals of 95 %."""
+
+    spread: Array  # what differs from window to window
+    white: Array  # noise alone
+    bias: Array  # what the model lacks
+
+    @property
+    def whole(self) -> Array:
+        """All of it (8,)."""
+        return np.maximum(self.spread, self.white) + self.bias
+
+
+class Reason(NamedTuple):
+    """Why a parameter is not told."""
+
+    cause: str  # not excited, collinear, noise, misfit, torques; or absent: nothing to be done
+    words: str
+
+
+class Lack(NamedTuple):
+    """What the equations of one kind lack, root mean squares of all windows."""
+
+    kind: str
+    ratio: float  # χ² by the number of windows: about 1 for a model that fits
+    size: float  # beyond noise [N], [N m], [m/s] or [rad/s]; 0 where the test does not fail
+    share: float  # of all that drives, or moves
+    goes_with: str  # '' where nothing explains it
+
+    @property
+    def fits(self) -> bool:
+        """Whether it is nothing, or not worth a word."""
+        return self.share <= (SLIGHT if self.goes_with in WEIGHT else WORTH_A_WORD)
+
+    @property
+    def words(self) -> str:
+        """In a sentence; `fits` or not."""
+        what, unit = WORDS[self.kind]
+        lacking = f"{self.size:.2g} {unit} of {what}, {self.share:.2g} of it, are not explained"
+        hint = HINTS.get(self.goes_with, "")
+        hint = hint and f" ({hint})"
+        return lacking + (f", and go with {self.goes_with}{hint}" if self.goes_with else "")
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Parameters in the order of `NAMES`, and what they were found from."""
+
+    values: Array  # (8,) those that were not sought are the climber's, or zero; nan: nothing tells
+    widths: Widths
+    sought: Choice  # (8,)
+    fits: Mapping[str, WindowFit]  # by kind of equation, of those with windows enough
+    extent: Extent
+    windows: Mapping[str, list[Indices]]  # the times in each, by kind
+    site: Site
+    left_out: int = 0  # windows that fit much worse than the others
+    late: tuple[float, float] = IN_TIME  # [s] delay and lag of the torques beyond what is assumed
+    has_effective_track: bool = False  # of wheels that scrub, or may
+    lacks: Sequence[Lack] = ()  # the test of fit, by kind of equation
+    reasons: Mapping[str, Reason] = field(default_factory=dict)  # by name, of what is not told
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[NAMES.index(name)])
+
+    @property
+    def half_widths(self) -> Array:
+        """Of the intervals (8,)."""
+        return self.widths.whole
+
+    @property
+    def known(self) -> Choice:
+        """Which are told (8,)."""
+        return np.array([name not in self.reasons for name in NAMES])
+
+    @property
+    def friction(self) -> float:
+        """Coulomb's and viscous, at the motion's speed [N]."""
+        coulomb = self["seal_friction_coefficient"] * self.extent.load
+        return coulomb + self["viscous_friction"] * self.extent.speed
+
+    @property
+    def turning_moment(self) -> float:
+        """The same of what resists turning, at the motion's yaw rate [N m]."""
+        return self["turning_friction"] + self["turning_resistance"] * self.extent.yaw_rate
+
+    def half_width(self, name: str) -> float:
+        """Of a parameter's interval."""
+        return float(self.half_widths[NAMES.index(name)])
+
+    def is_clear(self, name: str) -> bool:
+        """Whether zero is not in the interval of a parameter that was sought."""
+        return abs(self[name]) > self.half_width(name) > 0
+
+    @property
+    def uncertainty(self) -> Array:
+        """Half widths as shares of the value, or of all drive or turn if that is more (8,)."""
+        drive, turn, load, speed, yaw_rate, *_ = np.maximum(self.extent, NOTHING)
+        whole = np.array([0, drive / load, drive / speed, 0, turn, turn / yaw_rate, 0, 0])
+        values = np.nan_to_num(np.abs(self.values))
+        return self.half_widths / np.maximum(values, np.maximum(whole, NOTHING))

@@ -1,0 +1,156 @@
+"""`identify BAG`: mass, inertia, friction and geometry of the climber that a bag was recorded of.
+
+`identify --plan FILE` writes a parameter file with a trajectory that shows them well. The status is
+1 if something cannot be told, or went wrong.
+"""
+
+import argparse
+import json
+import sys
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from climber_uk.bags.topics import PARAMETERS
+from climber_uk.identification import excitation
+from climber_uk.identification import figure as identification_figure
+from climber_uk.identification.estimation import identify
+from climber_uk.identification.identified import NAMES
+from climber_uk.identification.integral_equations import Cut
+from climber_uk.identification.recorded_motion import Source, read_motion
+from climber_uk.identification.recorded_site import (
+    assumed_away,
+    differences,
+    recorded_parameters,
+    site_of,
+)
+from climber_uk.identification.report import (
+    CONTROLLER,
+    PLANT,
+    changes,
+    label_of,
+    missing,
+    remarks,
+    rows,
+    table,
+)
+from climber_uk.mechanics.climber import Climber
+from climber_uk.parameters.changed_parameters import write_changed
+from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.system.command_line import Parser
+
+PUBLISHER = "trajectory_publisher"
+SIDES = "right", "left"
+AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
+
+
+def tell(options: argparse.Namespace) -> None:
+    """Print and write what a bag tells; raises `ValueError` of what it does not."""
+    cut = Values(vars(options)).read(Cut)
+    file, plant = parameters_of(CONTROLLER, options), plant_of(options)
+    topic = Source(namespace=options.namespace).topic(PARAMETERS)
+    recorded = recorded_parameters(options.bag, topic)
+    parameters = {**recorded, **file}
+    believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
+    motion, unfit = read_motion(options.bag, source(options, {**file, **recorded}, believed))
+    found = identify(motion, believed, cut, site)
+    print(table(found, believed), end="")
+    print(*remarks(found), sep="\n")
+    for warning in (*differences(file, recorded, site), *assumed_away(parameters, plant)):
+        print(warning)
+    if unfit:
+        print(f"{unfit} unfit messages were left out")
+    if options.json:
+        text = json.dumps(list(rows(found, believed)), indent=2)
+        options.json.write_text(text + "\n", encoding="utf-8")
+    if options.figure:
+        identification_figure.draw(motion, believed, found, options.figure)
+    if options.output:
+        write_changed(options.params, changes(found, believed), options.output)
+    if said := list(missing(found)):
+        raise ValueError("\n".join(said))
+
+
+def source(options: argparse.Namespace, parameters: dict[str, Any], believed: Climber) -> Source:
+    """Where the bag tells of the climber whose controller had `parameters`."""
+    joints = [parameters.get(f"{side}_wheel_joint", f"{side}_wheel_joint") for side in SIDES]
+    delay = parameters.get("transport_delay", 0.0) if options.delay is None else options.delay
+    return Source(
+        namespace=options.namespace,
+        odometry=options.odometry,
+        joints=(joints[0], joints[1]),
+        pressure=believed.suction_pressure,
+        delay=delay,
+    )
+
+
+def plan(options: argparse.Namespace) -> None:
+    """Write a trajectory, with all that is in the parameter file; raises `ValueError`."""
+    parameters = parameters_of(PUBLISHER, options)
+    origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
+    controller = parameters_of(CONTROLLER, options)
+    site, believed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
+    if not site.has_seal:
+        believed = replace(believed, seal_friction_coefficient=0.0)
+    limits = Values(vars(options)).read(excitation.Limits)
+    best = excitation.plan(believed, limits, origin, site)
+    x, y, heading = best.trajectory.at(0.0).pose.tolist()
+    changed = {
+        PUBLISHER: best.parameters,
+        PLANT: {"initial_x": x, "initial_y": y, "initial_heading": heading, **AT_REST},
+        "run_demo": {"duration": best.trajectory.duration},
+    }
+    write_changed(options.params, changed, options.plan)
+    print(
+        f"{best.name}, {best.trajectory.duration:.1f} s, from ({x:.3f}, {y:.3f}) {heading:.3f} rad"
+    )
+    for name, share, sought in zip(NAMES, best.tells.uncertainty, excitation.SOUGHT, strict=True):
+        if sought:
+            print(f"{label_of(name, site)[0]} ± {share:.2%}")
+
+
+def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
+    """Those of a node in the parameter file; none without one."""
+    name = Source(namespace=options.namespace).topic(node)
+    return read_file(options.params, name) if options.params else {}
+
+
+def plant_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Parameters of the simulator in the parameter file; none if that has none for it."""
+    try:
+        return parameters_of(PLANT, options)
+    except ValueError:
+        return {}
+
+
+def main() -> None:
+    """Tell, or plan."""
+    parser = Parser("identify", __doc__)
+    parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
+    parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
+    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
+    parser.add_argument("--odometry", default="odom", help="topic (default: odom)")
+    parser.add_argument(
+        "--delay", type=float, help="[s] of torques, unless joint_states tells them"
+    )
+    parser.add_argument("--output", "-o", type=Path, help="write a parameter file for the nodes")
+    parser.add_argument("--json", type=Path, help="write the table as JSON")
+    parser.add_argument("--figure", type=Path, help="write a picture of the fit, PNG")
+    parser.add_argument(
+        "--plan", type=Path, help="write a parameter file with a trajectory instead"
+    )
+    for kind, of in (Cut, "of a bag"), (excitation.Limits, "of a plan"):
+        for field in fields(kind):
+            rule, name = field.metadata, "--" + field.name.replace("_", "-")
+            said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
+            parser.add_argument(name, type=float, default=field.default, help=said)
+    options = parser.arguments()
+    if (options.bag is None) == (options.plan is None):
+        parser.error("want a bag, or --plan")
+    try:
+        if options.plan:
+            plan(options)
+        else:
+            tell(options)
+    except (ValueError, OSError) as error:
+        sys.exit(f"identify: {error}")

@@ -1,0 +1,192 @@
+"""The climber's equations in integral form, linear in their coefficients, window by window.
+
+    v - ∫ (g·e + u ω) dt = v₀ + a₁ ∫ (τR + τL) dt - a₂ ∫ (1-k) P S σ dt - a₃ ∫ v dt       (11)
+    ω                    = ω₀ + b₁ ∫ (τR - τL) dt - b₂ ∫ sgn ω dt - b₃ ∫ ω dt             (15)
+
+and integrated once more, for the way and the heading; where wheel angles are known, way and heading
+as these tell them. g·e is gravity along the heading, u a side slip (0 of wheels that hold), and σ
+the direction in which the seal slides. Nothing is differentiated, and what is integrated are
+torques, which are known: only the noise of heading and way gets into the regressors, where it
+hardly counts. v₀, ω₀ and the like are different in each window, and projected out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from climber_uk.identification.even_time import gaps
+from climber_uk.identification.recorded_motion import SMOOTHING, Indices, RecordedMotion
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.climber import GRAVITY, Climber
+from climber_uk.mechanics.wall import Plane, Wall
+from climber_uk.parameters.declaration import check, parameter
+
+
+class Equations(NamedTuple):
+    """Of one window: target = start · unknowns + design · coefficients + noise.
+
+    Rows are the times of what is measured first, then those of what is measured second. `lacking`
+    is what an acceleration (a speed, of wheels) that the equations lack would add: a constant one
+    of 1, and one that goes from -√3 to √3 in the window.
+    """
+
+    start: Array  # (rows, unknowns)
+    design: Array  # (rows, coefficients)
+    target: Array  # (rows,)
+    lacking: Array  # (rows, 2)
+    measured: int  # how many quantities
+
+
+@dataclass(frozen=True)
+class Site:
+    """What a climber was driven on, and whether a seal rubs on it."""
+
+    wall: Wall = field(default_factory=Plane)
+    has_seal: bool = True
+
+
+@dataclass(frozen=True)
+class Cut:
+    """How a motion is cut into windows, in which its direction does not change."""
+
+    window: float = parameter(1.0, "s", "length of a window", above=0)
+    least_speed: float = parameter(0.02, "m/s", "below which it may as well rest", above=0)
+    least_yaw_rate: float = parameter(
+        0.05, "rad/s", "below which it may as well not turn: friction there is any", above=0
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def windows(self, motion: RecordedMotion) -> list[Indices]:
+        """Indices of the times in each window in which it drives one way."""
+        return self._cut(motion, motion.speed, self.least_speed)
+
+    def turning(self, motion: RecordedMotion) -> list[Indices]:
+        """Indices of the times in each window in which it turns one way."""
+        return self._cut(motion, motion.smooth_rates[:, 1], self.least_yaw_rate)
+
+    def _cut(self, motion: RecordedMotion, rate: Array, least: float) -> list[Indices]:
+        moving = np.abs(rate) > least
+        breaks = (np.diff(np.sign(rate) * moving) != 0) | (np.diff(motion.stretch) != 0)
+        breaks |= gaps(motion.time)
+        windows: list[Indices] = []
+        for run in np.split(np.arange(len(motion.time)), np.flatnonzero(breaks) + 1):
+            time = motion.time[run]
+            # it may rest, and not rub, as long before and after as rates are smoothed
+            sure = run[(time >= time[0] + SMOOTHING) & (time <= time[-1] - SMOOTHING)]
+            duration = np.ptp(motion.time[sure]) if len(sure) else 0.0
+            count = int(duration / self.window + 1e-6) * int(moving[run[0]])
+            windows += np.array_split(sure, count) if count else []
+        return windows
+
+
+def drive_equations(
+    motion: RecordedMotion, climber: Climber, site: Site, windows: Sequence[Indices]
+) -> list[Equations]:
+    """(11) in each window: a₁, a₂, a₃, and a₁ times how much later torques act than assumed."""
+    gravity, load = gravity_ahead(motion, climber, site), friction_load(motion, climber, site)
+    speed, yaw_rate = motion.smooth_rates.T
+    sliding = np.hypot(speed, motion.side_slip)
+    share = speed / np.maximum(sliding, 1e-9)  # of the seal's friction that is along the heading
+    known = gravity + motion.side_slip * yaw_rate
+    found = []
+    for window in windows:
+        time = motion.time[window]
+        pushed = motion.impulse[window].sum(axis=1)
+        late = motion.torques[window].sum(axis=1)
+        integrals = np.column_stack([load * share, speed])[window]
+        impulses = np.column_stack(
+            [pushed - pushed[0], -_integral(integrals, time), late[0] - late]
+        )
+        rate = None if motion.rates is None else motion.rates[window, 0]
+        free = _integral(known[window], time)
+        found.append(_twice_integrated(time, rate, motion.way[window], impulses, free))
+    return found
+
+
+def turn_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
+    """(15) in each window: b₁, b₂, b₃, and b₁ times how much later torques act than assumed."""
+    found, yaw_rate = [], motion.smooth_rates[:, 1]
+    for window in windows:
+        time = motion.time[window]
+        pushed, late = (
+            -np.diff(motion.impulse[window])[:, 0],
+            -np.diff(motion.torques[window])[:, 0],
+        )
+        sign = np.sign(yaw_rate[window[len(window) // 2]])
+        integrals = np.column_stack([np.full(len(window), sign), yaw_rate[window]])
+        impulses = np.column_stack(
+            [pushed - pushed[0], -_integral(integrals, time), late[0] - late]
+        )
+        rate = None if motion.rates is None else motion.rates[window, 1]
+        found.append(_twice_integrated(time, rate, motion.pose[window, 2], impulses, 0 * time))
+    return found
+
+
+def wheel_equations(
+    motion: RecordedMotion, windows: Sequence[Indices]
+) -> tuple[list[Equations], list[Equations]]:
+    """Way = r (φR + φL)/2 and heading = r/d (φR - φL)/2 in each window."""
+    assert motion.wheel_angles is not None
+    right, left = motion.wheel_angles.T
+    both = (motion.way, (right + left) / 2), (motion.pose[:, 2], (right - left) / 2)
+    found = []
+    for gone, angle in both:
+        found.append([_of_wheels(motion.time[w], gone[w], angle[w]) for w in windows])
+    return found[0], found[1]
+
+
+def friction_load(motion: RecordedMotion, climber: Climber, site: Site) -> Array:
+    """(1 - k) P S (n,) [N], of which the seal rubs with μ times as much; 1 N without a seal."""
+    if not site.has_seal:
+        return np.ones(len(motion.time))
+    return (1 - climber.wheel_load_share) * climber.suction_area * motion.pressure
+
+
+def gravity_ahead(motion: RecordedMotion, climber: Climber, site: Site) -> Array:
+    """Gravity along the heading (n,) [m/s²]."""
+    _, y, heading = motion.pose.T
+    s_x, s_y = site.wall.along(climber.inclination, y)
+    along: Array = GRAVITY * (s_x * np.cos(heading) + s_y * np.sin(heading))
+    return along
+
+
+def _twice_integrated(
+    time: Array, rate: Array | None, gone: Array, impulses: Array, known: Array
+) -> Equations:
+    """Of a rate, if it is measured, and of how far it has `gone`; `known` is what it adds to it."""
+    one, since = np.ones_like(time), time - time[0]
+    lacking = _integral(_shapes(time), time)
+    start, target = np.column_stack([since, one]), gone - gone[0] - _integral(known, time)
+    design, moved = _integral(impulses, time), _integral(lacking, time)
+    if rate is None:
+        return Equations(start, design, target, moved, 1)
+    return Equations(
+        # of its own, for sensors of rates have a bias
+        np.concatenate([np.column_stack([one, 0 * start]), np.column_stack([0 * one, start])]),
+        np.concatenate([impulses, design]),
+        np.concatenate([rate - known, target]),
+        np.concatenate([lacking, moved]),
+        2,
+    )
+
+
+def _of_wheels(time: Array, gone: Array, angle: Array) -> Equations:
+    lacking = _integral(_shapes(time), time)
+    one = np.ones((len(time), 1))
+    return Equations(one, (angle - angle[0])[:, None], gone - gone[0], lacking, 1)
+
+
+def _shapes(time: Array) -> Array:
+    """1, and a line of mean 0 and mean square 1 (n, 2)."""
+    middle, half = (time[0] + time[-1]) / 2, (time[-1] - time[0]) / 2
+    return np.column_stack([np.ones_like(time), np.sqrt(3) * (time - middle) / half])
+
+
+def _integral(values: Array, time: Array) -> Array:
+    integral: Array = cumulative_trapezoid(values, time, axis=0, initial=0)
+    return integral

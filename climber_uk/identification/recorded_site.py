@@ -1,0 +1,81 @@
+"""What a climber was driven on and by which settings, and what of that identification assumes away.
+
+Parameters of the controller are in a bag (`~/parameters`); those of the plant
+only in parameter files.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from climber_uk.bags.bag import read_messages
+from climber_uk.identification.integral_equations import Site
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.wall import WALLS
+from climber_uk.messages import reading
+from climber_uk.parameters.parameter_file import Values
+
+Parameters = Mapping[str, Any]
+# Settings that identification assumes away: whether one does, and what follows.
+ASSUMED_AWAY: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "seal_radius": (
+        lambda radius: radius > 0,
+        "a ring rubs less along the heading the more it turns, and resists turning: it is fitted "
+        "as if it did not",
+    ),
+    "friction": (
+        lambda law: law != "coulomb",
+        "it is fitted as Coulomb's and a viscous one",
+    ),
+    "odometry_source": (
+        lambda source: source == "wheels",
+        "radius and track are what the odometry was made with, and slip is taken for motion",
+    ),
+    "heading_bias": (lambda bias: bias != 0, "the weight is taken to pull another way"),
+}
+OF_SUCTION = (
+    "seal_friction_coefficient",
+    "wheel_load_share",
+    "suction_pressure",
+    "suction_area",
+)
+
+
+def recorded_parameters(bag: Path, topic: str) -> dict[str, Any]:
+    """Those that a controller told first on a topic; none if it did not, or there is no bag."""
+    with suppress(FileNotFoundError):  # `read_motion` says so
+        for _, _, message in read_messages(bag, [topic]):
+            return dict(reading.parameters(message))
+    return {}
+
+
+def site_of(controller: Parameters, plant: Parameters) -> Site:
+    """Wall of the plant, and whether there is a seal; raises `ValueError`."""
+    wall = plant.get("wall", "plane")
+    if wall not in WALLS:
+        raise ValueError(f"wall={wall!r} must be one of {', '.join(WALLS)}")
+    adhesion = controller.get("adhesion", plant.get("adhesion", "suction"))
+    return Site(Values(plant).read(WALLS[wall], f"{wall}."), adhesion == "suction")
+
+
+def differences(file: Parameters, recorded: Parameters, site: Site) -> Iterator[str]:
+    """Sentences on what a parameter file and a bag say differently of the climber."""
+    for field in fields(Climber):
+        if field.name in OF_SUCTION and not site.has_seal:
+            continue
+        told, other = recorded.get(field.name), file.get(field.name, field.default)
+        if told is not None and file and told != other:
+            yield f"{field.name} was {told:g} when this was recorded; {other:g} of the file is used"
+
+
+def assumed_away(controller: Parameters, plant: Parameters) -> Iterator[str]:
+    """Sentences on settings that the model does not know."""
+    for name, (violates, follows) in ASSUMED_AWAY.items():
+        value = plant.get(name, controller.get(name))
+        if value is not None and violates(value):
+            yield f"{name} is {value}: {follows}"
+    wall = plant.get("wall", "plane")
+    if wall != "plane":
+        yield f"the wall is a {wall}, as the parameter file has it"

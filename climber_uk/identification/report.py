@@ -1,0 +1,136 @@
+"""What was identified, in words, numbers and parameters of the nodes."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from climber_uk.identification.identified import IN_TIME, NAMES, UNITS, Identified
+from climber_uk.identification.integral_equations import Site
+from climber_uk.mechanics.climber import Climber
+from climber_uk.paper.table import markdown
+
+CONTROLLER, PLANT = "uk_torque_controller", "plant_simulator"
+COLUMNS = ("parameter", "estimate", "± 95 %", "unit", "nodes now", "")
+COULOMB = "seal_friction_coefficient"
+WITHOUT_SEAL = {COULOMB: ("rolling_friction", "N")}  # what that coefficient is then
+ADVICE = {
+    ("mass", COULOMB): "drive up, down and across the wall; on a floor, change speed",
+    ("yaw_inertia",): "drive bends to both sides",
+    ("wheel_radius", "half_track"): "drive further, and turn",
+}
+DIGITS = 6  # of a parameter that is written
+
+
+def label_of(name: str, site: Site) -> tuple[str, str]:
+    """What a parameter is called where it was found, and its unit."""
+    return (name, UNITS[name]) if site.has_seal else WITHOUT_SEAL.get(name, (name, UNITS[name]))
+
+
+def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
+    """What is told of each parameter; of what is not, why, and no number."""
+    for name, value, half_width in zip(NAMES, found.values, found.half_widths, strict=True):
+        label, unit = label_of(name, found.site)
+        reason = found.reasons.get(name)
+        yield {
+            "parameter": label,
+            "estimate": None if reason else float(value),
+            "half_width": None if reason else float(half_width),
+            "unit": unit,
+            "nodes_now": float(getattr(believed, label, 0.0)),
+            "known": reason is None,
+            "cause": reason and reason.cause,
+            "reason": reason and reason.words,
+            "model_fits": all(lack.fits for lack in found.lacks),
+        }
+
+
+def table(found: Identified, believed: Climber) -> str:
+    """The same, as text."""
+    cells = []
+    for row in rows(found, believed):
+        digits = {"estimate": 5, "half_width": 2, "nodes_now": 5}
+        numbers = [("" if row[key] is None else f"{row[key]:.{n}g}") for key, n in digits.items()]
+        why = f"cannot be told: {row['reason']}" if row["reason"] else ""
+        cells.append((row["parameter"], *numbers[:2], row["unit"], numbers[2], why))
+    return markdown(COLUMNS, cells)
+
+
+def remarks(found: Identified) -> Iterator[str]:
+    """Sentences on what the table does not say."""
+    windows, extent = len(found.windows["drive"]), found.extent
+    rubs = "the seal rubs" if found.site.has_seal else "rolling is resisted"
+    rubs += f" with {found.friction:.4g} N at {extent.speed:.3g} m/s"
+    yield f"{windows} windows in motion; {rubs}"
+    if found.left_out:
+        yield f"{found.left_out} windows more that fit much worse than these were left out"
+    ratios = ", ".join(f"{lack.kind} {lack.ratio:.3g}" for lack in found.lacks)
+    yield f"test of fit, χ² by the number of windows, about 1 for a model that fits: {ratios}"
+    for lack in found.lacks:
+        if not lack.fits:
+            yield f"the model does not fit: {lack.words}; intervals are as much wider"
+    if found.late != IN_TIME:
+        delay, lag = (1e3 * late for late in found.late)
+        yield f"torques act {delay:.2g} ms later than assumed, and with a lag of {lag:.2g} ms"
+    if "viscous_friction" in found.reasons:
+        other = "the seal's" if found.site.has_seal else "rolling friction"
+        yield f"viscous friction cannot be told apart from {other}: drive at different speeds"
+    elif found.is_clear("viscous_friction") and found.site.has_seal:
+        yield "the controller knows no viscous friction: it gets that of this speed as the seal's"
+    if found.is_clear("turning_friction") or found.is_clear("turning_resistance"):
+        moment = f"{found.turning_moment:.3g} N m at {extent.yaw_rate:.3g} rad/s"
+        yield f"turning is resisted, by {moment}: it is left to the controller's observer"
+    if found.has_effective_track:
+        yield "inertia and what resists turning are those of the nodes' half track"
+    if "wheel_radius" in found.reasons:
+        yield f"radius and track are taken as they are: {found.reasons['wheel_radius'].words}"
+    else:
+        yield "radius and track are those of odometry that does not come from the wheels itself"
+
+
+def missing(found: Identified) -> Iterator[str]:
+    """Sentences on what cannot be told though it was sought, and how to drive so that it can."""
+    for group, advice in ADVICE.items():
+        reasons = {name: found.reasons[name] for name in group if name in found.reasons}
+        causes = {
+            name: reason.cause for name, reason in reasons.items() if reason.cause != "absent"
+        }
+        if not causes:
+            continue
+        labels = [label_of(name, found.site)[0].replace("_", " ") for name in causes]
+        apart = " apart" if len(labels) > 1 and "collinear" in causes.values() else ""
+        said = f"{' and '.join(labels)} cannot be told{apart} from this bag: "
+        if set(causes.values()) <= {"misfit", "torques"}:
+            yield said + next(reasons[name].words for name in causes)
+        else:
+            yield f"{said}{advice} (see --plan)"
+
+
+def changes(found: Identified, believed: Climber) -> dict[str, dict[str, Any]]:
+    """Parameters by node; what is not told stays as it is."""
+    told = {row["parameter"]: row["estimate"] for row in rows(found, believed) if row["known"]}
+    climber = {name: value for name, value in told.items() if hasattr(believed, name)}
+    controller, plant = dict(climber), dict(climber)
+    if found.site.has_seal and _friction_is_known(found):
+        controller[COULOMB] = max(0.0, found.friction / found.extent.load)
+        plant |= _law(found, controller[COULOMB])
+    return {CONTROLLER: _rounded(controller), PLANT: _rounded(plant)}
+
+
+def _friction_is_known(found: Identified) -> bool:
+    """Whether it is, Coulomb's and viscous together."""
+    reasons = [found.reasons.get(name) for name in (COULOMB, "viscous_friction")]
+    return all(reason is None or reason.cause == "absent" for reason in reasons)
+
+
+def _law(found: Identified, whole: float) -> dict[str, Any]:
+    """Friction of the plant; `whole` is the coefficient that the controller gets."""
+    viscous, load = found["viscous_friction"], found.extent.load
+    coulomb = found[COULOMB] * load
+    apart = not {COULOMB, "viscous_friction"} & set(found.reasons)
+    if apart and viscous > 0 and found.is_clear("viscous_friction"):
+        law = {"ratio": 1.0, "viscous": viscous / coulomb}
+        return {"friction": "stribeck", **{f"stribeck.{name}": v for name, v in law.items()}}
+    return {"friction": "coulomb", COULOMB: whole}
+
+
+def _rounded(values: dict[str, Any]) -> dict[str, Any]:
+    return {k: v if isinstance(v, str) else float(f"{v:.{DIGITS}g}") for k, v in values.items()}

@@ -1,0 +1,218 @@
+"""A robust fit of linear equations in windows, its test, and how far its coefficients may be off.
+
+Least squares of the residuals' soft L1 norm, by reweighting. Three things may move a coefficient:
+
+- what differs from window to window, whatever its distribution: a jackknife over the windows;
+- white noise, which tells what is not excited at all: never less than that;
+- what the equations lack, and may go with what tells the coefficient: see `Misfit`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from climber_uk.identification.integral_equations import Equations
+from climber_uk.identification.recorded_motion import Indices
+from climber_uk.mechanics import Array, transpose
+
+ITERATIONS, REFINEMENTS = 10, 3
+CLEAR = 3.0  # standard deviations beyond which a residual counts less and less
+ROUNDING = 1e-13
+MEDIAN = 1.4826  # standard deviation of what is normal, by the median of its absolute value
+STRANGE, FEW = 6.0, 0.1  # times the usual, of a window; most of the windows that may be
+SLIGHT = 1e-4  # [m/s²] or the like, of a misfit that is none
+CHANCE = 1e-3  # of noise alone to fail the test of fit
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """The accelerations that the equations lack in each window, and what noise makes of them.
+
+    Noise is taken for white, and from one time to the next: what is slower is no noise of a sensor,
+    or one that looks like an acceleration. `excess` is what remains beyond it, 0 where the test
+    (χ² of all windows) does not fail.
+    """
+
+    found: Array  # (n, 2) constant in the window, and changing in it
+    noise: Array  # (n, 2) standard deviation
+    excess: Array  # (2,)
+
+    @classmethod
+    def of(cls, found: Array, noise: Array, coefficients: int) -> "Misfit":
+        """Test of what was `found` by a fit of some coefficients."""
+        count = len(found)
+        freedom = max(1, count - coefficients)
+        ratio = ((found / noise) ** 2).sum(axis=0)
+        beyond = np.mean(found**2, axis=0) * count / freedom - np.mean(noise**2, axis=0)
+        fails = chi2.sf(ratio, freedom) < CHANCE
+        return cls(found, noise, np.where(fails, np.sqrt(np.maximum(beyond, 0.0)), 0.0))
+
+    @property
+    def strange(self) -> NDArray[np.bool_]:
+        """Windows (n,) that fit much worse than most, a few at most: a push, a bump, a stop."""
+        usual = np.maximum(MEDIAN * np.median(np.abs(self.found), axis=0), self.noise + SLIGHT)
+        worst = np.max(np.abs(self.found) / usual, axis=1)
+        limit = np.quantile(worst, 1 - FEW)
+        strange: NDArray[np.bool_] = worst > max(STRANGE, limit)
+        return strange
+
+    @property
+    def ratio(self) -> float:
+        """χ² of the constant ones by the number of windows: about 1 for a model that fits."""
+        return float(np.mean((self.found[:, 0] / self.noise[:, 0]) ** 2))
+
+
+@dataclass(frozen=True)
+class WindowFit:
+    """Equations of all windows in standard deviations: target = design · coefficients + noise."""
+
+    design: Array  # (rows, c)
+    target: Array  # (rows,)
+    lacking: Array  # (rows, 2) see `Equations`
+    quantity: Indices  # (rows,) number of what is measured
+    ends: Indices  # (windows,) row after the last of each
+    noise: Array  # (q,) standard deviations
+
+    @classmethod
+    def of(
+        cls, windows: Sequence[Equations], columns: Sequence[int], noise: Array, least: float = 0.1
+    ) -> "WindowFit":
+        """Fit of the coefficients in `columns`, with the `noise` (q,) as it turns out to be.
+
+        No sensor is believed to be better than `least` times the noise to begin with; 0: any is.
+        """
+        whole = cls.standardised(windows, columns, noise)
+        for _ in range(REFINEMENTS):
+            quantities = range(len(noise))
+            spread = [np.median(np.abs(whole.residuals[whole.quantity == q])) for q in quantities]
+            turned_out = np.maximum(whole.noise * MEDIAN * np.array(spread), least * noise)
+            whole = cls.standardised(windows, columns, turned_out)
+        return whole
+
+    @classmethod
+    def standardised(
+        cls, windows: Sequence[Equations], columns: Sequence[int], noise: Array
+    ) -> "WindowFit":
+        """Fit of the coefficients in `columns`, with a `noise` (q,) that is known."""
+        parts, chosen = [], list(columns)
+        for one in windows:
+            quantity = np.repeat(np.arange(one.measured), len(one.target) // one.measured)
+            scale = noise[quantity][:, None]
+            start, _ = np.linalg.qr(one.start / scale)
+            rows = np.column_stack([one.design[:, chosen], one.target, one.lacking]) / scale
+            rows -= start @ (start.T @ rows)
+            parts.append((rows[:, : len(chosen)], rows[:, -3], rows[:, -2:], quantity))
+        ends = np.cumsum([len(part[1]) for part in parts])
+        design, target, lacking, quantity = map(np.concatenate, zip(*parts, strict=True))
+        return cls(design, target, lacking, quantity, ends, noise)
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """(c,)."""
+        weights: Array = np.ones(len(self.target))
+        for _ in range(ITERATIONS):
+            weighted = weights[:, None] * self.design
+            found = _inverse(weighted.T @ self.design) @ (weighted.T @ self.target)
+            weights = _weights(self.target - self.design @ found)
+        coefficients: Array = found
+        return coefficients
+
+    @cached_property
+    def residuals(self) -> Array:
+        """(rows,), in standard deviations."""
+        return self.target - self.design @ self.coefficients
+
+    @property
+    def cost(self) -> float:
+        """Sum of the soft L1 norm of the residuals."""
+        squares = (self.residuals / CLEAR) ** 2
+        return float(2 * CLEAR**2 * np.sum(np.sqrt(1 + squares) - 1))
+
+    @cached_property
+    def information(self) -> Array:
+        """N of each window (n, c, c)."""
+        rows = zip(self._split(self.design), self._split(self._weights), strict=True)
+        return np.stack([J.T @ (w[:, None] * J) for J, w in rows])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the coefficients, if noise is white (c, c)."""
+        return _inverse(self.information.sum(axis=0))
+
+    @cached_property
+    def changes(self) -> Array:
+        """Of the coefficients without one window after the other (n, c)."""
+        parts = self._split(self.design), self._split(self._weights), self._split(self.residuals)
+        g = np.stack([J.T @ (w * r) for J, w, r in zip(*parts, strict=True)])
+        rest = self.information.sum(axis=0) - self.information
+        changes: Array = (_inverse(rest) @ g[..., None])[..., 0]
+        return changes
+
+    @cached_property
+    def pulls(self) -> Array:
+        """What an acceleration of 1 that is lacking in a window would add (n, 2, c)."""
+        parts = self._split(self.design), self._split(self._weights), self._split(self.lacking)
+        g = np.stack([F.T @ (w[:, None] * J) for J, w, F in zip(*parts, strict=True)])
+        return g @ self.covariance
+
+    @cached_property
+    def misfit(self) -> Misfit:
+        """What the equations lack."""
+        parts = (self._split(part) for part in (self.lacking, self.residuals, self.quantity))
+        white = self._white()
+        found, noise = [], []
+        for F, r, quantity in zip(*parts, strict=True):
+            inverse = _inverse(F.T @ F)
+            shown = (white[quantity][:, None] * F) @ inverse
+            found.append(inverse @ (F.T @ r))
+            noise.append(np.sqrt((shown**2).sum(axis=0)))
+        return Misfit.of(np.array(found), np.array(noise), self.design.shape[1])
+
+    def bias(self, slopes: Array) -> Array:
+        """Most (p,) by which what the equations lack may have moved p parameters.
+
+        By `slopes` (p, c) these depend on the coefficients.
+        """
+        moved: Array = (np.abs(self.pulls @ slopes.T) * self.misfit.excess[:, None]).sum(
+            axis=(0, 1)
+        )
+        return moved
+
+    def _white(self) -> Array:
+        """Standard deviation (q,) of the white part of residuals, from their differences."""
+        white = []
+        for number in range(len(self.noise)):
+            steps = [
+                np.diff(r[quantity == number])
+                for r, quantity in zip(
+                    self._split(self.residuals), self._split(self.quantity), strict=True
+                )
+            ]
+            white.append(MEDIAN * np.median(np.abs(np.concatenate(steps))) / np.sqrt(2))
+        return np.maximum(white, ROUNDING)
+
+    @cached_property
+    def _weights(self) -> Array:
+        return _weights(self.residuals)
+
+    def _split(self, rows: NDArray[Any]) -> list[NDArray[Any]]:
+        return np.split(rows, self.ends[:-1])
+
+
+def _weights(residuals: Array) -> Array:
+    weights: Array = 1 / np.sqrt(1 + (residuals / CLEAR) ** 2)
+    return weights
+
+
+def _inverse(matrix: Array) -> Array:
+    """Inverse (..., p, p) of positive semidefinite matrices; enormous where there is none."""
+    scale = np.sqrt(np.maximum(np.diagonal(matrix, axis1=-2, axis2=-1), ROUNDING**2))
+    both = scale[..., :, None] * scale[..., None, :]
+    values, vectors = np.linalg.eigh(matrix / both)
+    inverse: Array = (vectors / np.maximum(values, ROUNDING)[..., None, :]) @ transpose(vectors)
+    return inverse / both

@@ -1,0 +1,42 @@
+"""The trajectory as parameters say, whoever reads them: a node, or a campaign."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from climber_uk.mechanics.shapes import SHAPES
+from climber_uk.mechanics.time_laws import TIME_LAWS
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.parameters.declaration import check, parameter
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to follow."""
+
+    shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
+    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=tuple(TIME_LAWS))
+    reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
+    origin_x: float = parameter(0.0, "m", "x of the shape's origin")
+    origin_y: float = parameter(0.0, "m", "y of the shape's origin")
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+KINDS: list[tuple[type, str]] = [
+    (Plan, ""),
+    *((kind, f"{name}.") for name, kind in {**SHAPES, **TIME_LAWS}.items()),
+]
+"""All that is read, with the prefix of its parameters."""
+
+
+def planned(read: Callable[..., Any]) -> Trajectory:
+    """Trajectory of what `read` gives for a class and a prefix; `ValueError` if there is none."""
+    plan = read(Plan)
+    return Trajectory(
+        shape=read(SHAPES[plan.shape], f"{plan.shape}."),
+        law=read(TIME_LAWS[plan.time_law], f"{plan.time_law}."),
+        reverse_gear=plan.reverse_gear,
+        origin=(plan.origin_x, plan.origin_y),
+    )

@@ -1,0 +1,116 @@
+"""What was tried to come by the errors that the paper prints: 1.8e-3 m in x and 0.6 m in y.
+
+Each attempt is an integrator of the printed system, in one reading of it.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.paper.consistent import PAPER_PATH
+from climber_uk.paper.motion import (
+    COARSE_TOLERANCE,
+    DEFAULT_TOLERANCE,
+    START,
+    Derivative,
+    dormand_prince,
+    runge_kutta,
+    semi_implicit_euler,
+)
+from climber_uk.paper.printed import GAINS, PrintedSystem
+
+COLUMNS = ("attempt", "(26) x [m]", "(26) y [m]", "(30) x [m]", "(30) y [m]")
+# ode45 gives four points a step by default, three of them interpolated.
+INTERPOLATED = np.linspace(0, 20, 2001)
+PATIENCE = 10_000  # evaluations, a multiple of what any attempt needs that comes to an end
+
+Integrator = Callable[[Derivative], tuple[Array, Array]]
+
+
+def _coarse(derivative: Derivative) -> tuple[Array, Array]:
+    return dormand_prince(derivative, COARSE_TOLERANCE)
+
+
+def _default(derivative: Derivative) -> tuple[Array, Array]:
+    return dormand_prince(derivative, DEFAULT_TOLERANCE)
+
+
+def _interpolated(derivative: Derivative) -> tuple[Array, Array]:
+    return dormand_prince(derivative, DEFAULT_TOLERANCE, times=INTERPOLATED)
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """Steps of fixed length by one of the simple methods."""
+
+    method: Callable[[Derivative, float], tuple[Array, Array]]
+    step: float  # [s]
+
+    def __call__(self, derivative: Derivative) -> tuple[Array, Array]:
+        """Integrate."""
+        return self.method(derivative, self.step)
+
+
+@dataclass(frozen=True)
+class FromYawRate:
+    """The default integrator from another yaw rate than the printed -6/10."""
+
+    yaw_rate: float  # [rad/s]
+
+    def __call__(self, derivative: Derivative) -> tuple[Array, Array]:
+        """Integrate."""
+        return dormand_prince(derivative, DEFAULT_TOLERANCE, np.array([*START[:5], self.yaw_rate]))
+
+
+def explicit_euler(derivative: Derivative, step: float) -> tuple[Array, Array]:
+    """Fixed steps along the derivative."""
+    times = np.arange(round(20 / step) + 1) * step
+    y = [START]
+    for time in times[:-1]:
+        y.append(y[-1] + step * derivative(time, y[-1]))
+    return times, np.array(y)
+
+
+def _impatient(derivative: Derivative) -> Derivative:
+    calls = itertools.count(1)
+
+    def limited(time: float, y: Array) -> Array:
+        if next(calls) > PATIENCE:
+            raise RuntimeError(f"stuck at {time:.3f} s: {PATIENCE} evaluations")
+        return derivative(time, y)
+
+    return limited
+
+
+# By name: the reading of (8), and the integrator.
+ATTEMPTS: dict[str, tuple[str, Integrator]] = {
+    "tolerance 1e-3": ("real part", _coarse),
+    "tolerance 1e-3, absolute 1e-6": ("real part", _default),
+    "the same, interpolated": ("real part", _interpolated),
+    "yaw rate +6/10 at the start": ("real part", FromYawRate(0.6)),
+    "yaw rate 0 at the start": ("real part", FromYawRate(0.0)),
+    **{f"gain {name}": (name, _default) for name in GAINS if name != "real part"},
+    "explicit Euler, 10 ms": ("real part", FixedStep(explicit_euler, 0.01)),
+    "semi-implicit Euler, 10 ms": ("real part", FixedStep(semi_implicit_euler, 0.01)),
+    "semi-implicit Euler, 5 ms": ("real part", FixedStep(semi_implicit_euler, 0.005)),
+    "Runge-Kutta, 10 ms": ("real part", FixedStep(runge_kutta, 0.01)),
+}
+
+
+def attempt(name: str) -> tuple[str, ...]:
+    """Largest x and y errors of (26) and of (30), as text in the order of `COLUMNS`."""
+    gain, integrate = ATTEMPTS[name]
+    system = PrintedSystem(gain=gain)
+    cells = [name]
+    for derivative in (system.uncorrected, system.corrected):
+        try:
+            times, y = integrate(_impatient(derivative))
+        except RuntimeError as why:
+            cells += [str(why).split(":")[0], ""]
+            continue
+        error = np.abs(y[:, :2] - PAPER_PATH.at(times).pose[:, :2]).max(axis=0)
+        cells += [f"{e:.3g}" for e in error]
+    return tuple(cells)

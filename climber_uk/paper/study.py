@@ -1,0 +1,142 @@
+"""What is computed of the paper: independent jobs, each for one process, and all at once."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from climber_uk.paper import attempts, closed_loop, drift, motion
+from climber_uk.paper.consistent import ConsistentSystem
+from climber_uk.paper.printed import PrintedSystem
+
+Key = tuple[Any, ...]
+Jobs = dict[Key, tuple[Callable[..., Any], tuple[Any, ...]]]
+Results = dict[Key, Any]
+
+PRINTED, CONSISTENT = PrintedSystem(), ConsistentSystem()
+BOTH = {"(26)": False, "(30)": True}
+# 0.1 m across the path and 0.05 rad off, rolling along its heading
+OFF_CONSTRAINT = np.array([0.0, 6.1, 0.05, 10 * np.cos(0.05), 10 * np.sin(0.05), -0.6])
+OFF_STEP, OFF_DURATION = 0.005, 20.0  # [s]
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is computed."""
+
+    tolerance: tuple[float, float]
+    step: float  # [s] under the torques (25)
+    drift_time: float  # [s]
+    drift_steps: tuple[float, ...]  # [s]
+    drift_tolerances: tuple[float, ...]
+    attempts: tuple[str, ...]
+    nodes: bool
+
+
+FULL = Extent(
+    tolerance=motion.PRINTED_TOLERANCE,
+    step=0.001,
+    drift_time=1000.0,
+    drift_steps=(0.001, 0.005, 0.01),
+    drift_tolerances=tuple(10.0**-n for n in range(12, 2, -1)),
+    attempts=tuple(attempts.ATTEMPTS),
+    nodes=True,
+)
+QUICK = Extent(
+    tolerance=(1e-6, 1e-9),
+    step=0.01,
+    drift_time=20.0,
+    drift_steps=(0.005, 0.01),
+    drift_tolerances=(1e-3, 1e-6),
+    attempts=("gain Aᵀ (A M⁻¹ Aᵀ)⁺",),
+    nodes=False,
+)
+
+
+def printed(corrected: bool, tolerance: tuple[float, float]) -> motion.Motion:
+    """As printed, by Dormand and Prince."""
+    derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
+    return motion.printed_motion(PRINTED, corrected, *motion.dormand_prince(derivative, tolerance))
+
+
+def coarse(corrected: bool) -> motion.Motion | str:
+    """As printed, at the default tolerance, or why not: rounding may lead such steps astray."""
+    try:
+        return printed(corrected, motion.DEFAULT_TOLERANCE)
+    except RuntimeError as why:
+        return str(why).split(":")[0]
+
+
+def euler(corrected: bool) -> motion.Motion:
+    """As printed, by semi-implicit Euler of 10 ms."""
+    derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
+    return motion.printed_motion(
+        PRINTED, corrected, *motion.semi_implicit_euler(derivative, step=0.01)
+    )
+
+
+def consistent(corrected: bool, tolerance: tuple[float, float]) -> motion.Motion:
+    """Consistent, by Dormand and Prince."""
+    derivative = CONSISTENT.corrected if corrected else CONSISTENT.uncorrected
+    times, y = motion.dormand_prince(derivative, tolerance)
+    return motion.consistent_motion(CONSISTENT, corrected, times, y)
+
+
+def jobs(extent: Extent) -> Jobs:
+    """Return what can be computed at once, by key, the longest first."""
+    return twenty_seconds(extent) | drifts(extent)
+
+
+def twenty_seconds(extent: Extent) -> Jobs:
+    """Return what the comparison needs, and the attempts."""
+    tight = extent.tolerance
+    todo: Jobs = {}
+    if extent.nodes:
+        todo["nodes",] = closed_loop.record, ()
+    for name, corrected in BOTH.items():
+        todo["as printed", name] = printed, (corrected, tight)
+    for name, corrected in BOTH.items():
+        todo["consistent", name] = consistent, (corrected, tight)
+        todo["default", name] = coarse, (corrected,)
+        todo["euler", name] = euler, (corrected,)
+    todo["open loop",] = motion.open_loop, (CONSISTENT, 0.005)
+    for name in extent.attempts:
+        todo["attempt", name] = attempts.attempt, (name,)
+    return todo
+
+
+def drifts(extent: Extent) -> Jobs:
+    """Return what the drift study needs."""
+    todo: Jobs = {}
+    for step in extent.drift_steps:
+        for method in drift.COMPARED:
+            todo["step", method, step] = drift.runge_kutta, (method, step, extent.drift_time)
+    for tolerance in extent.drift_tolerances:
+        for method in drift.COMPARED[:3]:
+            long = method, tolerance, extent.drift_time
+            todo["tolerance", method, tolerance] = drift.dormand_prince, long
+    for method in list(drift.METHODS)[4:]:
+        coarsest = max(extent.drift_steps)
+        long = method, coarsest, extent.drift_time
+        todo["variant", method, coarsest] = drift.runge_kutta, long
+    for method in drift.COMPARED:
+        off = method, OFF_STEP, OFF_DURATION, OFF_CONSTRAINT
+        todo["start", method] = drift.runge_kutta, off
+    return todo
+
+
+def compute(pool: ProcessPoolExecutor, todo: Jobs) -> Results:
+    """Results by key; tells as they come."""
+    begin = time.monotonic()
+    keys = {pool.submit(function, *arguments): key for key, (function, arguments) in todo.items()}
+    results: Results = {}
+    for future in as_completed(keys):
+        key = keys[future]
+        results[key] = future.result()
+        said = ", ".join(str(part) for part in key)
+        passed = time.monotonic() - begin
+        print(f"[{len(results):3}/{len(keys)}] {passed:5.1f} s  {said}", flush=True)
+    return results

@@ -1,0 +1,93 @@
+"""The comparison: one row a motion, printed, and written as Markdown and CSV."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from climber_uk.bags.run import RecordedRun
+from climber_uk.mechanics import Array
+from climber_uk.paper.motion import Motion
+
+COLUMNS = (
+    "motion",
+    "x error, max [m]",
+    "x error, end [m]",
+    "x error, growth [m/s]",
+    "y error, max [m]",
+    "y error, end [m]",
+    "y error, growth [m/s]",
+    "side slip, max [m/s]",
+    "third of Qc, max [m/s²]",
+    "torque, max [N m]",
+)
+
+# What the text says of its figures; the figures themselves carry no more digits.
+PRINTED_UNCORRECTED = ("printed in the paper, (26)", "1.8e-3", "", "", "0.6", "", "> 0", "", "", "")
+PRINTED_CORRECTED = (
+    *("printed in the paper, (30)", "> 1.8e-3", "", "0"),
+    *("an order below 0.6", "", "0", "", "", ""),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Numbers of a motion, in the order of `COLUMNS`; None where it has none."""
+
+    name: str
+    numbers: tuple[float | None, ...]
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """As text."""
+        return self.name, *("" if n is None else f"{n:.3g}" for n in self.numbers)
+
+
+def row(name: str, motion: Motion | RecordedRun | str) -> Row:
+    """Numbers of a motion, or why there is none."""
+    if isinstance(motion, str):
+        return Row(f"{name}: {motion}", (None,) * (len(COLUMNS) - 1))
+    if isinstance(motion, RecordedRun):  # a bag holds no accelerations, and so no third component
+        error: Array = (motion.pose - motion.reference)[:, :2]
+        third = None
+    else:
+        error, third = motion.error, _largest(motion.third)
+    errors = (n for axis in error.T for n in _error_numbers(motion.time, axis))
+    return Row(name, (*errors, _largest(motion.side_slip), third, _largest(motion.torques)))
+
+
+def growth(time: Array, error: Array) -> float:
+    """Slope [m/s] of the straight line that fits the error's size best."""
+    return float(np.polyfit(time, np.abs(error), 1)[0])
+
+
+def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table, which reads well as text too."""
+    widths = [max(map(len, column)) for column in zip(columns, *rows, strict=True)]
+    lines = [columns, ["-" * width for width in widths], *rows]
+    padded = (
+        " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        for line in lines
+    )
+    return "\n".join(f"| {line} |" for line in padded) + "\n"
+
+
+def write(
+    directory: Path, name: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
+) -> list[Path]:
+    """Write a table as Markdown and CSV; return their paths."""
+    paths = [directory / f"{name}.md", directory / f"{name}.csv"]
+    paths[0].write_text(markdown(columns, rows), encoding="utf-8")
+    with paths[1].open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([columns, *rows])
+    return paths
+
+
+def _error_numbers(time: Array, error: Array) -> tuple[float, float, float]:
+    return _largest(error), float(np.abs(error[-1])), growth(time, error)
+
+
+def _largest(values: Array) -> float:
+    return float(np.max(np.abs(values)))

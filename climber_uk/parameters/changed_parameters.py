@@ -1,0 +1,63 @@
+"""A parameter file with some values changed, for the nodes to load."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from climber_uk.parameters.parameter_file import OWN, TEXT, Section, read_sections, scalar
+
+
+def write_changed(
+    original: Path | None, changes: Mapping[str, Mapping[str, Any]], path: Path
+) -> None:
+    """Write what `original` holds, if there is one, with changes by node and parameter.
+
+    They stand in a section of their own at the end, so that they hold in every namespace.
+    """
+    tree = _tree(read_sections(original) if original else [])
+    for node, values in changes.items():
+        name = f"/**/{node}"
+        section = tree.pop(name, {OWN: {}})
+        for parameter, value in values.items():
+            _set(section[OWN], parameter, value)
+        tree[name] = section
+    _write(tree, path)
+
+
+def write_sections(sections: Iterable[Section], path: Path) -> None:
+    """Write a parameter file of these sections."""
+    _write(_tree(sections), path)
+
+
+def _tree(sections: Iterable[Section]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for section in sections:
+        for parameter, value in section.values.items():
+            _set(tree.setdefault(section.name, {OWN: {}})[OWN], parameter, value)
+    return tree
+
+
+def _write(tree: dict[str, Any], path: Path) -> None:
+    path.write_text(yaml.dump(tree, Dumper=_Dumper, sort_keys=False), encoding="utf-8")
+
+
+class _Dumper(yaml.SafeDumper):
+    """Has texts in quotation marks that a node would take for something else."""
+
+    def represent_str(self, text: str) -> yaml.ScalarNode:
+        """Scalar of a text."""
+        style = None if scalar(text) == text else '"'
+        return self.represent_scalar(TEXT, text, style=style)
+
+
+_Dumper.add_representer(str, _Dumper.represent_str)
+
+
+def _set(tree: dict[str, Any], name: str, value: Any) -> None:
+    tree.pop(name, None)
+    *parts, last = name.split(".")
+    for part in parts:
+        tree = tree.setdefault(part, {})
+    tree[last] = value

@@ -1,0 +1,57 @@
+"""What the parameter files among the arguments of a process have for one of its nodes."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+
+class ParameterFiles:
+    """Parameters that files give a node; raises `OSError`, `ValueError` if one cannot be read."""
+
+    def __init__(self, arguments: Sequence[str], node: str) -> None:
+        self.node, self.names = node, list[str]()
+        self.given: dict[str, Any] = {}  # see `parameter_file.Given`
+        self.sources: dict[str, str] = {}  # name of the file, by the parameter's
+        self.idle: list[str] = []  # a line for each file that has nothing for the node
+        for path in paths(arguments):
+            from climber_uk.parameters import (
+                parameter_file,  # where there is no file: no need of it
+            )
+
+            sections = parameter_file.read_sections(path)
+            given = parameter_file.given(sections, node)
+            self.names.append(str(path))
+            self.given |= given
+            self.sources |= dict.fromkeys(given, str(path))
+            if not given:
+                self.idle.append(parameter_file.nothing_for(node, path, sections))
+
+    def is_shared(self, name: str) -> bool:
+        """Whether a parameter is there only because nodes of any name are given it."""
+        return name in self.given and self.given[name].is_shared
+
+    def has_nothing_of(self, names: Iterable[str]) -> bool:
+        """Whether there are files, and none of these parameters in them."""
+        return bool(self.names) and not self.given.keys() & set(names)
+
+    @property
+    def emptiness(self) -> str:
+        """Line that says that files have nothing that a node needs."""
+        if self.idle:
+            return self.idle[0]
+        has = ", ".join(self.given)
+        return f"{', '.join(self.names)} has no parameters for {self.node} but {has}"
+
+    def named(self, names: Iterable[str]) -> str:
+        """Where the values of some parameters come from, to be read."""
+        return ", ".join(dict.fromkeys(self.sources.get(n, "command line") for n in names))
+
+
+def paths(arguments: Sequence[str]) -> Iterator[Path]:
+    """Parameter files among arguments; those of ROS stand between `--ros-args` and `--`."""
+    is_for_ros = False
+    for word, after in pairwise([*arguments, ""]):
+        is_for_ros = (is_for_ros or word == "--ros-args") and word != "--"
+        if is_for_ros and word == "--params-file":
+            yield Path(after)

@@ -1,0 +1,1 @@
+"""`replay_controller`: the controller over a recorded bag."""

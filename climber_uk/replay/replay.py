@@ -1,0 +1,162 @@
+"""The controller over a bag: what it would have answered to what it was told.
+
+After each answer it is made to believe that the recorded torques were sent, for it is these that
+moved the climber: every answer is one to the run as it was, whatever the parameters are.
+"""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from climber_uk.bags.publishing_order import read_published
+from climber_uk.bags.topics import ODOMETRY, REFERENCE, TORQUES
+from climber_uk.control.build import KINDS, new_follower, settings
+from climber_uk.control.controller import Answer
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.motion import Torques
+from climber_uk.messages import reading, reading_reference
+from climber_uk.messages.names import Names
+from climber_uk.parameters.parameter_file import Values
+from climber_uk.replay.recorded_controller import CLOCK, Modes, RecordedController
+
+PRESSURE = "suction_pressure"
+DEFAULTS = {
+    prefix + field.name: field.default
+    for kind, prefix in [*KINDS, (Names, "")]
+    for field in fields(kind)
+}
+Choose = Callable[[Mapping[str, Any]], Mapping[str, Any]]
+
+
+class Replay:
+    """A `Follower` that is told what the node was told; times are integers in nanoseconds.
+
+    `choose` makes the parameters of those that were in force.
+    """
+
+    def __init__(self, recorded: RecordedController, namespace: str, choose: Choose) -> None:
+        self.recorded, self.choose = recorded, choose
+        self.parameters = Values(choose(recorded.parameters or {}))
+        self.names = self.parameters.read(Names).within(namespace)
+        self.pressure: float | None = None  # [Pa] as last measured
+        self.follower = new_follower(self.parameters, None)
+        self.settings = deque(recorded.settings)  # that are to come
+        self.torques: dict[int, Array] = {}  # by stamp, right, left [N m]
+        self.modes: Modes = []
+        self.clock = self.looked = 0  # times of the node's clock, and of the wall clock
+        safety = self.follower.safety
+        self.look_period = round(
+            min(safety.odometry_timeout, safety.reference_timeout) / 2 * SECOND
+        )
+
+    @property
+    def changed(self) -> dict[str, tuple[Any, Any]]:
+        """Parameters that are others than in the bag: there, and here."""
+        told = self.recorded.parameters or {}
+        here = self.choose(told)
+        pairs = {
+            name: (told.get(name), here.get(name, default)) for name, default in DEFAULTS.items()
+        }
+        return {name: (was, now) for name, (was, now) in pairs.items() if was != now}
+
+    def run(self, bag: Path, namespace: str) -> None:
+        """Answer all of a bag; raises as `read_controller` does."""
+        odometry, reference = f"{namespace}/{ODOMETRY}", f"{namespace}/{REFERENCE}"
+        missing = {odometry, reference}
+        takers = {
+            CLOCK: self.on_clock,
+            odometry: self.on_odometry,
+            reference: self.on_reference,
+            f"{namespace}/{PRESSURE}": self.on_pressure,
+            f"{namespace}/{TORQUES}": self.on_torques,
+        }
+        for topic, at, message in read_published(bag, takers):
+            missing.discard(topic)
+            self.look_until(at)
+            self.pass_time(at)
+            takers[topic](at, message)
+        if missing:
+            raise ValueError(f"{bag} has no message on {' and '.join(sorted(missing))}")
+
+    def pass_time(self, now: int) -> None:
+        """Let the clock be a time of the wall clock, unless time is simulated; never go back."""
+        if not self.recorded.simulated:
+            self.clock = max(self.clock, now)
+
+    def look_until(self, at: int) -> None:
+        """Look, at the node's intervals of the wall clock, whether inputs have stopped."""
+        self.looked = self.looked or at
+        while self.looked + self.look_period <= at:
+            self.looked += self.look_period
+            self.pass_time(self.looked)
+            self.keep(self.follower.look(self.clock))
+
+    def on_clock(self, _: int, message: Any) -> None:
+        """Keep the simulated time."""
+        self.clock = reading.nanoseconds(message.clock)
+
+    def on_odometry(self, _: int, message: Any) -> None:
+        """Answer an odometry."""
+        stamp = reading.nanoseconds(message.header.stamp)
+        answered = self.recorded.published.get(stamp)
+        if answered is not None:
+            self.set(answered)
+            self.pass_time(answered)  # it looked at its clock right before
+        try:
+            state = reading.state(message, self.names.odom_frame, self.names.base_frame)
+        except ValueError as error:
+            self.keep(self.follower.on_bad_odometry(self.clock, str(error)))
+            return
+        self.keep(self.follower.on_odometry(self.clock, stamp, state))
+
+    def on_reference(self, _: int, message: Any) -> None:
+        """Keep a reference, unless it is one that the node refuses."""
+        try:
+            preview = reading_reference.preview(message, self.names.odom_frame)
+            preview.check_heading()
+        except ValueError:
+            return
+        self.keep(self.follower.on_reference(self.clock, preview))
+
+    def on_pressure(self, _: int, message: Any) -> None:
+        """Take the measured pressure into the model, unless it is one that the node refuses."""
+        try:
+            pressure = reading.pressure(message)
+        except ValueError:
+            return
+        if pressure != self.pressure:
+            self.pressure = pressure
+            self.retune()
+
+    def on_torques(self, at: int, message: Any) -> None:
+        """Look when the node did, and answered an odometry once more."""
+        if at != self.recorded.published.get(reading.nanoseconds(message.header.stamp)):
+            self.set(at)
+            self.keep(self.follower.look(self.clock))
+
+    def set(self, at: int) -> None:
+        """Set what others had set before the torques of some time were published."""
+        while self.settings and self.settings[0][0] <= at:
+            _, setting = self.settings.popleft()
+            self.follower.enable(setting.enabled)
+            self.parameters = Values(self.choose(setting.parameters or {}))
+            self.retune()
+
+    def retune(self) -> None:
+        """Follow as the parameters, and the measured pressure, say now."""
+        self.follower.tracker.retune(*settings(self.parameters, self.pressure))
+
+    def keep(self, answer: Answer | None) -> None:
+        """Keep the mode and the first answer to an odometry; go on from what was sent."""
+        mode = self.follower.mode.value
+        if not self.modes or mode != self.modes[-1][1]:
+            self.modes.append((self.clock, mode))
+        if answer is None or answer.stamp == 0:  # to no odometry
+            return
+        if answer.stamp not in self.torques:
+            self.torques[answer.stamp] = answer.torques
+            sent = self.recorded.torques.get(answer.stamp)
+            if sent is not None:
+                self.follower.tracker.correct(Torques(*sent.tolist()))

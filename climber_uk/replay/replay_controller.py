@@ -1,0 +1,114 @@
+"""`replay_controller BAG`: what the controller would answer to a recorded run, beside what it did.
+
+With other parameters it tells what these would change; with the same ones, nothing.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+from climber_uk.bags.publishing_order import are_known
+from climber_uk.bags.topics import TORQUES
+from climber_uk.parameters.parameter_file import read_argument, read_file
+from climber_uk.replay.recorded_controller import NODE, PARAMETERS, RecordedController
+from climber_uk.replay.replay import DEFAULTS, Replay
+from climber_uk.replay.torque_comparison import (
+    WHEELS,
+    Comparison,
+    compare,
+    summary,
+    table,
+    write_csv,
+)
+from climber_uk.report.outputs import output, printable
+from climber_uk.system.command_line import Parser
+
+
+def replayed(options: argparse.Namespace) -> Comparison:
+    """Replay a bag; raises `OSError` or `ValueError`, of one line, if that cannot be."""
+    namespace = "/" + options.namespace.strip("/") if options.namespace.strip("/") else ""
+    file = read_file(options.params, f"{namespace}/{NODE}") if options.params else None
+    given = dict(read_argument(argument) for argument in options.parameter)
+    for name in given:
+        if name not in DEFAULTS:
+            raise ValueError(f"{name} is not a parameter of the control law")
+
+    def choose(told: Mapping[str, Any]) -> dict[str, Any]:
+        return {**(told if file is None else file), **given}
+
+    recorded = RecordedController(options.bag, namespace, file)
+    if recorded.parameters is None and file is None:
+        raise ValueError(
+            f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
+        )
+    if not are_known(options.bag, [f"{namespace}/{TORQUES}"]):
+        print(
+            f"replay_controller: {options.bag} does not tell when messages were published: they "
+            "are taken in the order of their arrival at the recorder",
+            file=sys.stderr,
+        )
+    replay = Replay(recorded, namespace, choose)
+    replay.run(options.bag, namespace)
+    return compare(recorded, replay)
+
+
+def draw(found: Comparison, path: Path) -> None:
+    """Write both torques of each wheel, and the differences, as a figure."""
+    figure, axes = plt.subplots(3, figsize=(8, 8), sharex=True, layout="constrained")
+    for number, wheel in enumerate(WHEELS):
+        axis = axes[number]
+        axis.plot(found.time, found.recorded[:, number], color="0.7", linewidth=4, label="recorded")
+        axis.plot(found.time, found.replayed[:, number], linewidth=1, label="replayed")
+        axis.set_ylabel(f"{wheel} wheel [N m]")
+        axes[2].plot(found.time, found.difference[:, number], linewidth=1, label=wheel)
+    axes[2].set(xlabel="time [s]", ylabel="replayed - recorded [N m]")
+    for axis in axes:
+        axis.grid(alpha=0.3)
+        axis.legend(loc="upper right")
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Print the comparison and write its files."""
+    parser = Parser("replay_controller", __doc__)
+    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
+    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
+    parser.add_argument("--params", type=Path, help="parameter file (default: as recorded)")
+    parser.add_argument(
+        *("-p", "--parameter"),
+        action="append",
+        default=[],
+        metavar="NAME:=VALUE",
+        help="change one",
+    )
+    parser.add_argument(
+        *("--output", "-o"),
+        type=Path,
+        help="directory (default: a new one, replay, in the bag or beside it)",
+    )
+    parser.add_argument(
+        "--fail-above", type=float, metavar="TORQUE", help="status 1 if a torque differs more [N m]"
+    )
+    options = parser.arguments()
+    try:
+        with output(options.bag, "replay", options.output) as directory:
+            found = replayed(options)
+            numbers = summary(found)
+            (directory / "replay.json").write_text(json.dumps(numbers, indent=2) + "\n")
+            write_csv(found, directory / "torques.csv")
+            draw(found, directory / "torques.png")
+    except (ValueError, OSError) as error:
+        sys.exit(f"replay_controller: {printable(str(error))}")
+    print(table(numbers))
+    print(f"written: {directory}/replay.json, torques.csv, torques.png")
+    if options.fail_above is not None and found.largest > options.fail_above:
+        sys.exit(f"replay_controller: differs by {found.largest:.6g} N m > {options.fail_above:g}")

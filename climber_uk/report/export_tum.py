@@ -1,0 +1,90 @@
+"""`export_tum BAG`: a run's poses as TUM trajectories, which evo and others read.
+
+Lines of `stamp x y z qx qy qz qw`, in the order of the stamps: odom.tum, reference.tum with the
+reference at the stamps of the odometry, and ground_truth.tum if it was recorded. Where time starts
+again in the bag, each run has a directory of its own, run_1, run_2, ….
+"""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from climber_uk.bags.bag import open_bag
+from climber_uk.bags.collecting import collect
+from climber_uk.bags.run_reader import NoRunError, RunReader
+from climber_uk.bags.topics import ODOMETRY, REFERENCE, TRUTH, Topics
+from climber_uk.mechanics import SECOND, Array, Stamps
+from climber_uk.report.outputs import output, printable
+from climber_uk.system.command_line import Parser
+
+Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
+
+
+def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[str]]:
+    """Poses of each run by the names of their files, and what is to be said of the bag.
+
+    Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
+    """
+    with open_bag(bag) as opened:
+        reader = RunReader(opened, Topics(), namespace, None)
+        found = collect(opened, Topics(), [namespace])[0][namespace]
+        topic = reader.topic(ODOMETRY)
+        if not found.parts[ODOMETRY]:
+            raise ValueError("; ".join([f"{bag} has no message on {topic}", *opened.losses]))
+        runs = []
+        for part in found.runs():
+            try:
+                reader.check_agreement(part)
+            except NoRunError as error:
+                raise ValueError(f"{bag}: {error}") from None
+            odometry, truth = (reader.recorded(part, name) for name in (ODOMETRY, TRUTH))
+            reference = reader.reference(part, odometry.stamps)
+            known = np.isfinite(reference[:, 0])
+            poses = {
+                ODOMETRY: (odometry.stamps, odometry.values[:, :3]),
+                REFERENCE: (odometry.stamps[known], reference[known]),
+                TRUTH: (truth.stamps, truth.values[:, :3]),
+            }
+            runs.append({name: of for name, of in poses.items() if len(of[0])})
+        if not any(ODOMETRY in poses for poses in runs):
+            raise ValueError(f"{bag}: {'; '.join(opened.losses)}")
+        return runs, opened.losses
+
+
+def lines(poses: Poses) -> str:
+    """Poses as lines of a TUM trajectory, to the last bit."""
+    return "".join(
+        f"{stamp // SECOND}.{stamp % SECOND:09} {x!r} {y!r} 0 "
+        f"0 0 {math.sin(heading / 2)!r} {math.cos(heading / 2)!r}\n"
+        for stamp, (x, y, heading) in zip(*(array.tolist() for array in poses), strict=True)
+    )
+
+
+def main() -> None:
+    """Write the trajectories of a bag."""
+    parser = Parser("export_tum", __doc__)
+    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
+    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
+    parser.add_argument(
+        *("--output", "-o"),
+        type=Path,
+        help="directory (default: a new one, tum, in the bag or beside it)",
+    )
+    options = parser.arguments()
+    try:
+        with output(options.bag, "tum", options.output) as directory:
+            runs, losses = read_poses(options.bag, options.namespace.strip("/"))
+            if len(runs) > 1:
+                losses.append(f"time starts again, there are {len(runs)} runs")
+            for loss in losses:
+                print(printable(f"export_tum: {options.bag}: {loss}"), file=sys.stderr)
+            for number, found in enumerate(runs, start=1):
+                place = directory / f"run_{number}" if len(runs) > 1 else directory
+                place.mkdir(exist_ok=True)
+                for name, poses in found.items():
+                    (place / f"{name}.tum").write_text(lines(poses))
+                    print(f"{place / name}.tum: {len(poses[0])} poses")
+    except (ValueError, OSError) as error:
+        sys.exit(f"export_tum: {printable(str(error))}")

@@ -1,0 +1,34 @@
+"""A run in numbers: `GROUPS` has all metrics, and says what they are."""
+
+from climber_uk.report.metrics import effort, safety, timing, tracking, wall
+from climber_uk.report.metrics.metric import NAN, Case, Metric, prefix
+
+RUN = (
+    Metric("duration", "s", "from the first odometry to the last", lambda c: float(c.run.time[-1])),
+    Metric(
+        "travelled",
+        "m",
+        "way of the centre, by the speed in the odometry, or by its poses if it tells no twist",
+        effort.travelled,
+    ),
+)
+GROUPS: dict[str, tuple[Metric, ...]] = {
+    "Run": RUN,
+    "Tracking": tracking.METRICS,
+    "Motors and constraint forces": effort.METRICS,
+    "Hold on the wall": wall.METRICS,
+    "Timing": timing.METRICS,
+    "Safety": safety.METRICS,
+}
+METRICS = {metric.name: metric for group in GROUPS.values() for metric in group}
+
+
+def evaluate(case: Case) -> dict[str, float]:
+    """All metrics of a run, by their names; nan for what cannot be told."""
+    return {
+        name: float(metric.of(case)) if metric.concerns(case) else NAN
+        for name, metric in METRICS.items()
+    }
+
+
+__all__ = ["GROUPS", "METRICS", "Case", "Metric", "evaluate", "prefix"]

@@ -1,0 +1,71 @@
+"""Whether the controller followed, or had to give its safe output."""
+
+import math
+
+from climber_uk.bags.events import ERROR, Event
+from climber_uk.control.safety import Mode
+from climber_uk.report.metrics.metric import NAN, Case, Metric
+
+
+def following(case: Case) -> float:
+    """Share of the time of which the mode is known [%]."""
+    spans = case.run.modes
+    known = sum(end - begin for _, begin, end in spans)
+    followed = sum(end - begin for m, begin, end in spans if m.text == Mode.FOLLOWING.value)
+    return 100 * followed / known if known > 0 else NAN
+
+
+def stops(case: Case) -> float:
+    """How often a fault began, once it had followed or in the time of the run.
+
+    Before that it is how nodes start up, and so is a simulated clock that is not there yet.
+    """
+    modes, count, followed = case.run.modes, 0, False
+    for mode, begin, end in modes:
+        followed = followed or mode.text == Mode.FOLLOWING.value
+        is_starting = begin == end or _waits_for_clock(mode)
+        count += mode.level == ERROR and (followed or not is_starting)
+    return float(count) if modes else NAN
+
+
+def errors(case: Case) -> float:
+    """How often a node came to say ERROR, or said so when the run began; not as it starts up."""
+    if not case.run.is_diagnosed:
+        return NAN
+    told = [(time, event) for time, event in case.run.events if event.kind == "state"]
+    at_begin = {event.node: event for time, event in told if time < 0}.values()
+    follows = [t for t, e in case.run.events if e.kind == "mode" and e.text == Mode.FOLLOWING.value]
+    within = [
+        event
+        for time, event in told
+        if time >= 0 and not (_waits_for_clock(event) and time < min(follows, default=math.inf))
+    ]
+    begun = [event for event in at_begin if not _waits_for_clock(event)]
+    return float(sum(event.level == ERROR for event in [*begun, *within]))
+
+
+def _waits_for_clock(event: Event) -> bool:
+    return Mode.NO_CLOCK.value in event.text
+
+
+METRICS = (
+    Metric(
+        "following",
+        "%",
+        "share of time in which the controller followed, by /diagnostics",
+        following,
+    ),
+    Metric(
+        "safety_stops",
+        "",
+        "how often the controller gave its safe output because of a fault, by /diagnostics; not "
+        "as it starts up",
+        stops,
+    ),
+    Metric(
+        "errors",
+        "",
+        "how often a node came to be in the state ERROR, by /diagnostics; not as it starts up",
+        errors,
+    ),
+)

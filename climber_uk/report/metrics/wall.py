@@ -1,0 +1,116 @@
+"""How well the climber held on to its wall, and how the wall held on to it.
+
+m Δv = ∫ (τR + τL)/r dt - m g_t ∫ sinθ dt - f ∫ σ dt        (11), integrated
+"""
+
+import numpy as np
+
+from climber_uk.bags import topics
+from climber_uk.mechanics import Array
+from climber_uk.report.metrics.metric import NAN, Case, Metric, largest, lowest, share
+
+WINDOW = 0.5  # [s] over which momentum is balanced
+MOVING = 0.01  # [m/s] above which friction is that of sliding
+ASIDE, ASKEW = 0.02, 0.05  # [m/s] to a side, and share of the speed, above which it slips
+SUCTION = "suction"  # of the controller's `adhesion`
+
+
+def friction(case: Case) -> float:
+    """Coulomb friction f [N]: least squares over windows in which it moves one way."""
+    run, climber = case.run, case.known_climber
+    if climber is None or len(run.commands) < 2:
+        return NAN
+    time, speed = run.seconds(run.commands), run.rates[run.is_answered, 0]
+    drive, _ = climber.drive_and_turn(run.torques)
+    push = drive - climber.weight_along_wall * np.sin(run.pose[run.is_answered, 2])
+    pushed = np.concatenate([[0.0], np.cumsum(push[:-1] * np.diff(time))])
+    ways = np.concatenate([[0], np.cumsum(np.sign(speed) * (np.abs(speed) > MOVING))])
+
+    ends = np.flatnonzero(np.diff(time // WINDOW, prepend=-1))
+    begin, end = ends[:-1], ends[1:]  # of windows, the last of which is not whole
+    lasted, way = time[end] - time[begin], (ways[end] - ways[begin]) / (end - begin)
+    chosen = (np.abs(way) == 1) & (lasted < 1.5 * WINDOW)
+    taken = pushed[end] - pushed[begin] - climber.mass * (speed[end] - speed[begin])
+    opposed = (way * lasted)[chosen]
+    return float(taken[chosen] @ opposed / (opposed @ opposed)) if chosen.any() else NAN
+
+
+def _margin(case: Case, column: int) -> Array:
+    return case.run.hold.values[:, column]
+
+
+def slip_share(case: Case) -> float:
+    """Share of time that it slips [%], by the margin or by the way it goes, whichever is more.
+
+    Odometry of wheels sees no slip: that it alone tells none is not known to be none.
+    """
+    run = case.run
+    aside = np.abs(run.path_rates[:, 1]) > np.maximum(ASIDE, ASKEW * np.abs(run.path_rates[:, 0]))
+    if not (len(run.hold) or len(run.recorded[topics.TRUTH]) or aside.any()):
+        return NAN
+    return largest(np.array([share(_margin(case, 0) < 1), share(aside)]))
+
+
+def max_side_slip(case: Case) -> float:
+    """Largest speed to a side [m/s], by the twist and by the poses."""
+    return largest(np.concatenate([case.run.side_slip, case.run.path_rates[:, 1]]))
+
+
+def has_suction(case: Case) -> bool:
+    """Whether suction holds the climber, as far as is known."""
+    return case.run.parameters.get("adhesion", SUCTION) == SUCTION
+
+
+def _pressure(case: Case) -> Array:
+    return case.run.recorded[topics.PRESSURE].values.ravel()
+
+
+METRICS = (
+    Metric(
+        "lowest_slip_margin",
+        "",
+        "grip of the wheels over what is asked of it, at worst; below 1 they slip. As the "
+        "simulator tells it, else as the controller estimates it",
+        lambda case: lowest(_margin(case, 0)),
+    ),
+    Metric(
+        "slip_share",
+        "%",
+        "share of time with a slip margin below 1, or in which it goes to a side at more than "
+        "2 cm/s and 5 % of its speed, whichever is more: by the poses over 0.5 s, those of "
+        "`ground_truth` if it was recorded",
+        slip_share,
+    ),
+    Metric(
+        "lowest_tip_margin",
+        "",
+        "hold against tipping over what is asked of it, at worst; below 1 it tips",
+        lambda case: lowest(_margin(case, 1)),
+    ),
+    Metric(
+        "lowest_wheel_load",
+        "N",
+        "least load on the wheels",
+        lambda case: lowest(_margin(case, 2)),
+    ),
+    Metric(
+        "lowest_pressure",
+        "Pa",
+        "least pressure difference of the suction",
+        lambda case: lowest(_pressure(case)),
+        has_suction,
+    ),
+    Metric(
+        "max_side_slip",
+        "m/s",
+        "largest speed to a side, by the twist of the odometry or by the poses, as `slip_share`",
+        max_side_slip,
+    ),
+    Metric(
+        "friction",
+        "N",
+        "Coulomb friction against its motion: least squares of the momentum's balance over windows "
+        "of 0.5 s in which the climber moves one way; `identify` does it with care",
+        friction,
+    ),
+)

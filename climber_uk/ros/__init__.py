@@ -1,0 +1,1 @@
+"""What the nodes share: how they start, talk, take parameters and end."""

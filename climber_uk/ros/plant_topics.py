@@ -1,0 +1,50 @@
+"""The topics on which a simulated climber tells what a robot would tell, and the truth."""
+
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import FluidPressure, JointState
+
+from climber_uk.messages import writing
+from climber_uk.ros.running import SLOW, ClimberNode, Rhythm
+from climber_uk.simulation.simulated_robot import Machine
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # it comes with a ROS installation, not with the wheels
+    TFMessage = None
+
+
+class PlantTopics:
+    """The publishers of a node."""
+
+    def __init__(self, node: ClimberNode) -> None:
+        self.names, self.is_due = node.names, Rhythm(SLOW)
+        self.odometry = node.publisher(Odometry, "odom")
+        self.truth = node.publisher(Odometry, "ground_truth")
+        self.joints = node.publisher(JointState, "joint_states")
+        self.pressure = node.publisher(FluidPressure, "suction_pressure")
+        self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
+
+    def publish_odometry(self, machine: Machine, measured_at: int) -> None:
+        """Publish what the sensors tell, measured at a time [ns]."""
+        names = self.names
+        _, measured = machine.odometer.latest()
+        message = writing.odometry(measured, measured_at, names.odom_frame, names.base_frame)
+        self.odometry.publish(message)
+
+    def publish_others(self, machine: Machine, now: int) -> None:
+        """Publish how things are now [ns]."""
+        names, stamp = self.names, writing.time(now)
+        truth = writing.odometry(machine.state, now, names.odom_frame, names.base_frame)
+        self.truth.publish(truth)
+        joints = writing.wheel_torques(
+            machine.torques, now, names.left_wheel_joint, names.right_wheel_joint
+        )
+        joints.position = machine.angles[::-1].tolist()
+        joints.velocity = machine.rates[::-1].tolist()
+        self.joints.publish(joints)
+        if self.transform is not None:
+            self.transform.publish(TFMessage(transforms=[writing.transform(truth)]))
+        if self.is_due(now):
+            pressure = FluidPressure(fluid_pressure=machine.pressure)
+            pressure.header.stamp = stamp
+            self.pressure.publish(pressure)

@@ -1,0 +1,272 @@
+"""What every node of this package shares: how it starts, talks and ends."""
+
+import gc
+import math
+import re
+import signal
+import sys
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import ParameterException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
+
+from climber_uk.mechanics import SECOND
+from climber_uk.messages import writing
+from climber_uk.messages.names import Names
+from climber_uk.parameters.parameter_files import ParameterFiles
+from climber_uk.ros.parameters import QOS, Parameters
+from climber_uk.ros.transport import use_udp
+from climber_uk.system.signals import ignore_end, on_end
+
+RELIABLE = QoSProfile(depth=10)
+# what is kept for those who are behind: a recorder that the machine held up for half a second
+SENT = QoSProfile(depth=1000)
+BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+SIGNAL_PERIOD = 0.1  # [s]
+LONGEST_END = 4  # [s] from a signal to the end of the process, whatever hangs
+SLOW = SECOND // 20  # [ns] from one message to the next of what need not be told each time
+WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
+LINES, LINES_PERIOD = 6, 10.0  # [s]: of the log, on one subject
+EPILOG = (
+    "Parameters, which docs/parameters.md lists, come after --ros-args: --params-file FILE, or -p "
+    "NAME:=VALUE."
+)
+LATE = {"--params-file", "-p", "--param", "-r", "--remap"}
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Ration:
+    """Allows a few of many: `number` in each `period` [s] of the wall clock."""
+
+    def __init__(self, number: int, period: float) -> None:
+        self.period, self.times = period, deque([-math.inf] * number)
+        self.refused = 0  # since the last one that was allowed
+
+    def __call__(self) -> bool:
+        """Whether one more is allowed."""
+        now = WALL_CLOCK.now().nanoseconds / SECOND
+        if now - self.times[0] < self.period:
+            self.refused += 1
+            return False
+        self.times.popleft()
+        self.times.append(now)
+        return True
+
+
+class Rhythm:
+    """Says of the first stamp in each `period` [ns] that it is."""
+
+    def __init__(self, period: int) -> None:
+        self.period, self.number = period, -1
+
+    def __call__(self, stamp: int) -> bool:
+        """Whether no stamp of its period came right before."""
+        before, self.number = self.number, stamp // self.period
+        return before != self.number
+
+
+class ClimberNode(Node):
+    """A node with checked parameters, and topics whose QoS parameters can override.
+
+    `arguments` are those that rclpy was initialized with.
+    """
+
+    def __init__(
+        self, name: str, namespace: str = "", arguments: Sequence[str] | None = None
+    ) -> None:
+        super().__init__(name, namespace=namespace)
+        arguments = sys.argv if arguments is None else arguments
+        self.parameters = Parameters(self, arguments, self.on_parameters)
+        self.parameters.declare(Names)
+        self.names = self.parameters.read(Names).within(self.get_namespace())
+        self._troubles: dict[str, tuple[str, bool]] = {}
+        self._lines: dict[str, Ration] = {}  # that are logged on each subject
+        self._alone_on: Sequence[str] = ()
+        self._values: Callable[[], Mapping[str, object]] = dict
+        self._diagnostics: Publisher | None = None
+
+    def on_parameters(self) -> None:
+        """Take up changed parameters."""
+
+    def summary(self) -> str:
+        """What this node is made for, in a few numbers."""
+        return ""
+
+    def introduce(self) -> None:
+        """Log in a line what this node is, and what can hardly be meant of its parameters."""
+        about = self.summary()
+        self.get_logger().info(self.parameters.origin + (about and f"; {about}"))
+        for remark in [*self.parameters.remarks, *self._idle_overrides()]:
+            self.get_logger().warning(remark)
+
+    def _idle_overrides(self) -> list[str]:
+        """Lines about overrides of a QoS that nothing of this node has, or had until now."""
+        given = [name for name in self._parameter_overrides if name.startswith(QOS)]
+        idle = [name for name in given if not self.has_parameter(name)]
+        return [f"{name} overrides nothing{self.parameters.like(name)}" for name in idle]
+
+    def publisher(self, kind: type, topic: str, qos: QoSProfile = SENT) -> Publisher:
+        """Publisher whose QoS the parameters `qos_overrides.<topic>.publisher.*` override."""
+        return self._overridden(partial(self.create_publisher, kind, topic, qos))
+
+    def subscription(
+        self,
+        kind: type,
+        topic: str,
+        callback: Callable[..., None],
+        qos: QoSProfile = RELIABLE,
+        raw: bool = False,
+    ) -> Subscription:
+        """Subscription whose QoS the parameters `qos_overrides.<topic>.subscription.*` override."""
+        create = partial(self.create_subscription, kind, topic, callback, qos, raw=raw)
+        return self._overridden(create)
+
+    def _overridden(self, create: partial[Any]) -> Any:
+        """What `create` makes; `ValueError` if a parameter has its QoS wrong."""
+        try:
+            return create(qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        except (ParameterException, RuntimeError) as error:
+            raise ValueError(f"qos_overrides of {create.args[1]}: {error}") from None
+
+    def say(self, subject: str, trouble: str, detail: str = "", is_fault: bool = True) -> None:
+        """Log a trouble, or that it is over (''), once each time the trouble changes.
+
+        In diagnostics it is an error if `is_fault`, else a warning. Of troubles that come and go
+        too fast to be read, most are counted only.
+        """
+        if trouble == self._troubles.get(subject, ("", True))[0]:
+            return
+        self._troubles[subject] = trouble, is_fault
+        ration = self._lines.setdefault(subject, Ration(LINES, LINES_PERIOD))
+        if not ration():
+            return
+        more = f" [{ration.refused} changes were not logged]" if ration.refused else ""
+        ration.refused = 0
+        if trouble:
+            self.get_logger().warning(f"{subject}: {trouble}{detail and f' ({detail})'}{more}")
+        else:
+            self.get_logger().info(f"{subject}: ok again{more}")
+        self.diagnose()
+
+    def start_diagnostics(
+        self, values: Callable[[], Mapping[str, object]], alone_on: Sequence[str] = ()
+    ) -> None:
+        """Publish troubles and `values` on /diagnostics, every second and when troubles change.
+
+        On the topics `alone_on` there should be no more than one publisher.
+        """
+        self._values, self._alone_on = values, alone_on
+        self._diagnostics = self.publisher(DiagnosticArray, "/diagnostics")
+        self.create_timer(1.0, self.look_around, clock=WALL_CLOCK)
+
+    def look_around(self) -> None:
+        """Say where others publish what only one should, and how it goes."""
+        for topic in self._alone_on:
+            is_crowded = self.count_publishers(topic) > 1
+            self.say(
+                f"publishers of {topic}", "more than one" if is_crowded else "", is_fault=False
+            )
+        self.diagnose()
+
+    def diagnose(self) -> None:
+        """Publish troubles and values."""
+        troubles = {about: said for about, said in self._troubles.items() if said[0]}
+        level = DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK
+        if any(is_fault for _, is_fault in troubles.values()):
+            level = DiagnosticStatus.ERROR
+        text = "; ".join(f"{about}: {trouble}" for about, (trouble, _) in troubles.items())
+        self.publish_status("", level, text, self._values())
+
+    def publish_status(
+        self, about: str, level: bytes, text: str, values: Mapping[str, object]
+    ) -> None:
+        """Publish one status of this node on /diagnostics, once these have started."""
+        if self._diagnostics is not None:
+            name = self.get_fully_qualified_name() + (f": {about}" if about else "")
+            now = self.get_clock().now().nanoseconds
+            self._diagnostics.publish(writing.diagnostics(name, level, text, values, now))
+
+
+def run(
+    make_nodes: Callable[..., Sequence[ClimberNode]],
+    about: str | None,
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+) -> None:
+    """Spin nodes until a signal to end; exit with one line if they cannot start.
+
+    `make_nodes` gets the command line's `options`, of `argparse`, that are there.
+
+    rclpy's own signal handling takes the publishers away from under a running callback. Here the
+    callback is finished first. The executor is the one that takes half the CPU; its `spin` never
+    ends in rclpy 7.1, and it sees signals only between callbacks, hence the idle timer.
+    """
+    nodes: Sequence[ClimberNode] = ()
+    end = Future()
+
+    def stop(*_: object) -> None:
+        signal.alarm(LONGEST_END)  # by the kernel: the middleware may not come back
+        end.set_result(None)
+
+    on_end(stop)
+    try:
+        ParameterFiles(sys.argv, "")  # rcl would not say where a file is wrong
+        chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})
+        use_udp()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        nodes = make_nodes(**chosen)
+        nodes[0].create_timer(SIGNAL_PERIOD, lambda: None, clock=WALL_CLOCK)
+        executor = EventsExecutor()
+        for node in nodes:
+            node.introduce()
+            executor.add_node(node)
+        gc.freeze()  # to look through all that was imported would halt the loop for 20 ms
+        while not end.done():
+            executor.spin_until_future_complete(end, timeout_sec=3600.0)
+    except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
+        if nodes:
+            raise
+        sys.exit(f"{Path(sys.argv[0]).name}: {in_a_line(error)}")
+    finally:
+        ignore_end()  # the terminal and launch may both send a signal
+        for node in nodes:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def parse(
+    words: Sequence[str], about: str | None, options: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """What the words of a command line that are not for ROS choose among `options`."""
+    if not words:
+        return {}
+    from climber_uk.system.command_line import Parser  # most starts have nothing to parse
+
+    if LATE.intersection(words):
+        raise ValueError(f"{words[0]} must come after --ros-args")
+    parser = Parser(Path(sys.argv[0]).name, about, EPILOG)
+    for name, rules in options.items():
+        parser.add_argument(name, **rules)
+    return vars(parser.arguments(words))
+
+
+def in_a_line(error: Exception) -> str:
+    """What an error says, without rcl's lines of code."""
+    if isinstance(error, UnknownROSArgsError):
+        return f"not known after --ros-args: {str(error).strip('[]')}"
+    return re.sub(r", at /[^, ]*:\d+", "", " ".join(str(error).split()))

@@ -1,0 +1,35 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_plain import PAPER, many_starts, wheels
+
+from climber_uk.closed_loop import unicycle as plain
+from climber_uk.closed_loop.unicycle import Plain
+from climber_uk.mechanics.motion import Wrench, forces
+
+compiled = pytest.importorskip("climber_uk.closed_loop.compiled", reason="numba is not installed")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("fastest", [0.2, 6.0])
+def test_what_is_compiled_is_what_it_was_compiled_from(fastest):
+    random, number = np.random.default_rng(3), 600  # more than a block
+    masses = random.uniform(4, 6, number)
+    body, motion = Plain.of(replace(PAPER, mass=masses)), many_starts(number, fastest)
+    for _ in range(60):
+        wrench = Wrench(*forces(PAPER, *wheels(random, motion)))
+        expected = plain.advanced_often(body, motion, wrench, 0.0025, 2)
+        motion = compiled.advanced(body, motion, wrench, 0.0025, 2)
+        np.testing.assert_allclose(motion, expected, rtol=1e-12, atol=1e-12)
+    assert 10 < np.count_nonzero(motion.speed == 0) < number - 10  # sticking is in it
+
+
+def test_what_turns_too_fast_for_the_series_is_left_to_numpy():
+    motion = many_starts(5, 0.2)
+    motion = motion._replace(yaw_rate=motion.yaw_rate + 1000.0)
+    wrench = Wrench(np.zeros(5), np.zeros(5))
+    expected = plain.advanced_often(Plain.of(PAPER), motion, wrench, 0.0025, 3)
+    got = compiled.advanced(Plain.of(PAPER), motion, wrench, 0.0025, 3)
+    np.testing.assert_array_equal(got, expected)

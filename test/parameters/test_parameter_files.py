@@ -1,0 +1,90 @@
+"""Parameter files mean the same to the tools as to rcl, which reads them for the nodes."""
+
+import math
+import random
+from dataclasses import dataclass
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+
+from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.parameter_file import Values, read_argument, read_file
+from climber_uk.ros.parameters import Parameters
+
+SCALARS = """\
+5 5. 5.0 .5 -.5 +5 5e0 8e3 33e-2 1E5 1e+5 -1e-5 5.e3 08 010 -010 0x1F 0x1p3 0o17 0b1 1_000 1:30 00
+0 -0 +0 9223372036854775807 9223372036854775808 1e999 y Y n N yes no on off Yes NO On OFF true True
+TRUE tRUE null ~ .inf -.inf +.inf .nan .NaN inf -inf nan NaN Infinity 1.2.3 1e 1e5e5 e5 . a 12h
+2026-01-02 '5e0' "n"
+"""
+
+
+def read_by_rcl(path):
+    """What a node's parameters are after rcl has read the file."""
+    context = Context()
+    rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
+    node = Node("x", context=context, start_parameter_services=False, enable_rosout=False)
+    try:
+        return {name: given.value for name, given in node._parameter_overrides.items()}
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+@dataclass(frozen=True)
+class Renamed:
+    """A parameter that was called `size`."""
+
+    length: float = parameter(1.0, "m", "length", formerly="size")
+
+    def __post_init__(self):
+        check(self)
+
+
+@pytest.mark.parametrize(("given", "length"), [(["size:=2"], 2.0), (["size:=2", "length:=3"], 3.0)])
+def test_a_parameter_is_taken_under_its_former_name_with_a_remark(given, length):
+    arguments = ["--ros-args", *(word for one in given for word in ("-p", f"part.{one}"))]
+    context = Context()
+    rclpy.init(args=arguments, context=context)
+    node = Node("x", context=context, start_parameter_services=False, enable_rosout=False)
+    parameters = Parameters(node, arguments)
+    parameters.declare(Renamed, "part.")
+    parameters.refuse_unknown()
+    assert parameters.read(Renamed, "part.") == Renamed(length)
+    assert parameters.remarks == ["part.size is called part.length now"]
+    values = dict(read_argument(f"part.{one}") for one in given)
+    assert Values(values).read(Renamed, "part.") == Renamed(length)
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def same(one, other):
+    return type(one) is type(other) and (
+        one == other or (isinstance(one, float) and math.isnan(one) and math.isnan(other))
+    )
+
+
+def wrong(texts, directory):
+    """Scalars that we read otherwise than rcl, with both values."""
+    path = directory / "x.yaml"
+    lines = [f"    p{number}: {text}\n" for number, text in enumerate(texts)]
+    path.write_text("x:\n  ros__parameters:\n" + "".join(lines))
+    ours, theirs = read_file(path, "/x"), read_by_rcl(path)
+    assert ours.keys() == theirs.keys()
+    both = {text: (ours[f"p{i}"], theirs[f"p{i}"]) for i, text in enumerate(texts)}
+    return {text: values for text, values in both.items() if not same(*values)}
+
+
+def test_scalars_are_what_rcl_takes_them_for(tmp_path):
+    assert not wrong([*SCALARS.split(), "!!str 5", "|\n      5"], tmp_path)
+
+
+def test_any_scalar_is_what_rcl_takes_it_for(tmp_path):
+    draw = random.Random(1)
+    first, later = ".0123456789xnyif+", "-+.0123456789aeExXinfyo_"
+    texts = {
+        draw.choice(first) + "".join(draw.choices(later, k=draw.randrange(7))) for _ in range(5000)
+    }
+    assert not wrong(sorted(texts), tmp_path)

@@ -1,0 +1,190 @@
+"""One rule for where tools write: what was there stays, and whether they can is known first."""
+
+import sys
+
+import pytest
+from made_bag import SECOND, a_run, blank
+from test_restarts import two_runs, write
+
+from climber_uk.replay import replay_controller
+from climber_uk.report import analyze_bag, compare_bags, export_tum
+from climber_uk.report.outputs import output, printable
+
+TOOLS = {
+    analyze_bag: ("analysis", "metrics.csv"),
+    compare_bags: ("comparison", "metrics.csv"),
+    export_tum: ("tum", "odom.tum"),
+    replay_controller: ("replay", "torques.csv"),
+}
+pytestmark = pytest.mark.slow  # figures are
+each_tool = pytest.mark.parametrize(
+    "tool", TOOLS, ids=lambda tool: tool.__name__.rpartition(".")[2]
+)
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run a tool on a bag; return its exit status and what it said on both outputs."""
+
+    def run(tool, *arguments):
+        words = [arguments[0], *arguments] if tool is compare_bags else arguments
+        monkeypatch.setattr(sys, "argv", ["command", *map(str, words)])
+        status = None
+        try:
+            tool.main()
+        except SystemExit as ended:
+            status = ended.code
+        said = capsys.readouterr()
+        message = status if isinstance(status, str) else ""
+        assert "Traceback" not in said.err
+        return bool(status), said.out, said.err + message
+
+    return run
+
+
+def a_bag(path, *, as_file=False, storage="mcap"):
+    made = a_run(100)
+    made.add_parameters(left_wheel_joint="left", right_wheel_joint="right")
+    for stamp in made.stamps:
+        clock = blank("rosgraph_msgs/msg/Clock")
+        clock.clock.sec, clock.clock.nanosec = divmod(int(stamp), SECOND)
+        made.add("/clock", "rosgraph_msgs/msg/Clock", made.arrival(stamp) - 1, clock)
+    made.write(path, storage)
+    (file,) = [file for file in path.iterdir() if file.suffix in (".mcap", ".db3")]
+    return file.rename(path.with_suffix(file.suffix)) if as_file else path
+
+
+@each_tool
+@pytest.mark.parametrize(
+    ("as_file", "storage"), [(False, "mcap"), (True, "mcap"), (True, "sqlite3")]
+)
+def test_each_run_of_a_tool_writes_into_a_new_directory(tmp_path, run, tool, as_file, storage):
+    bag = a_bag(tmp_path / "run", as_file=as_file, storage=storage)
+    name, file = TOOLS[tool]
+    place = bag.with_name(f"run_{name}") if as_file else bag / name
+    kept = []
+    for number in range(2):
+        failed, out, err = run(tool, bag)
+        assert not failed, err
+        directory = place if number == 0 else place.with_name(f"{place.name}_{number + 1}")
+        assert f"{directory}/" in out
+        kept.append((directory / file).stat())
+    assert len({status.st_ino for status in kept}) == 2
+    assert kept[0] == (place / file).stat()
+
+
+@each_tool
+def test_what_output_names_is_made_and_written_into(tmp_path, run, tool):
+    bag, given = a_bag(tmp_path / "run"), tmp_path / "some" / "where"
+    before = sorted(bag.iterdir())
+    assert not run(tool, bag, "--output", given)[0]
+    assert (given / TOOLS[tool][1]).exists()
+    assert sorted(bag.iterdir()) == before
+
+
+@each_tool
+def test_that_nothing_can_be_written_is_said_before_the_work(tmp_path, run, tool):
+    """In place of a bag, which would be said if it were read."""
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "file").write_text("kept")
+    failed, out, err = run(tool, tmp_path / "bag", "--output", tmp_path / "file" / "x")
+    assert failed
+    assert out == ""
+    (line,) = err.splitlines()
+    assert f"cannot write into {tmp_path}/file/x (Not a directory): --output says where" in line
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+@each_tool
+@pytest.mark.parametrize("bag", ["nowhere", "empty"])
+def test_a_tool_that_fails_leaves_nothing_behind(tmp_path, run, tool, bag):
+    (tmp_path / "empty").mkdir()
+    for more in ([], ["--output", tmp_path / "a" / "b"]):
+        failed, _, err = run(tool, tmp_path / bag, *more)
+        assert failed
+        assert str(tmp_path / bag) in err
+        assert len(err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == [tmp_path / "empty"]
+    assert list((tmp_path / "empty").iterdir()) == []
+
+
+def test_what_was_written_before_a_failure_is_kept(tmp_path):
+    def fail_late():
+        with output(tmp_path, "x", None) as directory:
+            (directory / "part").write_text("some")
+            raise ValueError("late")
+
+    with pytest.raises(ValueError, match="late"):
+        fail_late()
+    assert (tmp_path / "x" / "part").read_text() == "some"
+
+
+@each_tool
+def test_runs_of_a_bag_in_which_time_starts_again_are_told_apart_or_refused(tmp_path, run, tool):
+    bag = write(tmp_path / "bag", two_runs())
+    failed, out, err = run(tool, bag)
+    assert "time starts again, there are 2 runs" in err
+    assert failed == (tool is replay_controller)
+    if tool is export_tum:
+        first, second = (bag / "tum" / f"run_{number}" for number in (1, 2))
+        same = (first / "reference.tum").read_text() == (second / "reference.tum").read_text()
+        assert same
+        assert (first / "odom.tum").read_text() != (second / "odom.tum").read_text()
+    elif not failed:
+        assert "run 2 of 2" in out
+
+
+def test_a_second_run_cannot_pass_unseen(tmp_path, run):
+    bag = write(tmp_path / "bag", two_runs())
+    failed, _, err = run(analyze_bag, bag, "--fail-if", "max_distance>0.1")
+    assert failed
+    assert "failed: run 2 of 2: max_distance is 0.5 > 0.1" in err
+
+
+def test_a_climber_without_a_run_cannot_pass_unseen(tmp_path, run):
+    one, other = a_run(100), a_run(100, namespace="/other")
+    for *_, sent in other.messages:
+        if hasattr(sent, "pose"):
+            sent.pose.pose.position.x = float("nan")
+    bag = write(tmp_path / "bag", one.messages + other.messages)
+    failed, out, err = run(analyze_bag, bag)
+    assert not failed
+    assert "rms_distance" in out
+    assert "no run on /other/odom" in err
+    assert run(analyze_bag, bag, "--fail-if", "max_distance>0.1")[0]
+    assert run(analyze_bag, bag, "--namespace", "", "--namespace", "other")[0]
+    assert not run(analyze_bag, bag, "--fail-if", "max_distance>0.1", "--namespace", "")[0]
+
+
+@pytest.mark.parametrize("bound", ["nan", "-nan", "NaN"])
+def test_a_bound_that_nothing_exceeds_is_refused(tmp_path, run, bound):
+    bag = a_bag(tmp_path / "run")
+    failed, _, err = run(analyze_bag, bag, "--fail-if", f"max_distance>{bound}")
+    assert failed
+    assert f"{bound} must be a number" in err
+
+
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [
+        ("plain ä → 1", "plain ä → 1"),
+        ("a\x1b[2Jb", "a\\x1b[2Jb"),
+        ("a\rb\tc\x9bd\u202ee", "a\\rb\\tc\\x9bd\\u202ee"),
+        ("two\nlines", "two\nlines"),
+    ],
+)
+def test_nothing_that_is_printed_commands_a_terminal(text, printed):
+    assert printable(text) == printed
+
+
+@pytest.mark.parametrize("tool", [analyze_bag, export_tum])
+def test_two_runs_at_the_same_times_are_refused_in_one_line(tmp_path, run, tool):
+    first, second = a_run(100), a_run(100)
+    second.pose[:, 0] += 0.5
+    second.messages.clear()
+    second.add_odometry()
+    bag = write(tmp_path / "bag", first.messages + second.messages)
+    failed, out, err = run(tool, bag)
+    assert (failed, out) == (True, "")
+    (line,) = err.splitlines()
+    assert f"{bag}: no run on /odom: 100 messages are more than 0.05 m from another" in line
