@@ -6,7 +6,7 @@ Needs what `bench/requirements.txt` lists. A comparison is a module with `compar
 import argparse
 import importlib
 
-from side_by_side import machine
+from side_by_side import robot
 
 COMPARISONS = {
     "torques": "peers.torques",
@@ -25,7 +25,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.rounds < 1:
         parser.error(f"rounds={options.rounds} must be >= 1")
-    print(machine())
+    print(robot())
     for name in options.only:
         try:
             comparison = importlib.import_module(COMPARISONS[name])

@@ -16,11 +16,11 @@ import numpy as np
 from limit import Limit, climber_numbers, controller_numbers
 from side_by_side import in_turns, rate, table, timed
 
-from climber_uk.closed_loop.batch import BLOCK, Course, Loops
+from climber_uk.closed_loop.batch import BLOCK, BatchRun, Loops
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.closed_loop.unicycle import Plain, advanced_often
+from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.many import keep_what_is_freed
@@ -58,7 +58,7 @@ def compared(title: str, ways: dict[str, Way], rounds: int) -> None:
 
 def open_loop(limit: Limit | None, with_numba: bool) -> dict[str, Way]:
     """Ways to advance climbers under constant torques."""
-    body, motion = Plain.of(PAPER), spread(OPEN)
+    body, motion = UnicycleModel.of(PAPER), spread(OPEN)
     wrench = Wrench(np.full(OPEN, PAPER.seal_friction), np.full(OPEN, 0.01))
     steps = OPEN * STEPS
     run = {"numpy": timed(lambda: advanced_often(body, motion, wrench, STEP, STEPS))}
@@ -89,7 +89,7 @@ def many_loops(number: int) -> Loops:
         mass=5 * random.uniform(0.9, 1.1, number),
         seal_friction_coefficient=0.8 * random.uniform(0.9, 1.1, number),
     )
-    return Loops(spread(number), true, Controller(PAPER, Guidance(), Law()))
+    return Loops(spread(number), true, ControlLaw(PAPER, Guidance(), ControlOptions()))
 
 
 def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, Way]:
@@ -100,7 +100,7 @@ def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, 
     def ours(compiled: bool) -> Callable[[], float]:
         def by_tick() -> float:
             """Ticks without the first, which is one of start-up."""
-            course = Course(ELLIPSE, TICKS * 0.005, steps=steps, compiled=compiled)
+            course = BatchRun(ELLIPSE, TICKS * 0.005, steps=steps, compiled=compiled)
             ends: list[float] = []
             loops.run_block(course, preview, lambda: ends.append(time.process_time()))
             return (ends[-1] - ends[0]) / (len(ends) - 1) * TICKS
@@ -120,7 +120,7 @@ def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, 
 
 def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
     """The same in C."""
-    controllers = controller_numbers(loops.controller, loops.observer, IN_C)
+    controllers = controller_numbers(loops.law, loops.observer, IN_C)
     climbers, start = climber_numbers(loops.climber, IN_C), np.array(loops.start).T.copy()
     preview = sampled(ELLIPSE, 1.0)
     times = (SECOND + round((tick + 0.5) * 0.005 * SECOND) for tick in range(TICKS))
@@ -128,9 +128,9 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
     memories = np.zeros((IN_C, 12))
     memories[:, :7] = start
     given = (
-        limit.pointer("Controller", controllers),
+        limit.pointer("ControlLaw", controllers),
         limit.pointer("Climber", climbers),
-        limit.pointer("Target", aims),
+        limit.pointer("ReferencePoint", aims),
     )
 
     def in_c() -> Array:
@@ -141,7 +141,7 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
 
     end = ELLIPSE.at(TICKS * 0.005).target
     far = np.hypot(*(in_c()[:, :2] - (end.x, end.y)).T)
-    ours = loops.run(Course(ELLIPSE, TICKS * 0.005, steps=steps)).last
+    ours = loops.run(BatchRun(ELLIPSE, TICKS * 0.005, steps=steps)).last
     if np.abs(far - ours).max() > 1e-9:
         raise RuntimeError(f"the C is {np.abs(far - ours).max()} m elsewhere")
     return timed(in_c)
@@ -149,7 +149,7 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[], float]:
 
 def half(number: int) -> None:
     """Some loops, in a process of their own."""
-    many_loops(number).run(Course(ELLIPSE, 0.5))
+    many_loops(number).run(BatchRun(ELLIPSE, 0.5))
 
 
 def two_processes() -> float:

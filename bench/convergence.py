@@ -38,8 +38,8 @@ def start(case: str, offset: np.ndarray) -> State:
 
 def run(case: str, constraints: str, offset: np.ndarray, duration: float = 4.0) -> Run:
     """Run of a case from an offset."""
-    follower = ours(WEAK, CONSTRAINTS[constraints]())
-    return simulate(CASES[case], start(case, offset), duration, follower, WEAK)
+    controller = ours(WEAK, CONSTRAINTS[constraints]())
+    return simulate(CASES[case], start(case, offset), duration, controller, WEAK)
 
 
 def share_back(case: str, constraints: str, distance: float, turn: float) -> float:

@@ -6,11 +6,11 @@ import numpy as np
 
 from climber_uk.closed_loop.simulate import Controlling, Link, Run, simulate
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Answer, Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Answer, Controller
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.identification.estimation import CUT, identify
 from climber_uk.identification.identified import NAMES, Choice, Identified
@@ -49,9 +49,9 @@ class Scenario:
 
     def run(self, believed: Climber, true: Climber, link: Link, seed: int = 0) -> tuple[Run, "Ear"]:
         """Run of a controller that believes in a climber, and what it was told."""
-        controller = Controller(believed, self.guidance, Law())
+        law = ControlLaw(believed, self.guidance, ControlOptions())
         timing = Timing(control_period=self.period)
-        ear = Ear(Follower(Tracker(controller, Observer(), timing, Pacing()), Safety()))
+        ear = Ear(Controller(SampledController(law, Observer(), timing, Pacing()), Safety()))
         link = replace(link, step=self.period / 2, period=self.period)
         loop = self.trajectory, self.start, self.duration, ear, true, link
         return simulate(*loop, seed=seed, plant_of=self.plant), ear

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.model import Observer
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
@@ -47,14 +47,14 @@ def climber_numbers(climber: Climber, number: int) -> Array:
     return np.stack([np.broadcast_to(each, number) for each in numbers], axis=1).astype(float)
 
 
-def controller_numbers(controller: Controller, observer: Observer, number: int) -> Array:
-    """Numbers (number, 16) of a `Controller` in C."""
-    gains = controller.constraints
+def controller_numbers(law: ControlLaw, observer: Observer, number: int) -> Array:
+    """Numbers (number, 16) of a `ControlLaw` in C."""
+    gains = law.constraints
     assert isinstance(gains, Guidance)
     numbers = (
         *(gains.along_track_gain, gains.cross_track_gain, gains.speed_rate),
         *(gains.heading_frequency, gains.fade_speed, gains.catch_up_speed, gains.turn_rate),
-        *(controller.law.friction_speed, observer.bandwidth),
+        *(law.options.friction_speed, observer.bandwidth),
     )
     rest = np.broadcast_to(numbers, (number, 9))
-    return np.concatenate([climber_numbers(controller.climber, number), rest], axis=1)
+    return np.concatenate([climber_numbers(law.climber, number), rest], axis=1)

@@ -28,12 +28,12 @@ from scipy.linalg import expm
 from climber_uk.closed_loop.simulate import Link
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
@@ -118,10 +118,10 @@ def stands(channel: Channel, observer: Observer, period: float, delay: float, la
 
 def simulated(scenario: Scenario, observer: Observer, learns: bool, link: Link) -> bool:
     """Whether the loop of the nodes stands."""
-    controller = Controller(scenario.climber, scenario.gains, Law())
-    tracker = Tracker(controller, observer, Timing(learn_delay=learns), Pacing())
-    follower = Follower(tracker, Safety(), ANYWHERE, UNGUARDED)
-    run = run_of(scenario.trajectory, scenario.start, 15.0, follower, scenario.climber, link)
+    law = ControlLaw(scenario.climber, scenario.gains, ControlOptions())
+    sampled_controller = SampledController(law, observer, Timing(learn_delay=learns), Pacing())
+    controller = Controller(sampled_controller, Safety(), ANYWHERE, UNGUARDED)
+    run = run_of(scenario.trajectory, scenario.start, 15.0, controller, scenario.climber, link)
     return run.rms(7.5) < OFF and run.chatter() < CHATTER
 
 

@@ -33,7 +33,7 @@ from climber_uk.simulation.inputs import FellOff
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
-from climber_uk.simulation.simulated_robot import Machine, Parts, Physics
+from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -153,15 +153,15 @@ def suction_lost() -> Figure:
         plant = Plant(BUILT, 0.0025, Contact(adhesion=Suction(pump_time=1.0)), slip=slip)
         start = State(np.array([0.0, 3.0, math.pi / 4]), np.zeros(3))
         physics = Physics(slip=slip, pressure_loss_time=5.0)
-        machine = Machine(Parts(plant, Motors(), Sensors(), physics), start, 0.005)
+        robot = SimulatedRobot(Parts(plant, Motors(), Sensors(), physics), start, 0.005)
         table = []
         try:
             while True:
-                _, y, _ = machine.state.pose
-                table.append([machine.time, machine.pressure, *machine.margins(), y])
-                machine.advance(np.zeros(2))
+                _, y, _ = robot.state.pose
+                table.append([robot.time, robot.pressure, *robot.margins(), y])
+                robot.advance(np.zeros(2))
         except FellOff as fall:
-            print(f"suction lost, slip {slip}: fell off at {machine.time:.3f} s: {fall}")
+            print(f"suction lost, slip {slip}: fell off at {robot.time:.3f} s: {fall}")
         time, pressure, slipping, tipping, y = np.array(table).T
         moved = time[np.abs(y - 3.0) > 0][0]
         low = time[slipping < 1][0]

@@ -111,18 +111,18 @@ def told(of: Robot) -> float:
 def driven(seed: int, delay_of: Callable[[Robot], float]) -> Result:
     """How the robot of a seed drives, told of a delay."""
     of = robot(seed)
-    follower = ours(BUILT, SLOW_GUIDANCE, delay_of(of))
+    controller = ours(BUILT, SLOW_GUIDANCE, delay_of(of))
     run = simulate(
         EIGHT,
         AT_REST,
         DURATION,
-        follower,
+        controller,
         of.climber,
         of.link,
         plant_of=partial(Plant, contact=of.contact),
     )
     late = DURATION / 2
-    return Result(run.rms(late), run.chatter(late), follower.tracker.latency.delay)
+    return Result(run.rms(late), run.chatter(late), controller.sampled_controller.latency.delay)
 
 
 def untold(_: Robot) -> float:

@@ -8,7 +8,7 @@ from climber_uk.closed_loop.simulate import Link
 from climber_uk.control.constraints import ConstraintSet, Guidance, demanded, tracking_error
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
-from climber_uk.control.sampled_controller import Tracker
+from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.elementary import arctan, cos, sin
@@ -80,7 +80,7 @@ class AdaptiveGains:
     layer: float  # ε
 
 
-class AdaptiveRobust(Tracker):
+class AdaptiveRobust(SampledController):
     """Adaptive robust UK control with leakage in the observer's place.
 
     As Udwadia, Wanichanon & Cho (2014) and Zhen, Chen et al. do: the nominal UK force, and against
@@ -105,16 +105,16 @@ class AdaptiveRobust(Tracker):
         reference = preview.at(self.stamp)
         if reference is not None and self.motion is not None:
             state = State.moving(self.motion)
-            errors = constraint_errors(self.controller.constraints, state, reference)
-            forces = []
+            errors = constraint_errors(self.law.constraints, state, reference)
+            wrench_of_torques = []
             for i, gains in enumerate((self.drive_gains, self.turn_gains)):
                 beta, bound = errors[i], self.bounds[i]
                 mu = beta * bound
                 gamma = 1 / max(abs(mu), gains.layer)
-                forces.append(-gamma * mu * bound)
+                wrench_of_torques.append(-gamma * mu * bound)
                 growth = gains.growth * abs(beta) - gains.leakage * bound
                 self.bounds[i] = max(bound + self.period * growth, 0.0)
-            self.disturbance = Wrench(*(-force for force in forces))
+            self.disturbance = Wrench(*(-force for force in wrench_of_torques))
         return super().answer(preview, age)
 
 

@@ -17,12 +17,12 @@ from scipy.spatial import cKDTree
 from climber_uk.closed_loop.simulate import Controlling, Link, Run, as_commanded, simulate
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import ConstraintSet, Exact, Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.shapes import Ellipse
@@ -48,12 +48,14 @@ def ours(
     gains: ConstraintSet = GUIDANCE,
     delay: float = 0.0,
     observer: Observer = OBSERVER,
-    tracker: type[Tracker] = Tracker,
-) -> Follower:
+    sampled_controller: type[SampledController] = SampledController,
+) -> Controller:
     """The controller as the node runs it."""
-    controller = Controller(climber, gains, Law())
+    law = ControlLaw(climber, gains, ControlOptions())
     timing = Timing(transport_delay=delay)
-    return Follower(tracker(controller, observer, timing, Pacing()), Safety(), ANYWHERE, UNGUARDED)
+    return Controller(
+        sampled_controller(law, observer, timing, Pacing()), Safety(), ANYWHERE, UNGUARDED
+    )
 
 
 def without_observer(
@@ -61,7 +63,7 @@ def without_observer(
     gains: Guidance = GUIDANCE,
     delay: float = 0.0,
     observer: Observer = OBSERVER,
-) -> Follower:
+) -> Controller:
     """Ours, believing its model."""
     return ours(climber, gains, delay, replace(observer, bandwidth=0.0))
 
@@ -71,7 +73,7 @@ def exact(
     gains: Guidance = GUIDANCE,
     delay: float = 0.0,
     observer: Observer = OBSERVER,
-) -> Follower:
+) -> Controller:
     """Ours with the other constraint set."""
     return ours(climber, Exact(), delay, observer)
 
@@ -81,7 +83,7 @@ def adaptive(
     gains: Guidance = GUIDANCE,
     delay: float = 0.0,
     observer: Observer = OBSERVER,
-) -> Follower:
+) -> Controller:
     """Adaptive robust control in the observer's place."""
     return ours(climber, gains, delay, replace(observer, bandwidth=0.0), AdaptiveRobust)
 
@@ -199,10 +201,10 @@ def too_weak(make: Make) -> tuple[float, float, float]:
 
 def know_limit(controlling: Controlling, climber: Climber) -> None:
     """Tell a controller of a new torque limit."""
-    if isinstance(controlling, Follower):
-        tracker = controlling.tracker
-        if tracker.controller.climber is not climber:
-            tracker.controller = replace(tracker.controller, climber=climber)
+    if isinstance(controlling, Controller):
+        sampled_controller = controlling.sampled_controller
+        if sampled_controller.law.climber is not climber:
+            sampled_controller.law = replace(sampled_controller.law, climber=climber)
     else:
         controlling.climber = climber
 
@@ -214,7 +216,7 @@ def interrupted(make: Make, duration: float = 20.0) -> tuple[float, int]:
 
     def climber(_: float) -> Climber:
         nonlocal stops
-        stops += isinstance(controlling, Follower) and controlling.mode.is_fault
+        stops += isinstance(controlling, Controller) and controlling.mode.is_fault
         return PAPER
 
     run = run_of(ELLIPSE, IN_MOTION, duration, controlling, climber, Link(loss=0.3, jitter=0.02))

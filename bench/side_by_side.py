@@ -64,11 +64,11 @@ def _spread(values: Array, median_width: int, quartiles_width: int) -> str:
     return f"{median:>{median_width}.4g}{quartiles:>{quartiles_width}}"
 
 
-def machine() -> str:
+def robot() -> str:
     """What all this ran on."""
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    here = f"{names[0] if names else platform.machine()}, {len(names)} cores"
+    here = f"{names[0] if names else platform.robot()}, {len(names)} cores"
     return f"{here}; Python {platform.python_version()}, {', '.join(map(_versioned, PACKAGES))}"
 
 

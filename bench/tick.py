@@ -1,7 +1,8 @@
 """`python bench/tick.py`: what a controller's tick costs, beside other ways to compute the same.
 
-A tick is `Tracker.see` and `Tracker.answer`: prediction, constraints, UK, observer, saturation,
-without messages. All ways are measured in turns in one process; the least time of many counts.
+A tick is what `SampledController` does from an odometry to its torques: prediction, constraints, UK,
+observer and saturation, without messages. All ways are measured in turns in one process; the
+least time of many counts.
 """
 
 import argparse
@@ -16,13 +17,13 @@ from scipy.linalg import sqrtm
 
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.constraints import CONSTRAINTS, rows
-from climber_uk.control.control_law import Controller, Law, Situation
+from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
 from climber_uk.control.model import Observer
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Demand, Motion, Target, Torques, Wrench
+from climber_uk.mechanics.motion import DesiredAcceleration, Motion, ReferencePoint, Torques, Wrench
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
@@ -45,15 +46,15 @@ def as_the_paper(M: Array, Q: Array, A: Array, b: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class WithMatrices(Controller):
+class WithMatrices(ControlLaw):
     """The same law, but with M, Q, A and b, and a function that solves them."""
 
     solve: Callable[[Array, Array, Array, Array], Array] = constraint_force
 
-    def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
-        """See `Controller`."""
+    def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
+        """See `ControlLaw`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
-        direction = np.tanh(demand[2] / self.law.friction_speed)
+        direction = np.tanh(demand[2] / self.options.friction_speed)
         Q = climber.applied_force(heading, direction)
         Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
         return float(along(heading, Qc)), float(Qc[2]), float(across(heading, Qc))
@@ -72,12 +73,12 @@ class Known:
     def __init__(self, preview: Preview, times: Iterable[int]) -> None:
         self.targets = {time: preview.target(time) for time in times}
 
-    def target(self, time: int) -> Target | None:
+    def target(self, time: int) -> ReferencePoint | None:
         """See `Preview`."""
         return self.targets[time]
 
 
-def ticks(tracker: Tracker, known: bool = False) -> Callable[[], None]:
+def ticks(sampled_controller: SampledController, known: bool = False) -> Callable[[], None]:
     """Ticks of a tracker on its way along the paper's ellipse, with targets that are known or not.
 
     A tick aims at the middle of the period that follows it.
@@ -93,54 +94,63 @@ def ticks(tracker: Tracker, known: bool = False) -> Callable[[], None]:
     def some() -> None:
         nonlocal number
         if number + TICKS > len(all_of_them):
-            tracker.reset()
+            sampled_controller.reset()
             number = 0
         for stamp, motion in all_of_them[number : number + TICKS]:
-            tracker.see(stamp, motion)
-            tracker.answer(preview, 0.0)
+            sampled_controller.see(stamp, motion)
+            sampled_controller.answer(preview, 0.0)
         number += TICKS
 
     return some
 
 
-def ticks_in_c(limit: Limit, tracker: Tracker) -> tuple[Callable[[], None], Array]:
+def ticks_in_c(
+    limit: Limit, sampled_controller: SampledController
+) -> tuple[Callable[[], None], Array]:
     """Ticks of the same law in C, of targets that are known; and their torques (n, 2)."""
-    controllers = controller_numbers(tracker.controller, tracker.observer, 1)
+    controllers = controller_numbers(sampled_controller.law, sampled_controller.observer, 1)
     numbers, preview = np.array(motions_on_the_way(TICKS)), sampled(PAPER, 1.0)
     times = (SECOND + round((number + 0.5) * PERIOD * SECOND) for number in range(TICKS))
     aims = np.array([preview.target(time) for time in times])
     memory, torques = np.zeros((1, 12)), np.zeros((TICKS, 2))
     memory[0, :7] = numbers[0]
-    arrays = (("Controller", controllers), ("Memory", memory), ("Motion", numbers))
-    controller, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
-    targets, told = limit.pointer("Target", aims), limit.pointer("double", torques)
+    arrays = (("ControlLaw", controllers), ("Memory", memory), ("Motion", numbers))
+    law, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
+    targets, told = limit.pointer("ReferencePoint", aims), limit.pointer("double", torques)
 
     def some() -> None:
         tick = limit.functions.tick  # which lives as long as the library does
         for i in range(TICKS):
-            tick(controller, past, motions + i, targets + i, PERIOD, told + 2 * i)
+            tick(law, past, motions + i, targets + i, PERIOD, told + 2 * i)
 
     return some, torques
 
 
-def with_known_targets(tracker: Tracker, in_c: Callable[[], None]) -> dict[str, Callable[[], None]]:
+def with_known_targets(
+    sampled_controller: SampledController, in_c: Callable[[], None]
+) -> dict[str, Callable[[], None]]:
     """The same work as the C does, which is given the targets."""
-    another = Tracker(tracker.controller, tracker.observer, tracker.timing, tracker.pacing)
+    another = SampledController(
+        sampled_controller.law,
+        sampled_controller.observer,
+        sampled_controller.timing,
+        sampled_controller.pacing,
+    )
     return {
         f"{OURS}, targets known": ticks(another, known=True),
         "C through cffi, targets known": in_c,
     }
 
 
-def bare(controller: Controller) -> Callable[[], None]:
+def bare(law: ControlLaw) -> Callable[[], None]:
     """The law alone: a torque from state and reference."""
     reference = PAPER.at(1.0)
     target, motion = reference.target, State(reference.pose, reference.velocity).motion
-    situation = Situation(motion, Torques(0.0, 0.0), Wrench(0.0, 0.0), PERIOD)
+    situation = ControlInput(motion, Torques(0.0, 0.0), Wrench(0.0, 0.0), PERIOD)
 
     def some() -> None:
         for _ in range(TICKS):
-            controller.command(situation, target)
+            law.command(situation, target)
 
     return some
 
@@ -158,26 +168,26 @@ def least(ways: dict[str, Callable[[], None]], rounds: int) -> dict[str, float]:
     return best
 
 
-def ways(constraints: str, law: Law) -> dict[str, Controller]:
+def ways(constraints: str, options: ControlOptions) -> dict[str, ControlLaw]:
     """Controllers that give the same torques."""
     gains = CONSTRAINTS[constraints]()
     return {
-        OURS: Controller(Climber(), gains, law),
-        "generic UK, numpy": WithMatrices(Climber(), gains, law),
-        "the paper's formula": WithMatrices(Climber(), gains, law, as_the_paper),
+        OURS: ControlLaw(Climber(), gains, options),
+        "generic UK, numpy": WithMatrices(Climber(), gains, options),
+        "the paper's formula": WithMatrices(Climber(), gains, options, as_the_paper),
     }
 
 
-def check(tracker: Tracker, run: Callable[[], None], torques: Array) -> None:
+def check(sampled_controller: SampledController, run: Callable[[], None], torques: Array) -> None:
     """Raise `RuntimeError` unless the C gives what the tracker answers."""
     run()
     preview = sampled(PAPER, 1.0)
     for number, motion in enumerate(motions_on_the_way(TICKS)):
-        tracker.see(SECOND + round(number * PERIOD * SECOND), motion)
-        command = tracker.answer(preview, 0.0)
+        sampled_controller.see(SECOND + round(number * PERIOD * SECOND), motion)
+        command = sampled_controller.answer(preview, 0.0)
         if command is None or np.abs(command.torques - torques[number]).max() > 1e-9:
             raise RuntimeError(f"tick {number}: {command} is not {torques[number]}")
-    tracker.reset()
+    sampled_controller.reset()
 
 
 def table(title: str, times: dict[str, float]) -> None:
@@ -197,10 +207,10 @@ def main() -> None:
     limit = None if options.no_c else Limit()
     for constraints in CONSTRAINTS:
         trackers = {
-            name: Tracker(controller, Observer(), Timing(), Pacing())
-            for name, controller in ways(constraints, Law()).items()
+            name: SampledController(law, Observer(), Timing(), Pacing())
+            for name, law in ways(constraints, ControlOptions()).items()
         }
-        whole = {name: ticks(tracker) for name, tracker in trackers.items()}
+        whole = {name: ticks(sampled_controller) for name, sampled_controller in trackers.items()}
         if limit is not None and constraints == "guidance":
             ours = next(iter(trackers.values()))
             run, torques = ticks_in_c(limit, ours)
@@ -208,8 +218,8 @@ def main() -> None:
             whole |= with_known_targets(ours, run)
         table(f"tick, {constraints}", least(whole, options.rounds))
         alone = {
-            name: bare(controller)
-            for name, controller in ways(constraints, Law(predict=False)).items()
+            name: bare(law)
+            for name, law in ways(constraints, ControlOptions(predict=False)).items()
         }
         table(f"law alone, {constraints}", least(alone, options.rounds))
 

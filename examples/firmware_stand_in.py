@@ -30,11 +30,11 @@ from climber_uk.messages import writing
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros import plant_parts
 from climber_uk.ros.plant_time import ASK_AGAIN, TICK
-from climber_uk.ros.running import ClimberNode, Rhythm
+from climber_uk.ros.running import ClimberNode, Throttle
 from climber_uk.ros.transport import use_udp
 from climber_uk.simulation.inputs import FellOff
-from climber_uk.simulation.options import Options
-from climber_uk.simulation.simulated_robot import Machine
+from climber_uk.simulation.options import SimulationOptions
+from climber_uk.simulation.simulated_robot import SimulatedRobot
 
 CUT, LIMITED = 1, 2  # flags
 SIGNS = np.array(MOUNTED)
@@ -63,16 +63,19 @@ class FirmwareStandIn(ClimberNode):
         self.parameters.declare(Board)
         plant_parts.declare(self.parameters)
         self.parameters.refuse_unknown()
-        self.board, self.options = self.parameters.read(Board), self.parameters.read(Options)
+        self.board, self.options = (
+            self.parameters.read(Board),
+            self.parameters.read(SimulationOptions),
+        )
         parts = plant_parts.parts(self.parameters)
-        self.machine = Machine(parts, self.options.initial_state, self.options.control_period)
+        self.robot = SimulatedRobot(parts, self.options.initial_state, self.options.control_period)
         self.torque = self.board.motor_constant * self.board.gear_ratio  # [N m] at a wheel for 1 A
         self.period = round(self.options.control_period * SECOND)
         self.time, self.commanded_at = SECOND, 0  # [ns] since the board was switched on
         self.commanded = np.zeros(2)  # [A]
         self.flags, self.refused, self.rest = CUT, 0, b""
         self.clock = self.publisher(Clock, "/clock") if self.options.simulated_time else None
-        self.is_due = Rhythm(TICK)
+        self.is_due = Throttle(TICK)
         self.port, self.line = pty.openpty()  # our end, and the one for the driver
         tty.setraw(self.line)
         os.set_blocking(self.port, False)
@@ -132,22 +135,22 @@ class FirmwareStandIn(ClimberNode):
         self.flags = CUT * cut | LIMITED * limited
         torques = (self.torque * SIGNS * currents)[::-1]
         for _ in range(self.options.steps):
-            self.machine.advance(torques)
+            self.robot.advance(torques)
         self.time += self.period
 
     def tell(self) -> None:
         """Send a frame, and write down the truth; what the driver does not read is lost."""
         count = 2 * math.pi / self.board.encoder_counts
-        counts = np.floor(SIGNS * self.machine.angles[::-1] / count).astype(int)
-        currents = np.round(1e3 * SIGNS * self.machine.torques[::-1] / self.torque).astype(int)
+        counts = np.floor(SIGNS * self.robot.angles[::-1] / count).astype(int)
+        currents = np.round(1e3 * SIGNS * self.robot.torques[::-1] / self.torque).astype(int)
         now = self.time // 1000 % 2**32
         numbers = (now, *counts, *currents, self.flags, self.refused)
         with suppress(BlockingIOError):
             os.write(self.port, packed(f"E {' '.join(map(str, numbers))}"))
         if self.is_due(self.time):
             self.tell_time()
-        right, left = self.machine.torques
-        row = (self.time / SECOND, *self.machine.state.pose, left, right)
+        right, left = self.robot.torques
+        row = (self.time / SECOND, *self.robot.state.pose, left, right)
         print(*(f"{number:.9f}" for number in row), sep=",", file=self.truth)
 
     def tell_time(self) -> None:

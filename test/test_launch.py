@@ -12,7 +12,7 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from climber_uk.simulation.options import Options
+from climber_uk.simulation.options import SimulationOptions
 
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "launch" / "climber.launch.py"
@@ -175,7 +175,7 @@ def test_a_simulation_that_is_recorded_waits_for_the_recorder(launch):
     (config, given) = found[PLANT]["parameters"]
     assert config == str(CONFIG)
     assert given == {"simulated_time": True, "wait_for": "rosbag2_recorder"}
-    assert given.keys() <= Options.__dataclass_fields__.keys()
+    assert given.keys() <= SimulationOptions.__dataclass_fields__.keys()
     assert found[CONTROLLER]["parameters"][1] == {"use_sim_time": True}
     found, _ = nodes(launch)
     assert found[PLANT]["parameters"][1] == {"simulated_time": False}

@@ -2,21 +2,21 @@
 
 from typing import Any
 
-from climber_uk.control.control_law import Controller
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.mechanics.elementary import tanh
-from climber_uk.mechanics.motion import Demand, Motion
+from climber_uk.mechanics.motion import DesiredAcceleration, Motion
 
 
-class ByInverseDynamics(Controller):
+class ByInverseDynamics(ControlLaw):
     """The same law; the friction of the seal, which no model of rigid bodies has, is added."""
 
     def needed(self, v_1: float, theta_2: float, motion: Motion) -> tuple[float, float, float]:
         """What gives v̇ and θ̈ without friction: forward [N], to the left [N], about z [N m]."""
         raise NotImplementedError
 
-    def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
-        """See `Controller`."""
+    def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
+        """See `ControlLaw`."""
         v_1, theta_2, speed = demand
         drive, lateral, turn = self.needed(v_1, theta_2, motion)
-        rubbing = self.climber.seal_friction * tanh(speed / self.law.friction_speed)
+        rubbing = self.climber.seal_friction * tanh(speed / self.options.friction_speed)
         return drive + rubbing, turn, lateral

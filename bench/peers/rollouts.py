@@ -11,10 +11,10 @@ import numpy as np
 from peers import mujoco_climber
 from side_by_side import in_turns, rate, table, timed
 
-from climber_uk.closed_loop.unicycle import Plain, advanced
+from climber_uk.closed_loop.unicycle import UnicycleModel, advanced
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import State, across
-from climber_uk.mechanics.motion import Motion, Wrench, forces
+from climber_uk.mechanics.motion import Motion, Wrench, wrench_of_torques
 from climber_uk.paper.consistent import PAPER_PATH, ConsistentSystem
 from climber_uk.paper.motion import DURATION, START
 from climber_uk.simulation.plant import Plant
@@ -58,11 +58,11 @@ def by_mujoco(model: tuple[str, str], climbers: int, given: Array, threads: int)
 
 def by_us(climbers: int, given: Array) -> Motion:
     """The last motion of so many climbers, all at once."""
-    body, motion = Plain.of(CLIMBER), State(START[:3], START[3:]).motion
+    body, motion = UnicycleModel.of(CLIMBER), State(START[:3], START[3:]).motion
     if climbers > 1:
         motion = Motion(*(np.full(climbers, part) for part in motion))
     for torques in given[:, :2].tolist():
-        motion = advanced(body, motion, Wrench(*forces(CLIMBER, *torques)), STEP)
+        motion = advanced(body, motion, Wrench(*wrench_of_torques(CLIMBER, *torques)), STEP)
     return motion
 
 

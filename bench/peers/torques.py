@@ -14,9 +14,9 @@ from side_by_side import in_turns, table, timed
 from tick import PERIOD, TICKS, WARM, WithMatrices, bare, ticks, ways, with_known_targets
 
 from climber_uk.control.constraints import CONSTRAINTS
-from climber_uk.control.control_law import Controller, Law, Situation
+from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
 from climber_uk.control.model import Observer
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber, State
@@ -34,7 +34,7 @@ def by_schur(M: Array, Q: Array, A: Array, b: Array) -> Array:
     return A.T @ np.linalg.solve(A @ solved[:, :-1], b - A @ solved[:, -1])
 
 
-def laws(constraints: str, law: Law) -> dict[str, Controller]:
+def laws(constraints: str, law: ControlOptions) -> dict[str, ControlLaw]:
     """Controllers that give the same torques; ours first."""
     climber, gains = Climber(), CONSTRAINTS[constraints]()
     return {
@@ -46,7 +46,7 @@ def laws(constraints: str, law: Law) -> dict[str, Controller]:
     }
 
 
-def check(controllers: Mapping[str, Controller]) -> float:
+def check(controllers: Mapping[str, ControlLaw]) -> float:
     """Largest difference of torques [N m], near the ellipse; raises `SystemExit` if it is one."""
     random, largest = np.random.default_rng(8), 0.0
     path = Trajectory(Ellipse(), ConstantRate())
@@ -55,7 +55,7 @@ def check(controllers: Mapping[str, Controller]) -> float:
         pose = reference.pose + random.normal(0, 0.1, 3)
         v, omega = reference.speed + random.normal(), reference.yaw_rate + random.normal()
         motion = State.rolling(pose, float(v), float(omega)).motion
-        situation = Situation(motion, Torques(0.0, 0.0), Wrench(0.5, -0.1), PERIOD)
+        situation = ControlInput(motion, Torques(0.0, 0.0), Wrench(0.5, -0.1), PERIOD)
         ours, *theirs = (c.command(situation, reference.target) for c in controllers.values())
         for name, other in zip(list(controllers)[1:], theirs, strict=True):
             off = float(np.abs(other.torques - ours.torques).max())
@@ -65,10 +65,10 @@ def check(controllers: Mapping[str, Controller]) -> float:
     return largest
 
 
-def in_c(limit: Limit, tracker: Tracker) -> Callable[[], None]:
+def in_c(limit: Limit, sampled_controller: SampledController) -> Callable[[], None]:
     """Ticks of the law in C, which are those of `tracker`, for as long as there is `limit`."""
-    run, torques = tick.ticks_in_c(limit, tracker)
-    tick.check(tracker, run, torques)
+    run, torques = tick.ticks_in_c(limit, sampled_controller)
+    tick.check(sampled_controller, run, torques)
     return run
 
 
@@ -81,17 +81,20 @@ def compare(rounds: int) -> None:
     """Check and print the tables."""
     limit = Limit()
     for constraints in CONSTRAINTS:
-        off = check(laws(constraints, Law()))
+        off = check(laws(constraints, ControlOptions()))
         print(f"\n{constraints}: torques of all agree to {off:.2g} N m in 200 states")
         alone = {
-            name: timed(bare(law)) for name, law in laws(constraints, Law(predict=False)).items()
+            name: timed(bare(law))
+            for name, law in laws(constraints, ControlOptions(predict=False)).items()
         }
         table(f"one torque, {constraints}", in_turns(alone, rounds, WARM), "µs", per_tick)
         trackers = {
-            name: Tracker(law, Observer(), Timing(), Pacing())
-            for name, law in laws(constraints, Law()).items()
+            name: SampledController(law, Observer(), Timing(), Pacing())
+            for name, law in laws(constraints, ControlOptions()).items()
         }
-        whole = {name: timed(ticks(tracker)) for name, tracker in trackers.items()}
+        whole = {
+            name: timed(ticks(sampled_controller)) for name, sampled_controller in trackers.items()
+        }
         if constraints == "guidance":
             ours = next(iter(trackers.values()))
             same = with_known_targets(ours, in_c(limit, ours))

@@ -12,7 +12,7 @@ from climber_uk.bags.bag import Bag
 from climber_uk.bags.batches import Batch, read_batches
 from climber_uk.bags.events import Event
 from climber_uk.bags.joints import Joints
-from climber_uk.bags.recorded import Part, in_order
+from climber_uk.bags.recorded import FilePart, in_order
 from climber_uk.bags.reference import Points
 from climber_uk.bags.restarts import windows
 from climber_uk.bags.taking import TAKEN
@@ -25,7 +25,7 @@ class Collected:
     """What was read so far of one climber."""
 
     def __init__(self) -> None:
-        self.parts: dict[str, list[Part]] = defaultdict(list)
+        self.parts: dict[str, list[FilePart]] = defaultdict(list)
         self.joints: dict[str, list[Joints]] = defaultdict(list)
         self.reference: list[Points] = []
         self.parameters: list[tuple[int, dict[str, Any]]] = []  # with the log time [ns]

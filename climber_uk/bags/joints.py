@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from climber_uk.bags.batches import Batch
-from climber_uk.bags.recorded import Part, Recorded
+from climber_uk.bags.recorded import FilePart, TimeSeries
 from climber_uk.bags.taking import are_sound
 from climber_uk.mechanics import Array, Stamps
 from climber_uk.messages.names import Names
@@ -43,7 +43,7 @@ class Joints:
         arrays = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "names"}
         return replace(self, **arrays)
 
-    def part(self, quantity: str, joints: Sequence[str]) -> Part:
+    def part(self, quantity: str, joints: Sequence[str]) -> FilePart:
         """The `rates` or `torques` of some of the joints, in their order."""
         columns = [self.names.index(joint) for joint in joints]
         values = getattr(self, quantity)[:, columns]
@@ -76,16 +76,16 @@ def wheel_names(joints: Iterable[str], parameters: Mapping[str, Any]) -> tuple[s
     return wanted[0], wanted[1]
 
 
-def of_both(parts: Sequence[Joints], wheels: tuple[str, str]) -> Recorded:
+def of_both(parts: Sequence[Joints], wheels: tuple[str, str]) -> TimeSeries:
     """Torques (n, 2) right, left [N m] of messages with both wheels; `ValueError` without any."""
     both = [part for part in parts if set(wheels) <= set(part.names)]
     told = [part for part in both if np.isfinite(part.part("torques", wheels)[2]).any()]
     if not told:
         raise ValueError(f"no message has {'effort' if both else ' and '.join(wheels)}")
-    return Recorded.of([part.part("torques", wheels) for part in told])
+    return TimeSeries.of([part.part("torques", wheels) for part in told])
 
 
-def of_one(parts: Sequence[Joints], wheel: str) -> Recorded:
+def of_one(parts: Sequence[Joints], wheel: str) -> TimeSeries:
     """Rates [rad/s] and torques [N m] (n, 2) of one wheel, which may be told without the other.
 
     Publishers that tell positions only do not count; `ValueError` if there are no others.
@@ -102,4 +102,4 @@ def of_one(parts: Sequence[Joints], wheel: str) -> Recorded:
             part.part(quantity, [wheel]) for quantity in quantities.values()
         )
         both.append((stamps, arrivals, np.hstack([rates, torques]), slow | weak))
-    return Recorded.of(both)
+    return TimeSeries.of(both)

@@ -40,7 +40,7 @@ SCHEMA = re.compile(rb"\x03.{8}(..)(..)\x00\x00([\w/]+)\x07\x00\x00\x00ros2(?:ms
 
 
 @dataclass(frozen=True)
-class Part:
+class FilePart:
     """Messages that lie together: a chunk, or some of those outside of chunks."""
 
     start: int  # log times of first and last [ns]
@@ -55,7 +55,7 @@ class Contents:
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    parts: list[Part] = field(default_factory=list)
+    parts: list[FilePart] = field(default_factory=list)
     counts: "Counter[int]" = field(default_factory=Counter)  # messages by channel
 
     def take(self, opcode: int, data: bytes) -> None:
@@ -68,7 +68,7 @@ class Contents:
             start = index.chunk_start_offset + HEAD.size
             place = Record(Opcode.CHUNK, start, start - HEAD.size + index.chunk_length)
             times = index.message_start_time, index.message_end_time
-            self.parts.append(Part(*times, place, index.message_index_offsets))
+            self.parts.append(FilePart(*times, place, index.message_index_offsets))
         elif opcode == Opcode.STATISTICS and (statistics := parsed(Statistics, data)):
             self.counts.update(statistics.channel_message_counts)
 
@@ -214,7 +214,7 @@ class _Search:
                 self._keep(error.data)
             return
         if counts:
-            self.contents.parts.append(Part(first, last, place, frozenset(counts)))
+            self.contents.parts.append(FilePart(first, last, place, frozenset(counts)))
             self.contents.counts.update(counts)
 
     def _keep(self, damaged: bytes) -> None:

@@ -19,7 +19,7 @@ from climber_uk.bags.connection import (
     is_name,
     tell_encodings,
 )
-from climber_uk.bags.mcap_contents import NOTHING, Part, from_records, from_summary
+from climber_uk.bags.mcap_contents import NOTHING, FilePart, from_records, from_summary
 from climber_uk.bags.mcap_records import MESSAGE_HEAD, RecordFile, records_in
 from climber_uk.bags.unpacking import LARGEST_MESSAGE, Allowance
 
@@ -80,7 +80,7 @@ class McapFile:
         tell_encodings(self.name, others, self._lose)
 
     def _messages(
-        self, number: int, part: Part, wanted: Mapping[int, Any], allowance: Allowance
+        self, number: int, part: FilePart, wanted: Mapping[int, Any], allowance: Allowance
     ) -> Iterator[tuple[int, int, int, int, int, bytes]]:
         """Yield log time, number of the part and in it, channel, publishing time and data.
 

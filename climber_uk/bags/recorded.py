@@ -11,11 +11,11 @@ from climber_uk.bags.taking import FAULTS, WIDEST, Faults
 from climber_uk.mechanics import Array, Stamps
 
 # stamps (n,) and log times (n,) [ns], values (n, k), and what is wrong with them
-Part = tuple[Stamps, Stamps, Array, Faults]
+FilePart = tuple[Stamps, Stamps, Array, Faults]
 
 
 @dataclass(frozen=True)
-class Recorded:
+class TimeSeries:
     """The n messages of one topic, each stamp once, in the order of the stamps."""
 
     stamps: NDArray[np.int64]  # (n,) [ns]
@@ -26,7 +26,7 @@ class Recorded:
     late: int = 0  # recorded after one with a later stamp
 
     @classmethod
-    def of(cls, parts: Collection[Part]) -> "Recorded":
+    def of(cls, parts: Collection[FilePart]) -> "TimeSeries":
         """Messages in parts; of those sent twice the first counts."""
         if not parts:
             return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, WIDEST)))
@@ -43,7 +43,7 @@ class Recorded:
     def __len__(self) -> int:
         return len(self.stamps)
 
-    def where(self, chosen: Any) -> "Recorded":
+    def where(self, chosen: Any) -> "TimeSeries":
         """Those that a mask or a slice chooses."""
         return replace(
             self,
@@ -52,12 +52,12 @@ class Recorded:
             values=self.values[chosen],
         )
 
-    def within(self, first: int, last: int) -> "Recorded":
+    def within(self, first: int, last: int) -> "TimeSeries":
         """Those with a stamp from `first` to `last`."""
         return self.where((self.stamps >= first) & (self.stamps <= last))
 
 
-def in_order(parts: Collection[Part]) -> Part:
+def in_order(parts: Collection[FilePart]) -> FilePart:
     """All messages as one part, in the order in which they were recorded."""
     stamps, arrivals, values, faults = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.argsort(arrivals, kind="stable")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from climber_uk.bags import topics
 from climber_uk.bags.body_rates import body_rates
 from climber_uk.bags.events import Event
-from climber_uk.bags.recorded import Recorded
+from climber_uk.bags.recorded import TimeSeries
 from climber_uk.control.constraints import tracking_error
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
@@ -33,12 +33,16 @@ class RecordedRun:
 
     name: str  # the climber's namespace
     start: int  # [ns] stamp of time 0
-    odometry: Recorded  # n messages: x [m], y [m], θ [rad], forwards, to the left [m/s], ω [rad/s]
+    odometry: (
+        TimeSeries  # n messages: x [m], y [m], θ [rad], forwards, to the left [m/s], ω [rad/s]
+    )
     reference: Array  # (n, 3) the pose there should have been; nan where there is no reference
-    commands: Recorded  # torques right, left [N m] that answer these odometry messages
-    wheels: tuple[Recorded, Recorded]  # right, left: rates [rad/s] and torques [N m] at the joints
+    commands: TimeSeries  # torques right, left [N m] that answer these odometry messages
+    wheels: tuple[
+        TimeSeries, TimeSeries
+    ]  # right, left: rates [rad/s] and torques [N m] at the joints
     truth_reference: Array  # (k, 3) as `reference`, at the stamps of the ground truth
-    recorded: dict[str, Recorded]  # all else, by the topic's name
+    recorded: dict[str, TimeSeries]  # all else, by the topic's name
     events: list[tuple[float, Event]]  # [s] and what was told that is news
     is_diagnosed: bool  # whether its nodes told their states
     parameters: Mapping[str, Any]  # of its controller, by name; none if they are not told
@@ -113,7 +117,7 @@ class RecordedRun:
         return np.isin(self.odometry.stamps, self.commands.stamps)
 
     @property
-    def hold(self) -> Recorded:
+    def hold(self) -> TimeSeries:
         """(k,) slip margin, tip margin, load on the wheels [N]: the plant's, else estimates."""
         told = [self.recorded[name] for name in topics.MARGINS]
         return next((recorded for recorded in told if len(recorded)), told[0])
@@ -136,6 +140,6 @@ class RecordedRun:
         times = [min(max(time, 0.0), end) for time, _ in told] + [end]
         return [(event, *span) for (_, event), span in zip(told, pairwise(times), strict=True)]
 
-    def seconds(self, recorded: Recorded) -> Array:
+    def seconds(self, recorded: TimeSeries) -> Array:
         """Times of some messages [s]."""
         return (recorded.stamps - self.start) / SECOND

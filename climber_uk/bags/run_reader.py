@@ -12,7 +12,7 @@ from climber_uk.bags.bag import Bag
 from climber_uk.bags.collecting import Collected
 from climber_uk.bags.events import Event
 from climber_uk.bags.joints import Joints, of_both, of_one, wheel_names
-from climber_uk.bags.recorded import Recorded, in_order
+from climber_uk.bags.recorded import TimeSeries, in_order
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.taking import TAKEN
@@ -23,7 +23,7 @@ from climber_uk.parameters.parameter_file import Values
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
 APART, OFTEN = 0.05, 5  # [m] and number of messages: from then on they are not of one climber
-NOTHING = Recorded.of([])
+NOTHING = TimeSeries.of([])
 NAMES = "left_wheel_joint", "right_wheel_joint", "adhesion"
 Told = Mapping[str, Any]  # parameters of a controller, by name
 
@@ -140,18 +140,18 @@ class RunReader:
 
         The controller tells 20 times a second; between, its reference went on evenly.
         """
-        told = Recorded.of(found.parts[topics.REFERENCE_TIME])
+        told = TimeSeries.of(found.parts[topics.REFERENCE_TIME])
         if len(told):
             begin = told.stamps[0]
             behind = np.interp(stamps - begin, told.stamps - begin, told.values[:, 0])
             stamps = stamps - np.round(behind * SECOND).astype(np.int64)
         return poses_at(found.reference, stamps)
 
-    def recorded(self, found: Collected, name: str) -> Recorded:
+    def recorded(self, found: Collected, name: str) -> TimeSeries:
         """The messages of a topic; says how many are left out, and why."""
-        return self.judged(Recorded.of(found.parts[name]), name)
+        return self.judged(TimeSeries.of(found.parts[name]), name)
 
-    def judged(self, recorded: Recorded, name: str) -> Recorded:
+    def judged(self, recorded: TimeSeries, name: str) -> TimeSeries:
         """The same; says how many messages are left out, and why."""
         if recorded.unfit:
             count, repeated = sum(recorded.unfit.values()), recorded.repeated
@@ -160,14 +160,14 @@ class RunReader:
             self.bag.lose(f"{self.topic(name)}: {count} of {of} messages left out: {why}")
         return recorded
 
-    def within(self, recorded: Recorded, name: str, odometry: Recorded) -> Recorded:
+    def within(self, recorded: TimeSeries, name: str, odometry: TimeSeries) -> TimeSeries:
         """The messages of a topic in the time of the odometry; says if there are none."""
         within = recorded.within(int(odometry.stamps[0]), int(odometry.stamps[-1]))
         if len(recorded) and not len(within):
             self.bag.lose(f"{self.topic(name)}: no message has a time of the odometry's")
         return within
 
-    def too_few(self, odometry: Recorded) -> str:
+    def too_few(self, odometry: TimeSeries) -> str:
         """Why there is no run."""
         topic, count = self.topic(topics.ODOMETRY), len(odometry)
         if count > 1:
@@ -193,7 +193,7 @@ class RunReader:
             return {}
         return told
 
-    def commands(self, found: Collected, parameters: Told) -> Recorded:
+    def commands(self, found: Collected, parameters: Told) -> TimeSeries:
         """Torques right, left that were commanded; says why there are none."""
         parts = found.joints[topics.TORQUES]
         if not parts:
@@ -206,7 +206,7 @@ class RunReader:
             self.bag.lose(f"{self.topic(topics.TORQUES)}: not used, {error}")
             return NOTHING
 
-    def wheels(self, found: Collected, parameters: Told) -> tuple[Recorded, Recorded]:
+    def wheels(self, found: Collected, parameters: Told) -> tuple[TimeSeries, TimeSeries]:
         """What joint_states tell of the right and the left wheel; says why they do not."""
         parts = found.joints[topics.JOINTS]
         if not parts:
@@ -223,7 +223,7 @@ def _names(parts: Iterable[Joints]) -> set[str]:
     return {name for part in parts for name in part.names}
 
 
-def _seconds(event: Event, odometry: Recorded, start: int) -> float:
+def _seconds(event: Event, odometry: TimeSeries, start: int) -> float:
     """Time of an event [s]: its stamp, if it is of the odometry's clock, else by its arrival."""
     stamps, arrivals = odometry.stamps, odometry.arrivals
     tolerance = TOLERANCE * SECOND

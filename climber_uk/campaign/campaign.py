@@ -30,7 +30,7 @@ from climber_uk.campaign.scenario import Node, Scenario
 from climber_uk.mechanics import Array
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.parameters.parameter_file import given, load, nothing_for, read_sections, similar
-from climber_uk.simulation.options import Options
+from climber_uk.simulation.options import SimulationOptions
 
 SEEDS = Uniform(0, 2**31)  # that a node takes, rounded down
 
@@ -83,7 +83,7 @@ class Campaign:
 
     def _on_grid(self, times: Array) -> Array:
         """Times [s] at which a control period begins: nodes and closed loops then agree on them."""
-        period = Node(PLANT, self.scenario.values).read(Options).control_period
+        period = Node(PLANT, self.scenario.values).read(SimulationOptions).control_period
         return np.round(np.ceil(times / period) * period, 9)
 
 

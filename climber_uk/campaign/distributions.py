@@ -87,7 +87,7 @@ class Lognormal:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Categorical:
     """`[value, ...]`, or `{value: weight, ...}`."""
 
     values: tuple[float, ...]
@@ -108,7 +108,7 @@ DISTRIBUTIONS: dict[str, type[Distribution]] = {
     "uniform": Uniform,
     "normal": Normal,
     "lognormal": Lognormal,
-    "choice": Choice,
+    "choice": Categorical,
 }
 
 
@@ -119,7 +119,7 @@ def distribution(given: Any) -> Distribution:
     [(name, told)] = given.items()
     if name == "choice" and told and isinstance(told, list | dict):
         weights = list(told.values()) if isinstance(told, dict) else [1.0] * len(told)
-        return Choice(tuple(_numbers(name, list(told))), tuple(_numbers("weights", weights)))
+        return Categorical(tuple(_numbers(name, list(told))), tuple(_numbers("weights", weights)))
     try:
         return DISTRIBUTIONS[name](*_numbers(name, told))
     except TypeError:
@@ -137,7 +137,7 @@ def drawn(from_: Distribution, seed: int, name: str, first: int, number: int) ->
 
 def extremes(of: Distribution) -> tuple[float, float]:
     """The least and the largest value that can be drawn."""
-    if isinstance(of, Choice):
+    if isinstance(of, Categorical):
         return min(of.values), max(of.values)
     low, high = of.quantile(EXTREMES).tolist()
     return low, high

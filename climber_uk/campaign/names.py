@@ -12,7 +12,7 @@ from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import KINDS as PLAN_KINDS
 from climber_uk.simulation.motors import Motors
-from climber_uk.simulation.options import Options
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import VARIANTS, Physics
 
@@ -39,7 +39,9 @@ ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHES
 PARAMETERS = {
     **_names(PLANNER, *PLAN_KINDS),
     **_names(CONTROLLER, *CONTROLLER_KINDS, *ON_WALL),
-    **_names(PLANT, *((kind, "") for kind in (Options, Climber, Physics, Motors, Sensors))),
+    **_names(
+        PLANT, *((kind, "") for kind in (SimulationOptions, Climber, Physics, Motors, Sensors))
+    ),
     **_names(PLANT, *((k, f"{name}.") for group in VARIANTS.values() for name, k in group.items())),
     **_names(PLANT, *ON_WALL),
 }

@@ -23,7 +23,7 @@ PART = 4096  # runs
 
 
 @dataclass(frozen=True)
-class Part:
+class CampaignPart:
     """Some runs, one after the other."""
 
     number: int
@@ -59,17 +59,17 @@ class Store:
         _write(about, json.dumps(now, indent=1).encode())
 
     @property
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[CampaignPart]:
         """All of them."""
         for first in range(0, self.runs, PART):
-            yield Part(first // PART, first, min(PART, self.runs - first))
+            yield CampaignPart(first // PART, first, min(PART, self.runs - first))
 
     @property
-    def missing(self) -> Iterator[Part]:
+    def missing(self) -> Iterator[CampaignPart]:
         """Parts that are still to be computed."""
         return (part for part in self.parts if not self._path(part.number).exists())
 
-    def keep(self, part: Part, table: pa.Table) -> None:
+    def keep(self, part: CampaignPart, table: pa.Table) -> None:
         """Write a part."""
         sink = pa.BufferOutputStream()
         parquet.write_table(table, sink)

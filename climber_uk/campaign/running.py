@@ -16,7 +16,7 @@ import pyarrow as pa
 from tqdm import tqdm
 
 from climber_uk.campaign.campaign import Campaign
-from climber_uk.campaign.parts import Part, Store, computed
+from climber_uk.campaign.parts import CampaignPart, Store, computed
 from climber_uk.system.workers import workers
 
 Workers = tuple[Executor, int]  # and how many parts they may have in hand at a time
@@ -33,11 +33,11 @@ def run_missing(campaign: Campaign, store: Store, workers: Workers) -> None:
 
 
 def _finished(
-    campaign: Campaign, waiting: Iterator[Part], workers: Workers
-) -> Iterator[tuple[Part, pa.Table]]:
+    campaign: Campaign, waiting: Iterator[CampaignPart], workers: Workers
+) -> Iterator[tuple[CampaignPart, pa.Table]]:
     """Parts in the order in which they are finished; no more are in hand than workers can take."""
     executor, at_once = workers
-    in_hand = dict[Future[pa.Table], Part]()
+    in_hand = dict[Future[pa.Table], CampaignPart]()
     while True:
         for part in islice(waiting, at_once - len(in_hand)):
             in_hand[executor.submit(computed, campaign, part.first, part.runs)] = part

@@ -16,15 +16,15 @@ from climber_uk.campaign.names import (
     SEED,
     WITHOUT,
 )
-from climber_uk.closed_loop.batch import Change, Course, Loops
+from climber_uk.closed_loop.batch import BatchRun, Change, Loops
 from climber_uk.control.build import settings
 from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.motion import Motion
-from climber_uk.mechanics.trajectory_parameters import planned
+from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.parameters.parameter_file import Values
-from climber_uk.simulation.options import Options
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import Physics
 
@@ -63,22 +63,22 @@ class Scenario:
             if value != wanted:
                 raise ValueError(f"{name}={value!r} must be {wanted!r} in a campaign")
 
-    def course(self) -> Course:
+    def course(self) -> BatchRun:
         """Where to, for how long and how often; raises as `Node.read` does."""
-        options = Node(PLANT, self.values).read(Options)
-        trajectory = planned(Node(PLANNER, self.values).read)
-        return Course(trajectory, self.duration, options.control_period, options.steps)
+        options = Node(PLANT, self.values).read(SimulationOptions)
+        trajectory = build_trajectory(Node(PLANNER, self.values).read)
+        return BatchRun(trajectory, self.duration, options.control_period, options.steps)
 
     def loops(self, own: Mapping[str, Any]) -> Loops:
         """Loops with their `own` values (n,) of some parameters; raises as `Node.read` does."""
         values = {**self.values, **own}
         plant = Node(PLANT, values)
         climber, number = plant.read(Climber), len(own[SEED])
-        controller, observer, timing, _ = settings(Node(CONTROLLER, values), pressure=None)
+        law, observer, timing, _ = settings(Node(CONTROLLER, values), pressure=None)
         return Loops(
-            start=_start(plant.read(Options), number),
+            start=_start(plant.read(SimulationOptions), number),
             climber=climber,
-            controller=controller,
+            law=law,
             observer=observer,
             sensors=plant.read(Sensors),
             seeds=own[SEED],
@@ -89,7 +89,7 @@ class Scenario:
         )
 
 
-def _start(options: Options, number: int) -> Motion:
+def _start(options: SimulationOptions, number: int) -> Motion:
     x, y, heading, speed, yaw_rate = (
         np.zeros(number) + getattr(options, f"initial_{name}")
         for name in ("x", "y", "heading", "speed", "yaw_rate")

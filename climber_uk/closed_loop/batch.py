@@ -1,10 +1,10 @@
-"""Thousands of closed loops at once: the node's `Tracker`, and plain climbers as `Plant` has them.
+"""Thousands of closed loops at once: the node's `SampledController`, with plain climbers.
 
 Whatever is a number in a `Climber`, in gains, in sensors or in a start may be an array (N,) of one
 for each loop. Loops go through time in blocks that fit the cache, and what is told of them is
 gathered on the way: memory grows with the block, not with N or the duration. Not in here, but in
 `simulate`: a reference that waits, jumps and safe outputs, lost and late messages, motors with a
-lag, wheel odometry, pumps, and every contact but that of a `Plain` climber.
+lag, wheel odometry, pumps, and every contact but that of a `UnicycleModel` climber.
 """
 
 from collections import deque
@@ -17,10 +17,10 @@ import numpy as np
 from climber_uk.closed_loop import pressure_gauge
 from climber_uk.closed_loop.outcome import Outcome, Tally
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.closed_loop.unicycle import Plain, advanced_often
-from climber_uk.control.control_law import Controller
+from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.model import Observer
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
@@ -28,7 +28,14 @@ from climber_uk.mechanics.contact import Contact, Wheeled
 from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, keep_what_is_freed, part
-from climber_uk.mechanics.motion import Motion, Target, Torques, Wrench, forces, torque_bounds
+from climber_uk.mechanics.motion import (
+    Motion,
+    ReferencePoint,
+    Torques,
+    Wrench,
+    torque_bounds,
+    wrench_of_torques,
+)
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.sensors import Sensors
@@ -45,7 +52,7 @@ class Change(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Course:
+class BatchRun:
     """What all loops share."""
 
     trajectory: Trajectory
@@ -62,7 +69,7 @@ class Loops:
 
     start: Motion  # arrays (N,)
     climber: Climber  # the true ones
-    controller: Controller
+    law: ControlLaw
     observer: Observer = field(default_factory=Observer)
     sensors: Sensors = field(default_factory=Sensors)
     seeds: Array | None = None  # (N,) integers: noise as the plant's sensors make it of a seed
@@ -72,7 +79,7 @@ class Loops:
     gauge: float = 0.0  # [s] between two times that the controllers hear of the pressure; 0: never
 
     def __post_init__(self) -> None:
-        if self.seeds is None and not self.sensors.are_exact:
+        if self.seeds is None and not self.sensors.is_ideal:
             raise ValueError("seeds=None must be one for each loop, for sensors that err")
         sensors, contact = self.sensors, self.contact
         for name, value, wanted in (
@@ -85,7 +92,7 @@ class Loops:
             if value != wanted:
                 raise ValueError(f"{name}={value!r} must be {wanted!r} in many loops at once")
 
-    def run(self, course: Course, block: int = BLOCK) -> Outcome:
+    def run(self, course: BatchRun, block: int = BLOCK) -> Outcome:
         """What became of each loop, arrays (N,)."""
         number = len(self.start.x)
         keep_what_is_freed()
@@ -97,27 +104,29 @@ class Loops:
         return Outcome(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
 
     def run_block(
-        self, course: Course, preview: Preview, on_period: Callable[[], object] = lambda: None
+        self, course: BatchRun, preview: Preview, on_period: Callable[[], object] = lambda: None
     ) -> Outcome:
         """The same, of few enough for the cache; `on_period` is called in every period."""
-        tracker = Tracker(self.controller, self.observer, self.timing, Pacing(catch_up=0.0))
+        sampled_controller = SampledController(
+            self.law, self.observer, self.timing, Pacing(catch_up=0.0)
+        )
         tally = Tally(len(self.start.x), self.contact)
         motion, step = self.start, course.period / course.steps
         advance = _advancing(course.compiled)
         on_their_way: deque[Torques] = deque()
         ticks = round(course.duration / course.period)
         controllers = pressure_gauge.controllers(
-            self.controller, self._climbers(course, ticks), course.period, self.gauge
+            self.law, self._climbers(course, ticks), course.period, self.gauge
         )
         given = (
             *(self._noise(ticks), self._climbers(course, ticks)),
             *(controllers, _targets(course, ticks)),
         )
-        for tick, (noise, climber, controller, target) in enumerate(zip(*given, strict=True)):
+        for tick, (noise, climber, law, target) in enumerate(zip(*given, strict=True)):
             told = motion if noise is None else self.sensors.told(motion, noise)
-            tracker.controller = controller
-            tracker.see(SECOND + round(tick * course.period * SECOND), told)
-            command = tracker.answer(preview, 0.0)
+            sampled_controller.law = law
+            sampled_controller.see(SECOND + round(tick * course.period * SECOND), told)
+            command = sampled_controller.answer(preview, 0.0)
             assert command is not None  # the preview goes beyond the duration
             if not on_their_way:
                 before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
@@ -125,9 +134,9 @@ class Loops:
             on_their_way.append(command.wheels)
             wheels = _within(on_their_way.popleft(), climber, motion)
             tally.add(tick * course.period, motion, target, command, wheels, climber)
-            wrench = Wrench(*forces(climber, *wheels))
+            wrench = Wrench(*wrench_of_torques(climber, *wheels))
             on_period()
-            motion = advance(Plain.of(climber), motion, wrench, step, course.steps)
+            motion = advance(UnicycleModel.of(climber), motion, wrench, step, course.steps)
         return tally.outcome()
 
     @property
@@ -136,7 +145,7 @@ class Loops:
 
     def _noise(self, ticks: int) -> Iterator[Array | None]:
         """Five numbers (5, N) for every odometry."""
-        if self.sensors.are_exact:
+        if self.sensors.is_ideal:
             yield from [None] * (ticks + 1)
             return
         seeds = np.asarray(self.seeds).tolist()
@@ -146,7 +155,7 @@ class Loops:
             drawn = np.array([random.normal(size=(many, 5)) for random in randoms])
             yield from np.ascontiguousarray(drawn.transpose(1, 2, 0))
 
-    def _climbers(self, course: Course, ticks: int) -> Iterator[Climber]:
+    def _climbers(self, course: BatchRun, ticks: int) -> Iterator[Climber]:
         """The true climbers at every period."""
         climber = self.climber
         for tick in range(ticks + 1):
@@ -158,15 +167,15 @@ class Loops:
             yield climber
 
 
-def _targets(course: Course, ticks: int) -> Iterator[Target]:
+def _targets(course: BatchRun, ticks: int) -> Iterator[ReferencePoint]:
     for first in range(0, ticks + 1, CHUNK):
         times = np.arange(first, min(first + CHUNK, ticks + 1)) * course.period
         target = course.trajectory.at(times).target
         rows = zip(*(each.tolist() for each in target), strict=True)
-        yield from (Target(*numbers) for numbers in rows)
+        yield from (ReferencePoint(*numbers) for numbers in rows)
 
 
-def _advancing(compiled: bool) -> Callable[[Plain, Motion, Wrench, float, int], Motion]:
+def _advancing(compiled: bool) -> Callable[[UnicycleModel, Motion, Wrench, float, int], Motion]:
     if not compiled:
         return advanced_often
     from climber_uk.closed_loop.compiled import advanced  # numba takes long to import

@@ -12,7 +12,7 @@ from numba import njit
 from numba.extending import overload, register_jitable
 
 from climber_uk.closed_loop import unicycle as plain
-from climber_uk.closed_loop.unicycle import Plain, Pushed
+from climber_uk.closed_loop.unicycle import Accelerations, UnicycleModel
 from climber_uk.mechanics import Array, elementary, many
 from climber_uk.mechanics.motion import Motion, Wrench
 
@@ -62,7 +62,9 @@ for function in (plain._from_rest, plain._stopped, plain._given_way, plain.stepp
     register_jitable(**EXACT)(function)
 
 
-def advanced(body: Plain, motion: Motion, wrench: Wrench, time: float, steps: int) -> Motion:
+def advanced(
+    body: UnicycleModel, motion: Motion, wrench: Wrench, time: float, steps: int
+) -> Motion:
     """Motions (N,) after `steps` steps of `time` [s]."""
     fastest = abs(motion.yaw_rate) + steps * time * abs(wrench.turn / body.yaw_inertia)
     if not np.max(fastest, initial=0.0) * time <= SMALL:
@@ -99,9 +101,9 @@ def _slide(now: Array, end: Array, time: float, number: int) -> None:
 
 
 @njit(**INLINE)
-def _given(a: Array, i: int) -> tuple[Pushed, Motion]:
+def _given(a: Array, i: int) -> tuple[Accelerations, Motion]:
     motion = Motion(a[0, i], a[1, i], a[2, i], a[3, i], a[4, i], a[5, i], a[6, i])
-    return Pushed(a[7, i], a[8, i], a[9, i], a[10, i]), motion
+    return Accelerations(a[7, i], a[8, i], a[9, i], a[10, i]), motion
 
 
 @njit(**INLINE)

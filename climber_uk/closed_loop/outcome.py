@@ -7,10 +7,10 @@ import numpy as np
 from climber_uk.control.control_law import Command
 from climber_uk.control.sampled_controller import CUT
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.adhesion import AMPLE
+from climber_uk.mechanics.adhesion import MAX_MARGIN
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.motion import Motion, Target, Torques, forces
+from climber_uk.mechanics.motion import Motion, ReferencePoint, Torques, wrench_of_torques
 
 NEAR = 0.01  # [m] from the reference within which a loop has settled
 
@@ -37,7 +37,7 @@ class Tally:
         self.squares, self.cuts = np.zeros(number), np.zeros(number)
         self.worst, self.last, self.late = np.zeros(number), np.zeros(number), np.zeros(number)
         self.peak = np.zeros(number)
-        self.slip, self.tip = np.full(number, AMPLE), np.full(number, AMPLE)
+        self.slip, self.tip = np.full(number, MAX_MARGIN), np.full(number, MAX_MARGIN)
         self.fell = np.full(number, np.inf)
         self._climber: Climber | None = None
         self._on_wall: Any = True  # or, once one fell, whether each did not
@@ -46,7 +46,7 @@ class Tally:
         self,
         time: float,
         motion: Motion,
-        target: Target,
+        target: ReferencePoint,
         command: Command,
         wheels: Torques,
         climber: Climber,
@@ -67,7 +67,9 @@ class Tally:
             np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
         lateral = climber.mass * motion.speed * motion.yaw_rate
         lateral = lateral + climber.weight_along_wall * motion.cosine
-        margin = self.contact.slip_margin(climber, self._into, forces(climber, *wheels)[0], lateral)
+        margin = self.contact.slip_margin(
+            climber, self._into, wrench_of_torques(climber, *wheels)[0], lateral
+        )
         np.minimum(self.slip, margin, out=self.slip, where=on)
 
     def _hold(self, time: float, climber: Climber) -> None:

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from climber_uk.control.control_law import Controller
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.mechanics.climber import Climber
 
 
 def controllers(
-    controller: Controller, climbers: Iterable[Climber], period: float, gauge: float
-) -> Iterator[Controller]:
+    law: ControlLaw, climbers: Iterable[Climber], period: float, gauge: float
+) -> Iterator[ControlLaw]:
     """Controller at every `period` [s], with the pressure that it was told last.
 
     Each `gauge` [s], or never if that is 0. What is told in a period is how it was in the one
@@ -23,9 +23,9 @@ def controllers(
         found = before or climber
         if gauge > 0 and found is not known and (tick == 0 or _is_told(tick - 1, period, gauge)):
             known, pressure = found, found.suction_pressure
-            model = replace(controller.climber, suction_pressure=pressure)
-            controller = replace(controller, climber=model)
-        yield controller
+            model = replace(law.climber, suction_pressure=pressure)
+            law = replace(law, climber=model)
+        yield law
         before, last = last, climber
 
 

@@ -1,7 +1,7 @@
 """Controller and plant in one process, with what lies between them: lock-step without messages.
 
-The same `Follower` and `Machine` that the nodes run, on a grid of the plant's step. Everything
-random comes from one seed.
+The same `Controller` and `SimulatedRobot` that the nodes run, on a grid of the plant's step. All
+that is random comes from one seed.
 """
 
 from collections import deque
@@ -20,7 +20,7 @@ from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
-from climber_uk.simulation.simulated_robot import Machine, Parts, Physics
+from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Link:
 
 
 class Controlling(Protocol):
-    """Whatever answers odometry with torques: a `Follower`, or a rival."""
+    """Whatever answers odometry with torques: a `Controller`, or a rival."""
 
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
         """Keep a reference."""
@@ -112,20 +112,20 @@ def simulate(
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
     rows, now_it_is = [], climber_at(0.0)
-    machine = Machine(link.parts(plant_of(now_it_is, link.step)), start, link.period)
+    robot = SimulatedRobot(link.parts(plant_of(now_it_is, link.step)), start, link.period)
     every, late = round(link.period / link.step), round(link.delay / link.step)
     for step in range(round(duration / link.step) + 1):
         now = SECOND + round(step * link.step * SECOND)
         if step % every == 0:
-            state = machine.state
+            state = robot.state
             error = np.array(tracking_error(state.pose, trajectory.at(step * link.step)))
-            rows.append([step * link.step, *state.pose, *state.velocity, *error, *machine.torques])
+            rows.append([step * link.step, *state.pose, *state.velocity, *error, *robot.torques])
             if step > 0:
-                machine.measure()
+                robot.measure()
             if random.random() >= link.loss:
                 arrival = step + round(random.uniform(0, link.jitter) / link.step)
                 arrival = max(arrival, arriving[-1][0]) if arriving else arrival
-                _, seen = machine.odometer.latest()
+                _, seen = robot.odometer.latest()
                 arriving.append((arrival, now, measured(seen, link, random)))
         while arriving and arriving[0][0] <= step:
             _, stamp, odometry = arriving.popleft()
@@ -137,8 +137,8 @@ def simulate(
             _, acting = commanded.popleft()
         before, now_it_is = now_it_is, climber_at(step * link.step)
         if now_it_is is not before:
-            machine.take(link.parts(plant_of(now_it_is, link.step)))
-        machine.advance(np.zeros(2) if acting is None else motors(machine.state, acting))
+            robot.take(link.parts(plant_of(now_it_is, link.step)))
+        robot.advance(np.zeros(2) if acting is None else motors(robot.state, acting))
     table = np.array(rows)
     return Run(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10:12])
 

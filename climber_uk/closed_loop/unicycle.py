@@ -26,7 +26,7 @@ from climber_uk.mechanics.motion import Motion, Wrench
 ITERATIONS = 5  # of Newton's method to an instant within a step; each squares what is left
 
 
-class Plain(NamedTuple):
+class UnicycleModel(NamedTuple):
     """What of a climber matters to its motion."""
 
     mass: Any  # [kg]
@@ -35,18 +35,20 @@ class Plain(NamedTuple):
     gravity: Any  # g_t along the wall, towards -y [m/s²]
 
     @classmethod
-    def of(cls, climber: Climber) -> "Plain":
+    def of(cls, climber: Climber) -> "UnicycleModel":
         """That of a climber, or of many."""
         gravity = GRAVITY * sin(climber.inclination * DEGREE)
         return cls(climber.mass, climber.yaw_inertia, climber.seal_friction, gravity)
 
-    def under(self, wrench: Wrench) -> "Pushed":
+    def under(self, wrench: Wrench) -> "Accelerations":
         """It, with what a wrench does to it."""
         mass, yaw_inertia, friction, gravity = self
-        return Pushed(wrench.drive / mass, wrench.turn / yaw_inertia, friction / mass, gravity)
+        return Accelerations(
+            wrench.drive / mass, wrench.turn / yaw_inertia, friction / mass, gravity
+        )
 
 
-class Pushed(NamedTuple):
+class Accelerations(NamedTuple):
     """What accelerates a climber."""
 
     drive: Any  # F/m [m/s²]
@@ -55,12 +57,14 @@ class Pushed(NamedTuple):
     gravity: Any  # g_t [m/s²]
 
 
-def advanced(body: Plain, motion: Motion, wrench: Wrench, time: float) -> Motion:
+def advanced(body: UnicycleModel, motion: Motion, wrench: Wrench, time: float) -> Motion:
     """Motion after a step of `time` [s] under a wrench, in which the seal may stick and slide."""
     return stepped(body.under(wrench), motion, time)
 
 
-def advanced_often(body: Plain, motion: Motion, wrench: Wrench, time: float, steps: int) -> Motion:
+def advanced_often(
+    body: UnicycleModel, motion: Motion, wrench: Wrench, time: float, steps: int
+) -> Motion:
     """Motion after `steps` such steps."""
     keep_what_is_freed()
     pushed = body.under(wrench)
@@ -69,7 +73,7 @@ def advanced_often(body: Plain, motion: Motion, wrench: Wrench, time: float, ste
     return motion
 
 
-def stepped(pushed: Pushed, motion: Motion, time: float) -> Motion:
+def stepped(pushed: Accelerations, motion: Motion, time: float) -> Motion:
     """Motion after a step of `time` [s]."""
     end = slid(pushed, motion, with_sign_of(pushed.friction, motion.speed), time)
     if everywhere(motion.speed * end.speed > 0):
@@ -79,7 +83,7 @@ def stepped(pushed: Pushed, motion: Motion, time: float) -> Motion:
     return amended(rests, end, _from_rest, pushed, motion, time)
 
 
-def slid(pushed: Pushed, motion: Motion, rubbing: Any, time: Any) -> Motion:
+def slid(pushed: Accelerations, motion: Motion, rubbing: Any, time: Any) -> Motion:
     """Motion `time` [s] later of a climber whose seal slides: friction decelerates by `rubbing`."""
     x, y, heading, c_0, s_0, v_0, omega = motion
     faster = 0.5 * time * pushed.turning  # in half of the time
@@ -101,7 +105,7 @@ def slid(pushed: Pushed, motion: Motion, rubbing: Any, time: Any) -> Motion:
     )
 
 
-def _held(pushed: Pushed, motion: Motion, time: Any) -> Motion:
+def _held(pushed: Accelerations, motion: Motion, time: Any) -> Motion:
     """Motion `time` [s] later of a climber that friction holds: it may turn on the spot."""
     x, y, heading, cosine, sine, v, omega = motion
     angle = time * (omega + time / 2 * pushed.turning)
@@ -109,12 +113,12 @@ def _held(pushed: Pushed, motion: Motion, time: Any) -> Motion:
     return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * pushed.turning)
 
 
-def _push(pushed: Pushed, motion: Motion) -> Any:
+def _push(pushed: Accelerations, motion: Motion) -> Any:
     """What friction at rest is up against [m/s²]."""
     return pushed.drive - pushed.gravity * motion.sine
 
 
-def _from_rest(pushed: Pushed, motion: Motion, time: Any) -> Motion:
+def _from_rest(pushed: Accelerations, motion: Motion, time: Any) -> Motion:
     """Motion after a step, or what is left of one, that begins at rest."""
     push = _push(pushed, motion)
     end = _held(pushed, motion, time)
@@ -124,7 +128,7 @@ def _from_rest(pushed: Pushed, motion: Motion, time: Any) -> Motion:
     return amended(starts, end, slid, pushed, motion, sign(push) * pushed.friction, time)
 
 
-def _stopped(pushed: Pushed, motion: Motion, direction: Any, time: Any) -> Motion:
+def _stopped(pushed: Accelerations, motion: Motion, direction: Any, time: Any) -> Motion:
     """Motion after a step within which the climber comes to rest."""
     until, there, rubbing = 0.0 * motion.speed, motion, direction * pushed.friction
     for _ in range(ITERATIONS):
@@ -136,7 +140,7 @@ def _stopped(pushed: Pushed, motion: Motion, direction: Any, time: Any) -> Motio
     return _from_rest(pushed, there, time - until)
 
 
-def _given_way(pushed: Pushed, motion: Motion, end: Motion, time: Any) -> Motion:
+def _given_way(pushed: Accelerations, motion: Motion, end: Motion, time: Any) -> Motion:
     """Motion after a step within which what friction holds, turning, becomes too much for it."""
     way, until, there = sign(_push(pushed, end)), time + 0.0 * end.x, end
     rubbing = way * pushed.friction

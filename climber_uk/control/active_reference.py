@@ -10,11 +10,11 @@ from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import Command
 from climber_uk.control.guard import STANDS, Expected, Rates
 from climber_uk.control.safety import Mode
-from climber_uk.control.sampled_controller import Tracker
+from climber_uk.control.sampled_controller import SampledController
 from climber_uk.control.time_scaling import Progress, restarted
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion, Target
+from climber_uk.mechanics.motion import Motion, ReferencePoint
 from climber_uk.mechanics.preview import Preview
 
 SAME = 0.05  # [m, rad] within which a new preview goes on with the old one
@@ -36,11 +36,11 @@ class Followed(NamedTuple):
     command: Command | None = None
 
 
-class Course:
+class ActiveReference:
     """Knows where on its reference the climber is, and takes it there if it is elsewhere."""
 
-    def __init__(self, tracker: Tracker, options: Approach) -> None:
-        self.tracker, self.options = tracker, options
+    def __init__(self, sampled_controller: SampledController, options: Approach) -> None:
+        self.sampled_controller, self.options = sampled_controller, options
         self.approach_constraints = Guidance()  # that can begin at rest
         self.preview: Preview | None = None  # of the reference
         self.way: Preview | None = None  # to where it waits
@@ -56,25 +56,25 @@ class Course:
         return self.way or self.preview
 
     @property
-    def target(self) -> Target | None:
+    def target(self) -> ReferencePoint | None:
         """Where the climber should be at the last odometry; None if nothing is followed."""
         followed = self.followed
         if followed is None or self._is_paused:
             return None
-        return followed.target(self.time_followed(self.tracker.stamp))
+        return followed.target(self.time_followed(self.sampled_controller.stamp))
 
-    def expected(self, target: Target) -> Expected:
+    def expected(self, target: ReferencePoint) -> Expected:
         """What is expected of a climber that should be at `target`."""
-        tracker, followed = self.tracker, self.followed
+        sampled_controller, followed = self.sampled_controller, self.followed
         assert followed is not None
-        number = self.time_followed(tracker.stamp) // AROUND
+        number = self.time_followed(sampled_controller.stamp) // AROUND
         if self._around is None or self._around[0] is not followed or self._around[1] != number:
             fastest = followed.fastest((number - 1) * AROUND, (number + 2) * AROUND)
             self._around = followed, number, fastest
-        pace = tracker.progress.pace
-        hurry = 1 + (tracker.pacing.catch_up if pace.lag > 0 else 0.0)
+        pace = sampled_controller.progress.pace
+        hurry = 1 + (sampled_controller.pacing.catch_up if pace.lag > 0 else 0.0)
         constraints = (
-            self.approach_constraints if self._is_gentle else tracker.controller.constraints
+            self.approach_constraints if self._is_gentle else sampled_controller.law.constraints
         )
         return Expected(
             wanted=Rates(math.hypot(target.v_x, target.v_y), abs(target.yaw_rate)),
@@ -85,23 +85,23 @@ class Course:
     @property
     def _is_gentle(self) -> bool:
         """Whether what is followed begins at rest."""
-        return self.way is not None or self.tracker.progress.is_restarting
+        return self.way is not None or self.sampled_controller.progress.is_restarting
 
     def position(self, stamp: int) -> int | None:
         """Time of the reference [ns] at `stamp` [ns]; None if none was followed or waits."""
         if self.way is None and not self._is_paused:
-            return self.tracker.progress.at(stamp)
+            return self.sampled_controller.progress.at(stamp)
         return self._position
 
     @property
     def waited(self) -> float:
         """How much later than planned the reference is [s]."""
-        progress = self.tracker.progress
+        progress = self.sampled_controller.progress
         return progress.waited / SECOND + float(progress.pace.lag)
 
     def time_followed(self, stamp: int) -> int:
         """Time of what is followed [ns] at `stamp` [ns]."""
-        return self.tracker.progress.at(stamp)
+        return self.sampled_controller.progress.at(stamp)
 
     def begins_after(self, stamp: int) -> bool:
         """Whether the reference begins later."""
@@ -127,14 +127,14 @@ class Course:
             return Followed(Mode.WAITING)
         try:
             if self._is_paused:
-                refused = self._begin(self.tracker.begin(age))
+                refused = self._begin(self.sampled_controller.begin(age))
                 if refused is not None:
                     return refused
             return self._go_on(self.preview, age)
         except (ValueError, ArithmeticError) as error:
             return Followed(Mode.NO_SOLUTION, str(error))
 
-    def strayed(self, motion: Motion, target: Target) -> tuple[Mode, str] | None:
+    def strayed(self, motion: Motion, target: ReferencePoint) -> tuple[Mode, str] | None:
         """Whether a climber is too far from where it should be."""
         distance = math.hypot(motion.x - target.x, motion.y - target.y)
         if distance <= STRAYED * self.options.max_distance:
@@ -142,21 +142,21 @@ class Course:
         return Mode.OFF_PATH, f"{distance:.2f} m from it"
 
     def _go_on(self, preview: Preview, age: float) -> Followed:
-        tracker = self.tracker
+        sampled_controller = self.sampled_controller
         constraints = self.approach_constraints if self._is_gentle else None
         if self.way is not None:
-            command = tracker.answer(self.way, age, constraints)
+            command = sampled_controller.answer(self.way, age, constraints)
             if command is not None:
                 return Followed(Mode.APPROACHING, f"{self._began_at:.2f} m away", command)
             self.way, self._is_paused = None, True  # it has arrived
-            refused = self._begin(tracker.begin(age))
+            refused = self._begin(sampled_controller.begin(age))
             if refused is not None:
                 return refused
             return self._go_on(preview, age)
-        command = tracker.answer(preview, age, constraints)
+        command = sampled_controller.answer(preview, age, constraints)
         if command is None:
             return Followed(Mode.WAITING)
-        self._position = tracker.progress.position
+        self._position = sampled_controller.progress.position
         return Followed(Mode.FOLLOWING, "", command)
 
     # Beginning, and going on after a pause
@@ -169,9 +169,9 @@ class Course:
 
     def _begin(self, time: int) -> Followed | None:
         """Follow from `time` [ns] on: the reference, or a way to it; else say why not."""
-        tracker, preview, options = self.tracker, self.preview, self.options
+        sampled_controller, preview, options = self.sampled_controller, self.preview, self.options
         assert preview is not None
-        motion = tracker.expected_at(time)
+        motion = sampled_controller.expected_at(time)
         position = self._where(preview, motion, time)
         target = preview.target(position)
         if target is None:
@@ -187,9 +187,9 @@ class Course:
         turned = abs(wrapped(motion.heading - target.heading))
         if distance > options.max_distance or turned > options.max_heading:
             self.way = options.way(motion, target, time)
-            tracker.progress = Progress()
+            sampled_controller.progress = Progress()
         else:
-            tracker.progress = restarted(time, position, _rate(motion, target))
+            sampled_controller.progress = restarted(time, position, _rate(motion, target))
         return None
 
     def _where(self, preview: Preview, motion: Motion, time: int) -> int:
@@ -198,7 +198,7 @@ class Course:
             return self._first_position(time)
         first, last = int(preview.times[0]), int(preview.times[-1])
         position = max(self._position, first)
-        answered = self.tracker.progress.time
+        answered = self.sampled_controller.progress.time
         skip = 0 if answered is None else min(time - answered, LONGEST_SKIP, last - position)
         if skip <= 0:
             return position
@@ -218,12 +218,12 @@ class Course:
         return min(max(nearest + round(ahead * SECOND), position), position + skip)
 
 
-def _speed(target: Target) -> float:
+def _speed(target: ReferencePoint) -> float:
     """Speed of a target along its heading [m/s]."""
     return float(target.v_x * math.cos(target.heading) + target.v_y * math.sin(target.heading))
 
 
-def _rate(motion: Motion, target: Target) -> float:
+def _rate(motion: Motion, target: ReferencePoint) -> float:
     """Rate σ of a reference that is as fast as the climber is, 1 if that is nearly so."""
     speed = _speed(target)
     if abs(speed) < SLOW:

@@ -11,7 +11,7 @@ import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion, Target
+from climber_uk.mechanics.motion import Motion, ReferencePoint
 from climber_uk.mechanics.preview import Preview
 from climber_uk.parameters.declaration import check, parameter
 
@@ -40,7 +40,7 @@ class Approach:
     def __post_init__(self) -> None:
         check(self)
 
-    def way(self, motion: Motion, target: Target, begin: int) -> Preview:
+    def way(self, motion: Motion, target: ReferencePoint, begin: int) -> Preview:
         """Reference from where a climber is, at rest from `begin` [ns] on, to where `target` is."""
         offset_x, offset_y = target.x - motion.x, target.y - motion.y
         distance = math.hypot(offset_x, offset_y)
@@ -49,16 +49,16 @@ class Approach:
             turned = float(wrapped(math.atan2(offset_y, offset_x) - first))
             if abs(turned) > math.pi / 2:  # in reverse gear it is less of a turn
                 turned, direction = float(wrapped(turned + math.pi)), -1.0
-            course = first + turned
+            active = first + turned
         else:
-            distance, course = 0.0, first
-        last = course + float(wrapped(target.heading - course))
+            distance, active = 0.0, first
+        last = active + float(wrapped(target.heading - active))
         start = (motion.x, motion.y)
         end = (target.x, target.y) if distance else start
         parts = [
-            self._turn(start, first, course),
-            self._drive(start, course, direction, distance),
-            self._turn(end, course, last),
+            self._turn(start, first, active),
+            self._drive(start, active, direction, distance),
+            self._turn(end, active, last),
         ]
         return _joined([part for part in parts if part is not None] or [_rest(end, last)], begin)
 
@@ -73,14 +73,14 @@ class Approach:
         return rows
 
     def _drive(
-        self, place: tuple[float, float], course: float, direction: float, distance: float
+        self, place: tuple[float, float], active: float, direction: float, distance: float
     ) -> Array | None:
         if not distance:
             return None
         time, p, p_1, p_2 = _move(distance, self.approach_speed)
-        way = direction * distance * np.array([math.cos(course), math.sin(course)])
+        way = direction * distance * np.array([math.cos(active), math.sin(active)])
         rows = np.zeros((len(time), 10))
-        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * way, course
+        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * way, active
         rows[:, 4:6], rows[:, 7:9] = p_1[:, None] * way, p_2[:, None] * way
         return rows
 

@@ -5,12 +5,12 @@ from typing import Protocol, TypeVar
 
 from climber_uk.control.approach import Approach
 from climber_uk.control.constraints import CONSTRAINTS, Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.guard import GuardOptions
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
 from climber_uk.mechanics.climber import Climber
@@ -19,7 +19,7 @@ from climber_uk.parameters.declaration import check, parameter
 T = TypeVar("T")
 
 
-class Parameters(Protocol):
+class ParameterSource(Protocol):
     """Where parameters come from."""
 
     def read(self, kind: type[T], prefix: str = "") -> T:
@@ -27,7 +27,7 @@ class Parameters(Protocol):
 
 
 @dataclass(frozen=True)
-class Choice:
+class ConstraintChoice:
     """Which constraints are followed, and what kind of climber follows them."""
 
     constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
@@ -38,7 +38,7 @@ class Choice:
 
 
 KINDS: list[tuple[type, str]] = [
-    *((kind, "") for kind in (Choice, Climber, Law, Timing, Safety, Approach)),
+    *((kind, "") for kind in (ConstraintChoice, Climber, ControlOptions, Timing, Safety, Approach)),
     *((kind, f"{name}.") for name, kind in CONSTRAINTS.items()),
     (Observer, "observer."),
     (Pacing, "pacing."),
@@ -48,23 +48,25 @@ KINDS: list[tuple[type, str]] = [
 
 
 def settings(
-    parameters: Parameters, pressure: float | None
-) -> tuple[Controller, Observer, Timing, Pacing]:
+    parameters: ParameterSource, pressure: float | None
+) -> tuple[ControlLaw, Observer, Timing, Pacing]:
     """What the parameters, and the measured pressure [Pa], say now."""
     read = parameters.read
-    choice = read(Choice)
+    choice = read(ConstraintChoice)
     name, climber = choice.constraints, with_its_seal(read(Climber), choice.adhesion)
     if pressure is not None:
         climber = replace(climber, suction_pressure=pressure)
-    controller = Controller(climber, read(CONSTRAINTS[name], f"{name}."), read(Law))
-    return controller, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
+    law = ControlLaw(climber, read(CONSTRAINTS[name], f"{name}."), read(ControlOptions))
+    return law, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
 
 
-def new_follower(parameters: Parameters, pressure: float | None) -> Follower:
+def build_controller(parameters: ParameterSource, pressure: float | None) -> Controller:
     """Follower as the parameters say, that has seen nothing yet."""
-    read, tracker = parameters.read, Tracker(*settings(parameters, pressure))
-    follower = Follower(tracker, read(Safety), read(Approach), read(GuardOptions, "guard."))
-    name = read(Choice).adhesion
-    follower.guard.adhesion = read(ADHESION[name], f"{name}.")
-    follower.course.approach_constraints = read(Guidance, "guidance.")
-    return follower
+    read, sampled_controller = parameters.read, SampledController(*settings(parameters, pressure))
+    controller = Controller(
+        sampled_controller, read(Safety), read(Approach), read(GuardOptions, "guard.")
+    )
+    name = read(ConstraintChoice).adhesion
+    controller.guard.adhesion = read(ADHESION[name], f"{name}.")
+    controller.active.approach_constraints = read(Guidance, "guidance.")
+    return controller

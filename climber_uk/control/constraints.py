@@ -11,11 +11,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from climber_uk.control.guidance import guided, on_track
+from climber_uk.control.guidance import guided, prepared_target
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import State, across, along, no_slip
 from climber_uk.mechanics.elementary import cos, select, sin, wrapped
-from climber_uk.mechanics.motion import Demand, Motion, Target
+from climber_uk.mechanics.motion import DesiredAcceleration, Motion, ReferencePoint
 from climber_uk.mechanics.reference import Reference
 from climber_uk.parameters.declaration import check, parameter
 
@@ -26,22 +26,22 @@ REST_SPEED = 1e-3  # [m/s] below which a heading cannot be told from the way a c
 class ConstraintSet(Protocol):
     """What makes the climber follow a reference, with gains as fields."""
 
-    def track(self, target: Target) -> Any:
+    def prepared(self, target: ReferencePoint) -> Any:
         """All that can be said of a target before it is known where the climber is."""
 
-    def demand(self, track: Any, motion: Motion) -> Demand:
+    def demand(self, prepared: Any, motion: Motion) -> DesiredAcceleration:
         """What is asked of a climber that moves like that."""
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""
 
 
-def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> Demand:
+def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> DesiredAcceleration:
     """What `constraints` ask of a state, each (...)."""
-    return constraints.demand(constraints.track(reference.target), state.motion)
+    return constraints.demand(constraints.prepared(reference.target), state.motion)
 
 
-def rows(state: State, demand: Demand) -> tuple[Array, Array]:
+def rows(state: State, demand: DesiredAcceleration) -> tuple[Array, Array]:
     """A (..., 3, 3) and b (..., 3) of a demand and of no-slip (18); A is orthonormal."""
     slip_row, slip_b = no_slip(state)
     sine, minus_cosine, zero = unpack(slip_row)
@@ -103,7 +103,7 @@ class Guidance:
         turning = min(root / self.turn_radius, self.turn_rate)
         return speed + hurry, yaw_rate + turning + steering
 
-    track = on_track  # see `ConstraintSet`
+    prepared = prepared_target  # see `ConstraintSet`
     demand = guided
 
 
@@ -129,11 +129,11 @@ class Exact:
         correction = self.natural_frequency * REACH
         return 2 * speed + correction, 2 * yaw_rate + self.natural_frequency
 
-    def track(self, target: Target) -> Target:
+    def prepared(self, target: ReferencePoint) -> ReferencePoint:
         """See `ConstraintSet`."""
         return target
 
-    def demand(self, target: Target, motion: Motion) -> Demand:
+    def demand(self, target: ReferencePoint, motion: Motion) -> DesiredAcceleration:
         """See `ConstraintSet`."""
         x, y, _, cosine, sine, v, omega = motion
         x_d, y_d, heading_d, v_x, v_y, _, a_x, a_y, _, j_x, j_y = target

@@ -12,21 +12,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from climber_uk.control.constraints import ConstraintSet
-from climber_uk.control.model import rolled
+from climber_uk.control.model import predict
 from climber_uk.mechanics import Array, pack
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
 from climber_uk.mechanics.motion import (
     Bounds,
-    Demand,
+    DesiredAcceleration,
     Motion,
-    Target,
+    ReferencePoint,
     Torques,
     Wrench,
-    forces,
-    limited,
     named,
+    saturate,
     torque_bounds,
+    wrench_of_torques,
 )
 from climber_uk.parameters.declaration import check, parameter
 
@@ -34,8 +34,8 @@ NOTHING = Wrench(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Law:
-    """How the torques are computed; see `Controller`."""
+class ControlOptions:
+    """How the torques are computed; see `ControlLaw`."""
 
     predict: bool = parameter(
         True, "", "aim at the middle of the period in which the torque acts", runtime=True
@@ -55,7 +55,7 @@ class Law:
         return 0.5 * period if self.predict else 0.0
 
 
-class Situation(NamedTuple):
+class ControlInput(NamedTuple):
     """What the controller answers: the motion at which its torques will begin to act, and more."""
 
     motion: Motion
@@ -89,63 +89,63 @@ class Command(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Controller:
+class ControlLaw:
     """The control law: a model of the climber and a constraint set."""
 
     climber: Climber
     constraints: ConstraintSet
-    law: Law
+    options: ControlOptions
 
-    def command(self, situation: Situation, target: Target) -> Command:
+    def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
 
         The answer itself acts on the state it is for: it is computed twice, the second time
         knowing what it will be.
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
-        ahead = self.law.lookahead(period)
-        track = self.constraints.track(target)
+        ahead = self.options.lookahead(period)
+        prepared = self.constraints.prepared(target)
         right, left = self._fixed_bounds or self._bounds(situation)
-        drive, turn = forces(climber, held.right, held.left)
+        drive, turn = wrench_of_torques(climber, held.right, held.left)
         for _ in range(2 if ahead else 1):
-            aim = rolled(climber, motion, drive + r_drive, turn + r_turn, ahead)
-            wanted, turned, lateral = self.force(self.constraints.demand(track, aim), aim)
+            aim = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
+            wanted, turned, lateral = self.force(self.constraints.demand(prepared, aim), aim)
             wanted, turned = wanted - r_drive, turned - r_turn
-            drive, turn, one, other = limited(climber, wanted, turned, right, left)
+            drive, turn, one, other = saturate(climber, wanted, turned, right, left)
         wheels, demanded = named(Torques, (one, other)), named(Wrench, (wanted, turned))
         fits = drive is wanted and turn is turned
         lost = NOTHING if fits else named(Wrench, (wanted - drive, turned - turn))
         return named(Command, (wheels, demanded, lateral, lost))
 
-    def force(self, demand: Demand, motion: Motion) -> tuple[Any, Any, Any]:
+    def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
         """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
         (v_1, turning, speed), (_, _, _, cosine, sine, v, omega) = demand, motion
         mass, inertia, friction, weight = self.climber.inertial
-        drive = mass * v_1 + friction * tanh(speed / self.law.friction_speed) + weight * sine
+        drive = mass * v_1 + friction * tanh(speed / self.options.friction_speed) + weight * sine
         return drive, inertia * turning, mass * v * omega + weight * cosine
 
-    def holding(self, situation: Situation, braking_rate: float) -> Torques:
+    def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
         climber, motion = self.climber, situation.motion
         weight = climber.weight_along_wall * motion.sine
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
-        return Torques(*limited(climber, drive, turn, *self._bounds(situation))[2:])
+        return Torques(*saturate(climber, drive, turn, *self._bounds(situation))[2:])
 
     @cached_property
     def _fixed_bounds(self) -> tuple[Bounds, Bounds] | None:
         """Those of `_bounds`, unless they depend on the situation."""
         climber = self.climber
-        if not everywhere((climber.no_load_wheel_rate == 0) & (self.law.max_torque_rate == 0)):
+        if not everywhere((climber.no_load_wheel_rate == 0) & (self.options.max_torque_rate == 0)):
             return None
         bounds = -climber.max_wheel_torque, climber.max_wheel_torque
         return bounds, bounds
 
-    def _bounds(self, situation: Situation) -> tuple[Bounds, Bounds]:
+    def _bounds(self, situation: ControlInput) -> tuple[Bounds, Bounds]:
         right, left = torque_bounds(self.climber, situation.motion)
-        if everywhere(self.law.max_torque_rate == 0):
+        if everywhere(self.options.max_torque_rate == 0):
             return right, left
-        change = self.law.max_torque_rate * situation.period
+        change = self.options.max_torque_rate * situation.period
         held = situation.held
         return _near(right, held.right, change), _near(left, held.left, change)
 

@@ -8,13 +8,13 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from climber_uk.control.active_reference import Course
+from climber_uk.control.active_reference import ActiveReference
 from climber_uk.control.ages import Ages
 from climber_uk.control.approach import Approach
 from climber_uk.control.control_law import Command
 from climber_uk.control.guard import Guard, GuardOptions, Observed
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import LONGEST_STEP, Tracker
+from climber_uk.control.sampled_controller import LONGEST_STEP, SampledController
 from climber_uk.control.twist_check import SUSPECTED, TwistCheck
 from climber_uk.mechanics import SECOND, Array, pack
 from climber_uk.mechanics.climber import State
@@ -44,18 +44,18 @@ class Answer(NamedTuple):
     command: Command | None  # what they came from; None: safe output
 
 
-class Follower:
+class Controller:
     """Follows while all is well, else gives the safe output; `mode` and `detail` say why."""
 
     def __init__(
         self,
-        tracker: Tracker,
+        sampled_controller: SampledController,
         safety: Safety,
         approach: Approach | None = None,
         guard: GuardOptions | None = None,
     ) -> None:
-        self.tracker, self.safety = tracker, safety
-        self.course = Course(tracker, approach or Approach())
+        self.sampled_controller, self.safety = sampled_controller, safety
+        self.active = ActiveReference(sampled_controller, approach or Approach())
         self.guard = Guard(guard or GuardOptions())
         self.mode, self.detail = Mode.WAITING, ""
         self.answer: Answer | None = None  # the last one
@@ -80,7 +80,7 @@ class Follower:
     @property
     def state(self) -> State | None:
         """State at the last good odometry, as it is believed to be."""
-        motion = self.tracker.motion
+        motion = self.sampled_controller.motion
         return None if motion is None else State.moving(motion)
 
     @property
@@ -91,12 +91,12 @@ class Follower:
     @property
     def clock_offset(self) -> float:
         """By how much the node's clock is ahead of the odometry's [s]; 0 if that may be latency."""
-        return self.ages.offset(self.tracker.timing.max_latency)
+        return self.ages.offset(self.sampled_controller.timing.max_latency)
 
     @property
     def preview(self) -> Preview | None:
         """What is followed, or will be: the reference, or the way to it."""
-        return self.course.followed
+        return self.active.followed
 
     def enable(self, enabled: bool) -> None:
         """Follow the reference, or give the safe output; what was wrong before is forgiven."""
@@ -137,7 +137,7 @@ class Follower:
 
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
         """Keep a reference; answer the odometry that waits for one."""
-        self.course.take(preview)
+        self.active.take(preview)
         waits = self._waiting_since is not None or self.mode is Mode.NO_REFERENCE
         return self._answer(now) if waits else None
 
@@ -160,9 +160,9 @@ class Follower:
         # stamps of before the step are no newer ones
         self._stamp, self._waiting_since = 0, None
         self._forget_when()
-        self.tracker.restart()
+        self.sampled_controller.restart()
         if back > CLOCK_STEP:
-            self.course.preview = None
+            self.active.preview = None
 
     def _forget_when(self) -> None:
         """Forget when what was: it counts no more, or times of before mean nothing."""
@@ -174,23 +174,25 @@ class Follower:
 
     def _take(self, stamp: int, motion: Motion) -> Trouble | None:
         """Give the tracker an odometry; return what is wrong with it."""
-        tracker, last = self.tracker, self.tracker.motion
+        sampled_controller, last = self.sampled_controller, self.sampled_controller.motion
         if last is None:
-            tracker.see(stamp, motion)
+            sampled_controller.see(stamp, motion)
         else:
-            expected = tracker.expected_at(stamp)
+            expected = sampled_controller.expected_at(stamp)
             trouble = None
-            if tracker.observer.velocity_source == "pose":
+            if sampled_controller.observer.velocity_source == "pose":
                 motion = motion._replace(speed=expected.speed, yaw_rate=expected.yaw_rate)
             else:
-                trouble = self._check_twist(last, motion, (stamp - tracker.stamp) / SECOND)
-            if self.safety.has_jumped(expected, motion, tracker.controller.climber.half_track):
+                trouble = self._check_twist(
+                    last, motion, (stamp - sampled_controller.stamp) / SECOND
+                )
+            if self.safety.has_jumped(expected, motion, sampled_controller.law.climber.half_track):
                 self._start_anew()
                 self._unsettled = self.safety.settling_messages
                 trouble = None  # no rate explains a jump
             self._unsettled -= self._unsettled > 0
             self._watch(stamp, last, motion, trouble)
-            tracker.see(stamp, motion, expected)
+            sampled_controller.see(stamp, motion, expected)
         if self._unsettled:
             return Mode.JUMPED, ""
         if self._moved_without_twist > self.safety.max_twist_error:
@@ -203,26 +205,29 @@ class Follower:
             self._moved_without_twist += math.hypot(motion.x - last.x, motion.y - last.y)
             return None
         self._moved_without_twist = 0.0
-        self._twist.add(last, motion, time, self.tracker.controller.climber.half_track)
+        self._twist.add(last, motion, time, self.sampled_controller.law.climber.half_track)
         detail, is_sign = self._twist.trouble(self.safety.max_twist_error)
         if not detail:
             return None
         return Mode.SIGN_WRONG if is_sign else Mode.TWIST_WRONG, detail
 
     def _start_anew(self) -> None:
-        self.tracker.reset()
+        self.sampled_controller.reset()
         self.guard.restart()
         self._twist.restart()
         self._moved_without_twist = 0.0
 
     def _watch(self, stamp: int, last: Motion, motion: Motion, trouble: Trouble | None) -> None:
         """Let the guard look at a climber that follows; let one that had a fault rest."""
-        tracker, guard = self.tracker, self.guard
-        climber = tracker.controller.climber
-        time = (stamp - tracker.stamp) / SECOND
+        sampled_controller, guard = self.sampled_controller, self.guard
+        climber = sampled_controller.law.climber
+        time = (stamp - sampled_controller.stamp) / SECOND
         if self._fault is None:
             if self.mode in (Mode.FOLLOWING, Mode.APPROACHING) and time > 0:
-                acted, disturbance = tracker.mean_torques(stamp), tracker.disturbance
+                acted, disturbance = (
+                    sampled_controller.mean_torques(stamp),
+                    sampled_controller.disturbance,
+                )
                 observed = Observed(last, motion, time, acted, disturbance)
                 self._fault, self._rested = trouble or self._find_fault(observed), 0.0
                 if self._fault is not None:
@@ -238,12 +243,12 @@ class Follower:
 
     def _find_fault(self, observed: Observed) -> Trouble | None:
         """What the guard finds of a climber that follows."""
-        target = self.course.target
+        target = self.active.target
         if target is None:
             return None
-        climber, expected = self.tracker.controller.climber, self.course.expected(target)
+        climber, expected = self.sampled_controller.law.climber, self.active.expected(target)
         fault = self.guard.watch(climber, observed, expected)
-        fault = fault or self.course.strayed(observed.before, target)
+        fault = fault or self.active.strayed(observed.before, target)
         if fault is not None and fault[0] is Mode.TOO_FAST:
             sign = self._twist.opposed(SUSPECTED * self.safety.max_twist_error)
             return (Mode.SIGN_WRONG, sign) if sign else fault
@@ -280,8 +285,11 @@ class Follower:
 
     def _unfit(self) -> Trouble | None:
         """What forbids to follow, though nothing is wrong."""
-        tracker, safety = self.tracker, self.safety
-        pressure, period = tracker.controller.climber.suction_pressure, tracker.period
+        sampled_controller, safety = self.sampled_controller, self.safety
+        pressure, period = (
+            sampled_controller.law.climber.suction_pressure,
+            sampled_controller.period,
+        )
         if pressure < safety.least_pressure:
             return Mode.LOW_PRESSURE, f"{pressure:.0f} Pa"
         if period > SELDOM * safety.odometry_timeout:
@@ -290,7 +298,7 @@ class Follower:
 
     def _missing(self, now: int) -> Trouble:
         """Whether there is a reference."""
-        if self.course.begins_after(self._stamp):
+        if self.active.begins_after(self._stamp):
             return Mode.NOT_BEGUN, ""
         since = now if self._waiting_since is None else self._waiting_since
         if now - since > self.safety.reference_timeout * SECOND:
@@ -321,7 +329,9 @@ class Follower:
         mode, detail = self._calmed(now, *self._find_mode(now))
         command = None
         if mode in (Mode.FOLLOWING, Mode.NO_REFERENCE):
-            found = self.course.follow(self.ages.latency(age, self.tracker.timing.max_latency))
+            found = self.active.follow(
+                self.ages.latency(age, self.sampled_controller.timing.max_latency)
+            )
             command = found.command
             if found.mode is not Mode.WAITING or mode is Mode.FOLLOWING:
                 mode, detail = found.mode, found.detail
@@ -330,12 +340,12 @@ class Follower:
         else:
             self._waiting_since = None
         if mode.is_fault and mode is not self.mode:
-            self.tracker.forget()
+            self.sampled_controller.forget()
         self.mode, self.detail = mode, detail
         if mode is Mode.WAITING:
             return None
         if command is None:
-            self.course.pause(self._stamp)
+            self.active.pause(self._stamp)
             torques = self._safe_torques(age)
         else:
             self._braked = None
@@ -344,19 +354,19 @@ class Follower:
         return self.answer
 
     def _safe_torques(self, age: float) -> Torques:
-        motion, climber = self.tracker.motion, self.tracker.controller.climber
+        motion, climber = self.sampled_controller.motion, self.sampled_controller.law.climber
         if self.mode is Mode.DEAD_WHEEL and climber.seal_friction >= climber.weight_along_wall:
-            return self.tracker.let_go(age)  # one wheel that holds turns the climber
+            return self.sampled_controller.let_go(age)  # one wheel that holds turns the climber
         holds = self.safety.safe_output == "hold" and self._stamp >= self._coasts_until
         if holds and motion is not None:
             rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
             begin, before = self._braked = self._braked or (self._stamp, rim)
             if self._stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
                 self._coasts_until, self._braked = self._stamp + round(COASTING * SECOND), None
-                return self.tracker.let_go(age)
+                return self.sampled_controller.let_go(age)
             braking = 0.0 if self.mode.doubts_odometry else self.safety.braking_rate
             try:
-                return self.tracker.hold(age, braking)
+                return self.sampled_controller.hold(age, braking)
             except (ValueError, ArithmeticError):
-                self.tracker.reset()  # an absurd state that odometry, finite as it was, gave
-        return self.tracker.let_go(age)
+                self.sampled_controller.reset()  # finite odometry gave an absurd state
+        return self.sampled_controller.let_go(age)

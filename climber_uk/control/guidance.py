@@ -6,13 +6,13 @@ v = v_d - L tanh(k_x e_x / L),   ψ = θ - θ_d + atan(g e_y),   g = k_y v_d / �
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from climber_uk.mechanics.elementary import arctan, cos, either, select, sin, sqrt, tanh, wrapped
-from climber_uk.mechanics.motion import Demand, Motion, Target, named
+from climber_uk.mechanics.motion import DesiredAcceleration, Motion, ReferencePoint, named
 
 if TYPE_CHECKING:
     from climber_uk.control.constraints import Guidance
 
 
-class Track(NamedTuple):
+class PreparedTarget(NamedTuple):
     """A target as `Guidance` sees it: along its heading, and what it allows and wants there."""
 
     x: Any
@@ -30,7 +30,7 @@ class Track(NamedTuple):
     gain: tuple[Any, Any, Any]  # g [1/m] and its first two derivatives by time
 
 
-def on_track(gains: "Guidance", target: Target) -> Track:
+def prepared_target(gains: "Guidance", target: ReferencePoint) -> PreparedTarget:
     """Target along its heading, with the speeds and the steering that the gains allow there."""
     x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y = target
     cosine, sine = cos(heading), sin(heading)
@@ -71,13 +71,13 @@ def on_track(gains: "Guidance", target: Target) -> Track:
         turn_rate,
         gain,
     )
-    return named(Track, numbers)
+    return named(PreparedTarget, numbers)
 
 
-def guided(gains: "Guidance", track: Track, motion: Motion) -> Demand:
+def guided(gains: "Guidance", prepared: PreparedTarget, motion: Motion) -> DesiredAcceleration:
     """Speed and heading that lead back, and the accelerations with which they are reached."""
     x, y, heading, cosine, sine, v, omega = motion
-    x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, *others = track
+    x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, *others = prepared
     waiting, hurrying, (fastest, fastest_1), gain = others
     offset_x, offset_y, turned = x - x_d, y - y_d, wrapped(heading - heading_d)
     e_x, e_y = offset_x * cosine_d + offset_y * sine_d, offset_y * cosine_d - offset_x * sine_d

@@ -29,7 +29,7 @@ FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 
 
-def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float) -> Motion:
+def predict(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float) -> Motion:
     """Motion `time` [s] later under a constant drive [N] and turn [N m], by the midpoint rule.
 
     Both include the disturbance. At rest friction takes whatever value holds the climber, up to f.
@@ -50,7 +50,7 @@ def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float)
     return named(Motion, (x + way * c, y + way * s, heading, cosine, sine, v, omega))
 
 
-class Learnt(NamedTuple):
+class DisturbanceEstimate(NamedTuple):
     """What is known of the disturbance: itself, and how it changes."""
 
     drive: Any = 0.0  # r_F [N]
@@ -59,9 +59,9 @@ class Learnt(NamedTuple):
     turn_rate: Any = 0.0  # [N m/s]
 
     @property
-    def held(self) -> "Learnt":
+    def held(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
-        return named(Learnt, (self.drive, self.turn, 0.0, 0.0))
+        return named(DisturbanceEstimate, (self.drive, self.turn, 0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +100,12 @@ class Observer:
     def corrected(
         self,
         climber: Climber,
-        learnt: Learnt,
+        learnt: DisturbanceEstimate,
         expected: Motion,
         found: Motion,
         time: float,
         shares: tuple[Any, Any],
-    ) -> tuple[Motion, Learnt]:
+    ) -> tuple[Motion, DisturbanceEstimate]:
         """Motion and disturbance after `time` [s] in which `expected` became `found`.
 
         `shares` are those of the observer for that time.
@@ -125,7 +125,7 @@ class Observer:
         slides = abs(expected.speed) > REST
         drive_rate = select(slides, drive_rate + newer / time * mass * faster, 0.0)
         turn_rate = turn_rate + newer / time * inertia * turning
-        return found, named(Learnt, (drive, turn, drive_rate, turn_rate))
+        return found, named(DisturbanceEstimate, (drive, turn, drive_rate, turn_rate))
 
     def shares(self, time: float, delay: float) -> tuple[Any, Any]:
         """What of an acceleration that was not expected is put down to the disturbance.
@@ -137,8 +137,13 @@ class Observer:
         return 2.0 * new, new * new
 
     def _from_pose(
-        self, climber: Climber, learnt: Learnt, expected: Motion, found: Motion, time: float
-    ) -> tuple[Motion, Learnt]:
+        self,
+        climber: Climber,
+        learnt: DisturbanceEstimate,
+        expected: Motion,
+        found: Motion,
+        time: float,
+    ) -> tuple[Motion, DisturbanceEstimate]:
         x, y, heading, cosine, sine, v, omega = expected
         ahead = (found.x - x) * cosine + (found.y - y) * sine
         beside = (found.y - y) * cosine - (found.x - x) * sine
@@ -156,9 +161,9 @@ class Observer:
         motion = Motion(x, y, *rotated(heading, cosine, sine, g * turned), v, omega)
         mass, inertia, _, _ = climber.inertial
         drive = learnt.drive + k / time**2 * mass * ahead
-        return motion, Learnt(drive, learnt.turn + k / time**2 * inertia * turned)
+        return motion, DisturbanceEstimate(drive, learnt.turn + k / time**2 * inertia * turned)
 
 
-def _faded(learnt: Learnt, time: float) -> Learnt:
+def _faded(learnt: DisturbanceEstimate, time: float) -> DisturbanceEstimate:
     left = exp(-time / FORGETTING_TIME)
-    return Learnt(learnt.drive * left, learnt.turn * left)
+    return DisturbanceEstimate(learnt.drive * left, learnt.turn * left)

@@ -1,6 +1,6 @@
 """When the controller follows, and when it gives its safe output instead: a small state machine.
 
-Its state is a `Mode`; `Follower` asks after every odometry, reference and look at the clock which
+Its state is a `Mode`; `Controller` asks after every odometry, reference and look at the clock which
 one it is now.
 """
 

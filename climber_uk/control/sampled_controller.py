@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from climber_uk.control.constraints import ConstraintSet
-from climber_uk.control.control_law import Command, Controller, Situation
+from climber_uk.control.control_law import Command, ControlInput, ControlLaw
 from climber_uk.control.latency import Latency, Sample
-from climber_uk.control.model import SLOW, Learnt, Observer, rolled
+from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, predict
 from climber_uk.control.time_scaling import Pacing, Progress
-from climber_uk.control.torque_history import NONE, Acting
+from climber_uk.control.torque_history import NONE, TorqueHistory
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, named
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, named, wrench_of_torques
 from climber_uk.mechanics.preview import Preview
 from climber_uk.parameters.declaration import check, parameter
 
@@ -65,17 +65,15 @@ class Timing:
         check(self)
 
 
-class Tracker:
+class SampledController:
     """Answers odometry with torques, and learns from how the climber took the last ones."""
 
-    def __init__(
-        self, controller: Controller, observer: Observer, timing: Timing, pacing: Pacing
-    ) -> None:
-        self.controller, self.observer = controller, observer
+    def __init__(self, law: ControlLaw, observer: Observer, timing: Timing, pacing: Pacing) -> None:
+        self.law, self.observer = law, observer
         self.timing, self.pacing = timing, pacing
         self.period = timing.control_period  # [s] from one odometry to the next
         self._period_is_measured = False
-        self._acting = Acting()
+        self._acting = TorqueHistory()
         self.latency, self.twist = Latency(), TwistKind()
         self._delay = 0.0  # [s] of the last answer
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
@@ -98,7 +96,7 @@ class Tracker:
 
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
-        self.learnt = Learnt()
+        self.learnt = DisturbanceEstimate()
         self._learning: Any = False
 
     @property
@@ -108,15 +106,13 @@ class Tracker:
 
     @disturbance.setter
     def disturbance(self, disturbance: Wrench) -> None:
-        self.learnt = Learnt(*disturbance)
+        self.learnt = DisturbanceEstimate(*disturbance)
 
-    def retune(
-        self, controller: Controller, observer: Observer, timing: Timing, pacing: Pacing
-    ) -> None:
+    def retune(self, law: ControlLaw, observer: Observer, timing: Timing, pacing: Pacing) -> None:
         """Go over to other settings: the constraints' gains gradually, so that no torque jumps."""
-        if controller.constraints != self.controller.constraints:
+        if law.constraints != self.law.constraints:
             self._retuned = self.stamp, self._constraints()
-        self.controller, self.observer = controller, observer
+        self.law, self.observer = law, observer
         self.timing, self.pacing = timing, pacing
 
     def see(self, stamp: int, motion: Motion, expected: Motion | None = None) -> None:
@@ -134,7 +130,7 @@ class Tracker:
                 if self.timing.learn_delay and is_known:
                     self._learn_delay(stamp, expected, motion, shares)
             motion, learnt = self.observer.corrected(
-                self.controller.climber, self.learnt, expected, motion, time, shares
+                self.law.climber, self.learnt, expected, motion, time, shares
             )
             if is_known:
                 is_learnt = self._learning
@@ -154,22 +150,22 @@ class Tracker:
         Raises `ValueError` or `ArithmeticError` if they are not finite.
         """
         begins, situation = self._situation(age)
-        controller = self.controller
+        law = self.law
         if constraints is not None:
-            controller = replace(controller, constraints=constraints)
+            law = replace(law, constraints=constraints)
         elif self._retuned is not None:
-            controller = replace(controller, constraints=self._constraints())
-        aim = begins + round(controller.law.lookahead(self.period) * SECOND)
+            law = replace(law, constraints=self._constraints())
+        aim = begins + round(law.options.lookahead(self.period) * SECOND)
         progress = self.progress.advanced(begins, self.pacing)
         target = progress.target(preview, aim)
         if target is None:
             return None
-        command = controller.command(situation, target)
+        command = law.command(situation, target)
         if self.pacing.catch_up > 0 and abs(command.lost.drive) > CUT:
             progress = progress.slowed(
-                command.lost.drive / controller.climber.mass, preview, aim, self.period
+                command.lost.drive / law.climber.mass, preview, aim, self.period
             )
-            command = controller.command(situation, progress.target(preview, aim) or target)
+            command = law.command(situation, progress.target(preview, aim) or target)
         wheels, _, _, (drive, turn) = command
         _check(wheels)
         self.progress = progress
@@ -183,7 +179,7 @@ class Tracker:
         if age >= LONGEST_STEP:  # it has been braked, as far as can be known
             at_rest = situation.motion._replace(speed=0.0, yaw_rate=0.0)
             situation = situation._replace(motion=at_rest)
-        torques = self.controller.holding(situation, braking_rate)
+        torques = self.law.holding(situation, braking_rate)
         _check(torques)
         self._learning = False
         self._send(begins, torques)
@@ -210,13 +206,13 @@ class Tracker:
     def expected_at(self, stamp: int) -> Motion:
         """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.motion is not None
-        motion, climber = self.motion, self.controller.climber
+        motion, climber = self.motion, self.law.climber
         r_drive, r_turn, _, _ = self.learnt
         if stamp == self.stamp:
             return motion
         for torques, time in self._acting.between(self.stamp, stamp):
-            drive, turn = forces(climber, *torques)
-            motion = rolled(climber, motion, drive + r_drive, turn + r_turn, time)
+            drive, turn = wrench_of_torques(climber, *torques)
+            motion = predict(climber, motion, drive + r_drive, turn + r_turn, time)
         return motion
 
     def _at_its_stamp(self, expected: Motion, found: Motion, time: float) -> Motion:
@@ -238,8 +234,8 @@ class Tracker:
         self, stamp: int, expected: Motion, found: Motion, shares: tuple[Any, Any]
     ) -> None:
         """Learn how much later than told torques act; `shares` are the observer's."""
-        climber = self.controller.climber
-        drive, turn = forces(climber, *self._acting.between(self.stamp, stamp)[-1][0])
+        climber = self.law.climber
+        drive, turn = wrench_of_torques(climber, *self._acting.between(self.stamp, stamp)[-1][0])
         lever = climber.half_track
         accelerations = drive / climber.mass, lever * turn / climber.yaw_inertia
         errors = found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)
@@ -250,13 +246,13 @@ class Tracker:
     def _constraints(self) -> ConstraintSet:
         """Constraints as they are now, on their way from the gains that were before."""
         if self._retuned is None:
-            return self.controller.constraints
+            return self.law.constraints
         since, before = self._retuned
         share = (self.stamp - since) / SECOND / RETUNING_TIME
-        if not 0 <= share < 1 or type(before) is not type(self.controller.constraints):
+        if not 0 <= share < 1 or type(before) is not type(self.law.constraints):
             self._retuned = None
-            return self.controller.constraints
-        after = self.controller.constraints
+            return self.law.constraints
+        after = self.law.constraints
         gains = {
             field.name: (1 - share) * getattr(before, field.name)
             + share * getattr(after, field.name)
@@ -272,11 +268,11 @@ class Tracker:
         self._delay = delay
         return self._acting.begin(self.stamp + round(delay * SECOND))
 
-    def _situation(self, age: float) -> tuple[int, Situation]:
+    def _situation(self, age: float) -> tuple[int, ControlInput]:
         begins = self.begin(age)
         motion = self.expected_at(begins)
         situation = motion, self._acting.last, self.disturbance, self.period
-        return begins, named(Situation, situation)
+        return begins, named(ControlInput, situation)
 
     def _send(self, begins: int, torques: Torques) -> None:
         self._acting.add(begins, torques)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import compose
-from climber_uk.mechanics.motion import Target
+from climber_uk.mechanics.motion import ReferencePoint
 from climber_uk.mechanics.preview import Preview
 from climber_uk.parameters.declaration import check, parameter
 
@@ -72,7 +72,7 @@ class Pace(NamedTuple):
             return self
         return self._replace(change=max(self.change - missing / speed, -self.rate / step))
 
-    def target(self, preview: Preview, time: int) -> Target | None:
+    def target(self, preview: Preview, time: int) -> ReferencePoint | None:
         """Target for `time` [ns] at this pace; None outside of the preview."""
         found = preview.target(time - round(self.lag * SECOND))
         if found is None or (self.rate == 1 and self.change == 0):
@@ -83,7 +83,7 @@ class Pace(NamedTuple):
         _, v_y, a_y, j_y = compose((y, v_y, a_y, j_y), rates)
         # the jerk of the heading is not known, nor needed
         _, omega, omega_1, _ = compose((heading, omega, omega_1, 0.0), rates)
-        return Target(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
+        return ReferencePoint(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
 
 
 IN_TIME = Pace()
@@ -109,7 +109,7 @@ class Progress(NamedTuple):
         """Time of the reference [ns] at `time` [ns], near that of the last answer."""
         return time - self.waited - round(self.pace.lag * SECOND)
 
-    def target(self, preview: Preview, time: int) -> Target | None:
+    def target(self, preview: Preview, time: int) -> ReferencePoint | None:
         """Target for `time` [ns]; None outside of the preview."""
         if self.pace is IN_TIME:
             return preview.target(time - self.waited)

@@ -8,7 +8,7 @@ from climber_uk.mechanics.motion import Torques
 NONE = Torques(0.0, 0.0)
 
 
-class Acting:
+class TorqueHistory:
     """Torques in the order in which they act; none before the first."""
 
     def __init__(self) -> None:

@@ -53,7 +53,7 @@ class Interrupted(Exception):  # noqa: N818 - as above
 
 
 @dataclass(frozen=True)
-class Options:
+class DemoOptions:
     """How long the demonstration takes."""
 
     duration: float = parameter(20.0, "s", "of the trajectory that is run", above=0)
@@ -72,9 +72,9 @@ class Demo(ClimberNode):
         self.climbers, self.signals = climbers, signals
         self.processes: Processes = {}  # that have to go on
         self.has_begun = False
-        self.parameters.declare(Options)
+        self.parameters.declare(DemoOptions)
         self.parameters.refuse_unknown()
-        self.duration = self.parameters.read(Options).duration
+        self.duration = self.parameters.read(DemoOptions).duration
         self.time: float | None = None  # [s] of the plant
         self.fall = ""  # what the plant said of it
         self.subscription(FluidPressure, f"{climbers[0]}/suction_pressure", self.on_pressure)

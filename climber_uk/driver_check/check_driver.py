@@ -20,7 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from climber_uk.driver_check import checks, report
-from climber_uk.driver_check.evidence import Expected
+from climber_uk.driver_check.evidence import ExpectedDriver
 from climber_uk.driver_check.graph import is_known, others_commanding
 from climber_uk.driver_check.node import DriverNode
 from climber_uk.driver_check.trial import Bounds
@@ -50,7 +50,7 @@ def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
 
     Raises `OSError`, or `ValueError` if a file has nothing for either.
     """
-    known = {field.name for kind in (Names, Climber, Expected) for field in fields(kind)}
+    known = {field.name for kind in (Names, Climber, ExpectedDriver) for field in fields(kind)}
     as_controller: list[Section] = []
     own: list[Section] = []
     files = list(paths(arguments))

@@ -26,7 +26,7 @@ PLANAR = 0, 7, 35  # x, y and about z, on the diagonal of a covariance
 
 
 @dataclass(frozen=True)
-class Expected:
+class ExpectedDriver:
     """What the controller is told of the driver; the same names as there."""
 
     control_period: float = parameter(
@@ -71,7 +71,7 @@ class Arrival(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionSeen:
     """Odometry in numbers: n messages, each stamp once."""
 
     stamp: Times  # (n,)
@@ -139,7 +139,7 @@ class Evidence:
     """All that was seen."""
 
     climber: Climber
-    expected: Expected
+    expected: ExpectedDriver
     frames: tuple[str, str]  # that odometry should have
     use_sim_time: bool
     graph: Graph
@@ -179,12 +179,12 @@ class Evidence:
         ).reshape(-1, 6)
 
     @cached_property
-    def motion(self) -> Motion:
+    def motion(self) -> MotionSeen:
         """Poses and twists, of messages that are good."""
         return motion_of(self.arrivals)
 
 
-def motion_of(arrivals: Sequence[Arrival]) -> Motion:
+def motion_of(arrivals: Sequence[Arrival]) -> MotionSeen:
     """Motion of what arrived, if all of it is good."""
     found = {}
     for arrival in arrivals:
@@ -198,7 +198,7 @@ def motion_of(arrivals: Sequence[Arrival]) -> Motion:
     table = np.array([found[stamp] for stamp in sorted(found)]).reshape(-1, 6)
     pose = table[:, :3].copy()
     pose[:, 2] = np.unwrap(pose[:, 2])
-    return Motion(np.array(sorted(found), np.int64), pose, table[:, 3:])
+    return MotionSeen(np.array(sorted(found), np.int64), pose, table[:, 3:])
 
 
 def _state(message: "Odometry") -> State:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from climber_uk.driver_check import thresholds
-from climber_uk.driver_check.evidence import Evidence, Motion
+from climber_uk.driver_check.evidence import Evidence, MotionSeen
 from climber_uk.driver_check.report import Finding, failed, graded, skipped, warned
 from climber_uk.mechanics import Array
 
@@ -31,7 +31,7 @@ class Ways:
         return max(span(self.on_wall), span(self.by_twist)) > thresholds.MOVED
 
 
-def ways(motion: Motion) -> Ways:
+def ways(motion: MotionSeen) -> Ways:
     """Ways of a motion; twist is integrated by the trapezoidal rule."""
     steps = np.diff(motion.time)[:, None]
     gone = np.cumsum(steps * (motion.twist[1:] + motion.twist[:-1]) / 2, axis=0)

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from climber_uk.driver_check.evidence import Arrival, Evidence, Expected
+from climber_uk.driver_check.evidence import Arrival, Evidence, ExpectedDriver
 from climber_uk.driver_check.graph import graph, others_commanding
 from climber_uk.driver_check.trial import Bounds, Trial
 from climber_uk.mechanics import SECOND, Array
@@ -30,7 +30,7 @@ class DriverNode(ClimberNode):
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("check_driver", arguments=arguments)
-        for kind in (Climber, Expected, Bounds):
+        for kind in (Climber, ExpectedDriver, Bounds):
             self.parameters.declare(kind)
         self.parameters.refuse_unknown()
         self.arrivals: list[Arrival] = []
@@ -165,7 +165,7 @@ class DriverNode(ClimberNode):
         """All that was seen until now."""
         return Evidence(
             climber=self.parameters.read(Climber),
-            expected=self.parameters.read(Expected),
+            expected=self.parameters.read(ExpectedDriver),
             frames=(self.names.odom_frame, self.names.base_frame),
             use_sim_time=self.use_sim_time,
             graph=graph(self, self.odometry.topic_name),

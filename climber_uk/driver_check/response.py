@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from climber_uk.driver_check import thresholds
-from climber_uk.driver_check.evidence import Evidence, Motion, Trial
+from climber_uk.driver_check.evidence import Evidence, MotionSeen, Trial
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 
@@ -72,7 +72,7 @@ class Response:
         return best, likeness[best]
 
 
-def respond(motion: Motion, trial: Trial, climber: Climber) -> Response:
+def respond(motion: MotionSeen, trial: Trial, climber: Climber) -> Response:
     """Response that explains the pulses, with the delay that explains them best."""
     at_rest = motion.stamp < trial.commands[0].time
     noise = np.std(motion.reaction[at_rest], axis=0) if at_rest.sum() > 1 else np.zeros(2)
@@ -96,7 +96,7 @@ def respond(motion: Motion, trial: Trial, climber: Climber) -> Response:
 
 
 def _fit_all(
-    motion: Motion, trial: Trial, floor: Array, delay: float
+    motion: MotionSeen, trial: Trial, floor: Array, delay: float
 ) -> dict[tuple[int, int], list[Fit]]:
     """Fits by pair (drive, turn) and speed (forward, yaw rate), one for each pulse that moved."""
     begin = motion.stamp[0]
@@ -155,7 +155,7 @@ def _cosine(one: Array, other: Array) -> float:
     return float(one @ other) / size if size else 0.0
 
 
-def pushed_on(motion: Motion, silence: tuple[int, int]) -> tuple[float, float]:
+def pushed_on(motion: MotionSeen, silence: tuple[int, int]) -> tuple[float, float]:
     """Yaw rate when a silence began [rad/s], and its acceleration at the silence's end [rad/s²]."""
     begin, end = silence
     last = (motion.stamp > end - (end - begin) // 3) & (motion.stamp <= end)

@@ -32,7 +32,7 @@ SOUGHT = np.isin(NAMES, ("mass", "seal_friction_coefficient", "yaw_inertia"))
 
 
 @dataclass(frozen=True)
-class Limits:
+class ExcitationLimits:
     """What the trajectory may take."""
 
     size: float = parameter(2.0, "m", "side of the square that it stays in", above=0)
@@ -45,7 +45,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ExcitationPlan:
     """A trajectory, and what it would tell."""
 
     name: str  # of the shape
@@ -73,8 +73,11 @@ class Plan:
 
 
 def plan(
-    climber: Climber, limits: Limits, origin: tuple[float, float] = (0.0, 0.0), site: Site = SITE
-) -> Plan:
+    climber: Climber,
+    limits: ExcitationLimits,
+    origin: tuple[float, float] = (0.0, 0.0),
+    site: Site = SITE,
+) -> ExcitationPlan:
     """The best of the candidates within the limits; `ValueError` if there is none."""
     found = list(_plans(climber, limits, origin, site))
     if not found:
@@ -83,8 +86,8 @@ def plan(
 
 
 def _plans(
-    climber: Climber, limits: Limits, origin: tuple[float, float], site: Site
-) -> Iterator[Plan]:
+    climber: Climber, limits: ExcitationLimits, origin: tuple[float, float], site: Site
+) -> Iterator[ExcitationPlan]:
     for name, shape in _shapes(limits.size):
         for ramp_time in RAMPS:
             trajectory = Trajectory(shape, _law(shape, ramp_time, limits), origin=origin)
@@ -93,7 +96,7 @@ def _plans(
             motion, torques = driven(trajectory, climber)
             is_long = len(CUT.windows(motion)) >= LEAST_WINDOWS
             if is_long and np.abs(torques).max() <= limits.torque:
-                yield Plan(name, trajectory, predicted(motion, climber, site=site))
+                yield ExcitationPlan(name, trajectory, predicted(motion, climber, site=site))
 
 
 def _shapes(size: float) -> Iterator[tuple[str, Shape]]:
@@ -107,7 +110,7 @@ def _shapes(size: float) -> Iterator[tuple[str, Shape]]:
         yield "lemniscate", Lemniscate(share * half, half)
 
 
-def _law(shape: Shape, ramp_time: float, limits: Limits) -> RestToRest:
+def _law(shape: Shape, ramp_time: float, limits: ExcitationLimits) -> RestToRest:
     """From rest to the highest speed and back, as often as there is time for."""
     _, slope, *_ = shape.derivatives(np.linspace(0, shape.length, 1000))
     rate = limits.speed / float(np.linalg.norm(slope, axis=-1).max())

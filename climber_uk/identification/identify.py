@@ -92,7 +92,7 @@ def plan(options: argparse.Namespace) -> None:
     site, believed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
     if not site.has_seal:
         believed = replace(believed, seal_friction_coefficient=0.0)
-    limits = Values(vars(options)).read(excitation.Limits)
+    limits = Values(vars(options)).read(excitation.ExcitationLimits)
     best = excitation.plan(believed, limits, origin, site)
     x, y, heading = best.trajectory.at(0.0).pose.tolist()
     changed = {
@@ -139,7 +139,7 @@ def main() -> None:
     parser.add_argument(
         "--plan", type=Path, help="write a parameter file with a trajectory instead"
     )
-    for kind, of in (Cut, "of a bag"), (excitation.Limits, "of a plan"):
+    for kind, of in (Cut, "of a bag"), (excitation.ExcitationLimits, "of a plan"):
         for field in fields(kind):
             rule, name = field.metadata, "--" + field.name.replace("_", "-")
             said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"

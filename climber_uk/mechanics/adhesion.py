@@ -13,7 +13,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sqrt, with_sign_of
 from climber_uk.parameters.declaration import check, parameter
 
-AMPLE = 100.0  # margins are told within ± that: without a demand there would be no end
+MAX_MARGIN = 100.0  # margins are told within ± that: without a demand there would be no end
 
 
 class Adhesion(Protocol):
@@ -149,7 +149,7 @@ class Grip:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hold:
+class Attachment:
     """All that a climber's hold on its wall depends on."""
 
     adhesion: Adhesion = field(default_factory=Suction)
@@ -174,7 +174,7 @@ class Hold:
         return clipped(self.hold(climber, into_wall) - held_by_seal, 0.0, float("inf"))
 
     def slip_margin(self, climber: Climber, into_wall: Any, drive: Any, lateral: Any) -> Any:
-        """μ_w N_w / √(drive² + lateral²) (...): below 1 a real climber slips; see `AMPLE`."""
+        """μ_w N_w / √(drive² + lateral²) (...): below 1 a real climber slips; see `MAX_MARGIN`."""
         traction = self.grip.wheel_friction_coefficient * self.wheel_load(climber, into_wall)
         return _margin(traction, sqrt(drive * drive + lateral * lateral))
 
@@ -186,7 +186,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class Alarm:
-    """Margins that are worth a word; see `Hold`."""
+    """Margins that are worth a word; see `Attachment`."""
 
     warn_margin: float = parameter(1.5, "", "below which margins warn", at_least=0, runtime=True)
     error_margin: float = parameter(
@@ -204,7 +204,7 @@ class Alarm:
 
 
 def _margin(held: Any, demanded: Any) -> Any:
-    within = abs(held) < AMPLE * demanded
+    within = abs(held) < MAX_MARGIN * demanded
     if everywhere(within):
         return held / demanded
-    return select(within, held / select(within, demanded, 1.0), with_sign_of(AMPLE, held))
+    return select(within, held / select(within, demanded, 1.0), with_sign_of(MAX_MARGIN, held))

@@ -170,7 +170,7 @@ class Climber:
 
     def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:
         """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
-        return motion.forces(self, *unpack(torques))
+        return motion.wrench_of_torques(self, *unpack(torques))
 
     def wheel_torques(self, drive: Array, turn: Array) -> Array:
         """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N, (..., 2) [N m]."""

@@ -6,7 +6,7 @@ A new kind of locomotion is one class and one entry. Everything broadcasts.
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from climber_uk.mechanics.adhesion import Hold
+from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.friction import Coulomb, Friction
 from climber_uk.parameters.declaration import check, parameter
 
@@ -46,7 +46,7 @@ LOCOMOTION: dict[str, type[Locomotion]] = {"wheeled": Wheeled, "tracked": Tracke
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contact(Hold):
+class Contact(Attachment):
     """How a climber is held, and what resists its motion."""
 
     friction: Friction = field(default_factory=Coulomb)

@@ -130,10 +130,11 @@ class LuGre(Stribeck):
         """σ₀ (...) [N/m]."""
         return f / self.deflection
 
-    def force(self, f: Any, velocity: Any, bent: Any, bending: Any) -> Any:
+    def force(self, f: Any, velocity: Any, deflection: Any, bending: Any) -> Any:
         """F (...) [N] against `velocity`, of the deflection z [m] and its rate ż [m/s]."""
         return (
-            self.stiffness(f) * (bent + self.damping_time * bending) + f * self.viscous * velocity
+            self.stiffness(f) * (deflection + self.damping_time * bending)
+            + f * self.viscous * velocity
         )
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Bounds = tuple[Any, Any]  # lowest and highest torque of a wheel [N m]
 # v̇ [m/s²] and θ̈ [rad/s²] asked of a climber, and the speed [m/s] whose sign friction will have
-Demand = tuple[Any, Any, Any]
+DesiredAcceleration = tuple[Any, Any, Any]
 
 
 class Motion(NamedTuple):
@@ -31,7 +31,7 @@ class Motion(NamedTuple):
     yaw_rate: Any  # ω [rad/s]
 
 
-class Target(NamedTuple):
+class ReferencePoint(NamedTuple):
     """Where a climber should be and how it should move, in the wall's frame."""
 
     x: Any  # [m]
@@ -61,7 +61,7 @@ class Torques(NamedTuple):
     left: Any
 
 
-def forces(climber: "Climber", right: Any, left: Any) -> tuple[Any, Any]:
+def wrench_of_torques(climber: "Climber", right: Any, left: Any) -> tuple[Any, Any]:
     """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
     radius = climber.wheel_radius
     return (right + left) / radius, climber.half_track * (right - left) / radius
@@ -98,7 +98,7 @@ def _bounds(limit: Any, part: Any) -> Bounds:
     return -limit * clipped(1 + part, 0.0, 1.0), limit * clipped(1 - part, 0.0, 1.0)
 
 
-def limited(
+def saturate(
     climber: "Climber", drive: Any, turn: Any, right: Bounds, left: Bounds
 ) -> tuple[Any, Any, Any, Any]:
     """What wheels within their bounds can do of drive and turn, the turn served first.

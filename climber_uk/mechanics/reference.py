@@ -5,7 +5,7 @@ from functools import cached_property
 
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import along
-from climber_uk.mechanics.motion import Target
+from climber_uk.mechanics.motion import ReferencePoint
 
 
 @dataclass(frozen=True)
@@ -18,15 +18,15 @@ class Reference:
     jerk: Array  # (..., 2) of x and y [m/s³]
 
     @classmethod
-    def of(cls, target: Target) -> "Reference":
+    def of(cls, target: ReferencePoint) -> "Reference":
         """Reference of a target."""
         return cls(pack(*target[:3]), pack(*target[3:6]), pack(*target[6:9]), pack(*target[9:]))
 
     @cached_property
-    def target(self) -> Target:
+    def target(self) -> ReferencePoint:
         """The same in components."""
         vectors = self.pose, self.velocity, self.acceleration, self.jerk
-        return Target(*(part for vector in vectors for part in unpack(vector)))
+        return ReferencePoint(*(part for vector in vectors for part in unpack(vector)))
 
     @cached_property
     def heading(self) -> Array:

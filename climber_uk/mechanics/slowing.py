@@ -21,7 +21,7 @@ MARGIN = 1.01  # for what peaks in between
 
 
 @dataclass(frozen=True)
-class Limits:
+class SpeedLimits:
     """What a climber must not exceed on its path."""
 
     rate: float  # [m/s] of u
@@ -61,7 +61,7 @@ class Slowed:
         return s, 1 / rho, -rho_1 / rho**3, (3 * rho_1**2 - rho * rho_2) / rho**5
 
 
-def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: Limits) -> Slowed:
+def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: SpeedLimits) -> Slowed:
     """s(u) along `curve`, a BSpline of s from 0 to `length`, so slow that the limits hold.
 
     At no rate it would have to be slower than that within less than `spacing` [m].
@@ -84,7 +84,7 @@ def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: Limi
 
 
 def _cells(
-    curve: Any, period: float | None, length: float, most: float, limits: Limits, least: float
+    curve: Any, period: float | None, length: float, most: float, limits: SpeedLimits, least: float
 ) -> tuple[Array, Array]:
     """Sizes (n,) of cells small enough to tell where it is how slow, and the ρ (n,) in each."""
     edges = np.unique(np.clip(curve.t, 0.0, length))
@@ -111,7 +111,7 @@ def _cells(
     raise ValueError(f"the path turns on the spot at ({x:.4g}, {y:.4g}) m: leave points out there")
 
 
-def _look(curve: Any, start: Array, size: Array, limits: Limits) -> tuple[Array, Array]:
+def _look(curve: Any, start: Array, size: Array, limits: SpeedLimits) -> tuple[Array, Array]:
     """Most |dθ/ds| [rad/m], and the ρ needed, of cells (n,)."""
     s = start[:, None] + size[:, None] * WITHIN
     p_1, p_2 = np.moveaxis(curve(s, 1), -1, 0), np.moveaxis(curve(s, 2), -1, 0)

@@ -11,7 +11,7 @@ from climber_uk.parameters.declaration import check, parameter
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrajectoryParameters:
     """What to follow."""
 
     shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
@@ -25,15 +25,15 @@ class Plan:
 
 
 KINDS: list[tuple[type, str]] = [
-    (Plan, ""),
+    (TrajectoryParameters, ""),
     *((kind, f"{name}.") for name, kind in {**SHAPES, **TIME_LAWS}.items()),
 ]
 """All that is read, with the prefix of its parameters."""
 
 
-def planned(read: Callable[..., Any]) -> Trajectory:
+def build_trajectory(read: Callable[..., Any]) -> Trajectory:
     """Trajectory of what `read` gives for a class and a prefix; `ValueError` if there is none."""
-    plan = read(Plan)
+    plan = read(TrajectoryParameters)
     return Trajectory(
         shape=read(SHAPES[plan.shape], f"{plan.shape}."),
         law=read(TIME_LAWS[plan.time_law], f"{plan.time_law}."),

@@ -9,7 +9,7 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.rounding import Rounded, rounded
-from climber_uk.mechanics.slowing import Limits, Slowed, slowed
+from climber_uk.mechanics.slowing import Slowed, SpeedLimits, slowed
 from climber_uk.mechanics.waypoint_file import read_waypoints
 from climber_uk.parameters.declaration import check, parameter
 
@@ -59,7 +59,7 @@ class Waypoints:
     def at_rate(self, rate: float) -> "SlowedPath":
         """See `Shape`."""
         if rate not in self._by_rate:
-            limits = Limits(rate, self.max_yaw_rate, self.max_acceleration)
+            limits = SpeedLimits(rate, self.max_yaw_rate, self.max_acceleration)
             path = self._rounded
             try:
                 pace = slowed(path.curve, path.length, path.closed, self.tolerance, limits)

@@ -20,7 +20,7 @@ from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
 from climber_uk.parameters.declaration import check, parameter
-from climber_uk.ros.running import BEST_EFFORT, RELIABLE, SLOW, ClimberNode, Rhythm, run
+from climber_uk.ros.running import BEST_EFFORT, PUBLISH_PERIOD, RELIABLE, ClimberNode, Throttle, run
 
 T = TypeVar("T")
 REFERENCE, TORQUES = "reference", "wheel_torques"
@@ -38,7 +38,7 @@ GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Options:
+class MarkerOptions:
     """How large it is drawn."""
 
     half_track: float = parameter(
@@ -59,12 +59,12 @@ class Markers(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__("markers")
-        self.parameters.declare(Options)
+        self.parameters.declare(MarkerOptions)
         self.parameters.refuse_unknown()
-        self.options = self.parameters.read(Options)
+        self.options = self.parameters.read(MarkerOptions)
         self.latest: dict[str, Any] = {}
         self.way: deque[Place] = deque(maxlen=self.options.way_points)
-        self.is_due, self.last = Rhythm(SLOW), 0
+        self.is_due, self.last = Throttle(PUBLISH_PERIOD), 0
         self.markers = self.publisher(MarkerArray, "markers", RELIABLE)
         self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
         for topic, kind in SEEN.items():

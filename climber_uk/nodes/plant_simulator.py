@@ -15,11 +15,11 @@ from climber_uk.ros.margins import Margins
 from climber_uk.ros.plant_time import PlantTime
 from climber_uk.ros.plant_topics import PlantTopics
 from climber_uk.ros.running import ClimberNode, run
-from climber_uk.simulation.command_buffer import Schedule
+from climber_uk.simulation.command_buffer import CommandBuffer
 from climber_uk.simulation.inputs import FellOff, NotFinite
-from climber_uk.simulation.options import Options
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
-from climber_uk.simulation.simulated_robot import NONE, Machine, Physics, Push
+from climber_uk.simulation.simulated_robot import NONE, Physics, Push, SimulatedRobot
 
 HEARD = "odom", "joint_states", "wheel_torques", "reference"  # of plant, controller and planner
 
@@ -34,7 +34,7 @@ class PlantSimulator(ClimberNode):
         super().__init__("plant_simulator", namespace)
         plant_parts.declare(self.parameters)
         self.parameters.refuse_unknown("the paper's climber, at rest")
-        self.options = self.parameters.read(Options)
+        self.options = self.parameters.read(SimulationOptions)
         self.margins = Margins(self, self.parameters.read(Alarm))
         self.time = time or PlantTime(self, self.options)
         self.time.join(self)
@@ -51,13 +51,13 @@ class PlantSimulator(ClimberNode):
 
     def on_parameters(self) -> None:
         """Take up what was changed: the pump's pressure, a magnet's gap, levels of alarm."""
-        self.machine.take(plant_parts.parts(self.parameters))
+        self.robot.take(plant_parts.parts(self.parameters))
         self.margins.alarm = self.parameters.read(Alarm)
 
     def summary(self) -> str:
         """What is simulated, in which time."""
-        climber, physics = self.machine.plant.climber, self.parameters.read(Physics)
-        pull = self.machine.plant.contact.adhesion.force(climber)
+        climber, physics = self.robot.plant.climber, self.parameters.read(Physics)
+        pull = self.robot.plant.contact.adhesion.force(climber)
         rate = 1 / self.options.control_period
         return (
             f"{climber.mass:g} kg, {physics.locomotion}, {physics.friction} friction, "
@@ -70,14 +70,14 @@ class PlantSimulator(ClimberNode):
     def place_at_start(self) -> None:
         """Go back to the initial state, with no torque yet."""
         start = self.options.initial_state
-        self.machine = Machine(
+        self.robot = SimulatedRobot(
             plant_parts.parts(self.parameters), start, self.options.control_period
         )
         self.held = bool(start.velocity.any())
         self.origin = self.time.stamp  # of the first odometry [ns]
         timeout = 0.0 if self.options.simulated_time else self.options.command_timeout
-        self.commands: Schedule[Array] = Schedule(round(timeout * SECOND))
-        self.pushes: Schedule[Push] = Schedule(round(self.options.push_timeout * SECOND))
+        self.commands: CommandBuffer[Array] = CommandBuffer(round(timeout * SECOND))
+        self.pushes: CommandBuffer[Push] = CommandBuffer(round(self.options.push_timeout * SECOND))
         self.fallen = self.answered = False
 
     def on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -129,7 +129,7 @@ class PlantSimulator(ClimberNode):
         except ValueError as error:
             self.say("wheel_torques", "refused, zero torque instead", str(error))
             torques = np.zeros(2)
-        limit = self.machine.plant.climber.max_wheel_torque
+        limit = self.robot.plant.climber.max_wheel_torque
         torques = np.clip(torques, -limit, limit)
         self.held = self.held and not torques.any()
         if not self.options.simulated_time:
@@ -152,7 +152,7 @@ class PlantSimulator(ClimberNode):
     @property
     def asked(self) -> int:
         """Stamp of the odometry that is published last [ns]."""
-        number, _ = self.machine.odometer.latest()
+        number, _ = self.robot.odometer.latest()
         return self.origin + number * self.time.period
 
     @property
@@ -173,12 +173,12 @@ class PlantSimulator(ClimberNode):
             for number in range(0 if self.held else self.options.steps):
                 time = self.time.stamp + number * self.time.period // self.options.steps
                 push, _ = self.pushes.at(time)
-                self.machine.advance(self.command_at(time), push or NONE)
+                self.robot.advance(self.command_at(time), push or NONE)
         except (FellOff, NotFinite) as error:
             self.fallen = True
             self.say("climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error))
             return
-        self.machine.measure()
+        self.robot.measure()
 
     def no_answer(self) -> None:
         """Report that nobody answers the last odometry."""
@@ -188,13 +188,13 @@ class PlantSimulator(ClimberNode):
 
     def publish_odometry(self) -> None:
         """Publish what torques are to answer."""
-        self.topics.publish_odometry(self.machine, self.asked)
+        self.topics.publish_odometry(self.robot, self.asked)
 
     def publish_others(self) -> None:
         """Publish all else that a robot would tell, and the margins."""
-        self.topics.publish_others(self.machine, self.time.stamp)
-        load = self.machine.plant.wheel_load(self.machine.state)
-        self.margins.take(*self.machine.margins(), load, self.time.stamp)
+        self.topics.publish_others(self.robot, self.time.stamp)
+        load = self.robot.plant.wheel_load(self.robot.state)
+        self.margins.take(*self.robot.margins(), load, self.time.stamp)
 
     def diagnose(self) -> None:
         """Publish troubles and values, and how near to slipping and tipping it has been."""
@@ -205,8 +205,8 @@ class PlantSimulator(ClimberNode):
         """Tell diagnostics how it goes."""
         return {
             "time [s]": self.time.stamp / SECOND,
-            "suction pressure [Pa]": self.machine.pressure,
-            "side slip [m/s]": float(self.machine.state.side_slip),
+            "suction pressure [Pa]": self.robot.pressure,
+            "side slip [m/s]": float(self.robot.state.side_slip),
             "paused": self.time.paused,
         }
 

@@ -48,7 +48,7 @@ RCLPY = {"3": "humble", "4": "iron", "7": "jazzy", "9": "kilted"}  # distributio
 
 
 @dataclass
-class Recorded:
+class RecordedTopic:
     """A topic that is recorded, as one of the types that it may have."""
 
     subscription: Subscription
@@ -69,7 +69,7 @@ class BagRecorder(Node):
         super().__init__("record_bag", start_parameter_services=False)
         self.wanted = {self.resolve_topic_name(name) for name in options.topics}
         self.unwanted = {self.resolve_topic_name(name) for name in options.exclude}
-        self.recorded: dict[str, Recorded] = {}
+        self.recorded: dict[str, RecordedTopic] = {}
         self.refused: set[tuple[str, str]] = set()  # topics with types that were said not to be
         self.bag = BagWriter(options.output, options.storage, running_distro())
         self.clock = LogClock()
@@ -162,7 +162,7 @@ class BagRecorder(Node):
             ),
         )
         lost = present.lost if present else 0
-        self.recorded[name] = Recorded(subscription, type_name, lost)
+        self.recorded[name] = RecordedTopic(subscription, type_name, lost)
 
     def adapt(self, name: str, offers: Sequence[QoSProfile]) -> None:
         """Subscribe a topic again if one of its publishers cannot serve the subscription.

@@ -17,7 +17,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
-from climber_uk.mechanics.trajectory_parameters import KINDS, Plan, planned
+from climber_uk.mechanics.trajectory_parameters import KINDS, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
@@ -28,7 +28,7 @@ CLOCK_STEP = SECOND // 5  # [ns] back, from which time has started anew
 
 
 @dataclass(frozen=True)
-class Options:
+class PublisherOptions:
     """How it is told."""
 
     autostart: bool = parameter(True, "", "start at the first odometry, not at ~/start")
@@ -51,12 +51,12 @@ class TrajectoryPublisher(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__("trajectory_publisher")
-        for kind, prefix in [*KINDS, (Options, "")]:
+        for kind, prefix in [*KINDS, (PublisherOptions, "")]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
-        self.options = self.parameters.read(Options)
-        self.planned = planned(self.parameters.read)
-        self.trajectory = self.planned
+        self.options = self.parameters.read(PublisherOptions)
+        self.build_trajectory = build_trajectory(self.parameters.read)
+        self.trajectory = self.build_trajectory
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
         self.followed: int | None = None  # [ns] stamp that a controller has come to
         self.last_look = self.stood_at = 0  # [ns] what the clock said
@@ -77,9 +77,9 @@ class TrajectoryPublisher(ClimberNode):
 
     def summary(self) -> str:
         """Numbers of the trajectory."""
-        found = summary(self.planned)
+        found = summary(self.build_trajectory)
         self.parameters.remarks += found.remarks
-        return f"{self.parameters.read(Plan).shape}, {found}"
+        return f"{self.parameters.read(TrajectoryParameters).shape}, {found}"
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start, or start again from the beginning, at the next odometry."""
@@ -94,7 +94,7 @@ class TrajectoryPublisher(ClimberNode):
             return response
         start = self.next_point * self.options.point_period
         law = Stopping(self.trajectory.law, start, self.options.stop_time)
-        self.trajectory = replace(self.planned, law=law)
+        self.trajectory = replace(self.build_trajectory, law=law)
         response.success, response.message = True, f"comes to rest from {start:.2f} s on"
         self.get_logger().info(response.message)
         return response
@@ -122,12 +122,12 @@ class TrajectoryPublisher(ClimberNode):
         self.say("start", "")
         self.destroy_subscription(self.odometry)
         self.odometry = None
-        self.trajectory, self.next_point = self.planned, 0
+        self.trajectory, self.next_point = self.build_trajectory, 0
         self.points.clear()
         self.followed = None
         self.start, self.last_look = stamp + round(self.options.start_delay * SECOND), now
         self.publish_around(self.start)
-        shape = self.parameters.read(Plan).shape
+        shape = self.parameters.read(TrajectoryParameters).shape
         self.get_logger().info(f"{shape} starts at {self.start / SECOND:.3f} s")
         self.publish_path(self.start)
 
@@ -151,7 +151,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_path(self, stamp: int) -> None:
         """Publish the whole path, for display."""
-        path = self.planned.path(points=400)
+        path = self.build_trajectory.path(points=400)
         self.path.publish(writing.path(path, stamp, self.names.odom_frame))
 
     def publish(self) -> None:

@@ -15,24 +15,32 @@ from sensor_msgs.msg import FluidPressure, JointState, TimeReference
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from climber_uk.control.build import KINDS, Choice, new_follower, settings
+from climber_uk.control.build import KINDS, ConstraintChoice, build_controller, settings
 from climber_uk.control.constraints import tracking_error
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
 from climber_uk.control.safety import Mode
-from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip, Hold
+from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.messages import reading, reading_reference, writing
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.managed import ManagedNode
 from climber_uk.ros.margins import Margins
-from climber_uk.ros.running import BEST_EFFORT, LATCHED, RELIABLE, SLOW, WALL_CLOCK, Rhythm, run
+from climber_uk.ros.running import (
+    BEST_EFFORT,
+    LATCHED,
+    PUBLISH_PERIOD,
+    RELIABLE,
+    WALL_CLOCK,
+    Throttle,
+    run,
+)
 
 LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points: to read one takes a quarter of a second
 
 
 @dataclass(frozen=True)
-class Options:
+class NodeOptions:
     """What is published."""
 
     effort_commands: bool = parameter(False, "", "publish effort_controller/commands as well")
@@ -45,22 +53,22 @@ class Options:
 
 
 class UkTorqueController(ManagedNode):
-    """Messages to and from a `Follower`, which decides."""
+    """Messages to and from a `Controller`, which decides."""
 
     def __init__(self) -> None:
         super().__init__("uk_torque_controller")
         parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
-        for kind, prefix in [*KINDS, (Options, ""), (Grip, ""), (Alarm, ""), *parts]:
+        for kind, prefix in [*KINDS, (NodeOptions, ""), (Grip, ""), (Alarm, ""), *parts]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 20 N m a wheel")
-        self.options = self.parameters.read(Options)
+        self.options = self.parameters.read(NodeOptions)
         self.margins = Margins(self, self.parameters.read(Alarm))
         self.hold = self.hold_now()
         self.pressure: float | None = None  # [Pa] as last measured
-        self.follower = new_follower(self.parameters, self.pressure)
+        self.controller = build_controller(self.parameters, self.pressure)
         self.answers = self.saturations = 0
-        self.is_due = Rhythm(SLOW)  # to tell the disturbance
-        self.is_position_due = Rhythm(SLOW)
+        self.is_due = Throttle(PUBLISH_PERIOD)  # to tell the disturbance
+        self.is_position_due = Throttle(PUBLISH_PERIOD)
         self.told_mode = Mode.WAITING
 
         self.torques = self.publisher(JointState, "wheel_torques")
@@ -71,7 +79,7 @@ class UkTorqueController(ManagedNode):
         self.reference_time = self.publisher(TimeReference, "reference_time")
         self.told = self.publisher(ParameterEvent, "~/parameters", LATCHED)
         self.tell_parameters()
-        safety = self.follower.safety
+        safety = self.controller.safety
         shortest = min(safety.odometry_timeout, safety.reference_timeout)
         # on the wall clock: one in simulated time would not notice that there is no clock
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
@@ -80,19 +88,19 @@ class UkTorqueController(ManagedNode):
 
     def summary(self) -> str:
         """What is driven, how, and within which limits."""
-        climber, choice = self.parameters.read(Climber), self.parameters.read(Choice)
+        climber, choice = self.parameters.read(Climber), self.parameters.read(ConstraintChoice)
         law, adhesion = choice.constraints, choice.adhesion
         pull = self.hold.adhesion.force(climber)
         return (
             f"{climber.mass:g} kg, at most {climber.max_wheel_torque:g} N m a wheel, "
             f"{adhesion} of {pull:.4g} N, constraints {law}, "
-            f"safe output {self.follower.safety.safe_output}"
+            f"safe output {self.controller.safety.safe_output}"
         )
 
     def listen(self) -> list[Subscription]:
         """Start from nothing with the safe output, and listen to all inputs."""
-        self.follower = new_follower(self.parameters, self.pressure)
-        self.follower.enable(False)
+        self.controller = build_controller(self.parameters, self.pressure)
+        self.controller.enable(False)
         return [
             self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT),
             self.subscription(
@@ -103,15 +111,15 @@ class UkTorqueController(ManagedNode):
 
     def act(self, active: bool) -> None:
         """Follow the reference, or give the safe output."""
-        self.follower.enable(active)
+        self.controller.enable(active)
 
     # Parameters
 
-    def hold_now(self) -> Hold:
+    def hold_now(self) -> Attachment:
         """What the parameters say that holds the climber on its wall."""
         read = self.parameters.read
-        name = read(Choice).adhesion
-        return Hold(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
+        name = read(ConstraintChoice).adhesion
+        return Attachment(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
 
     def on_parameters(self) -> None:
         """Take up changed parameters."""
@@ -122,7 +130,7 @@ class UkTorqueController(ManagedNode):
 
     def retune(self) -> None:
         """Follow as the parameters, and the measured pressure, say now."""
-        self.follower.tracker.retune(*settings(self.parameters, self.pressure))
+        self.controller.sampled_controller.retune(*settings(self.parameters, self.pressure))
 
     def tell_parameters(self) -> None:
         """Publish all parameters: with them, a bag has all that an answer came from."""
@@ -137,9 +145,9 @@ class UkTorqueController(ManagedNode):
         try:
             state = reading.state(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
-            self.tell(self.follower.on_bad_odometry(self.now(), str(error)))
+            self.tell(self.controller.on_bad_odometry(self.now(), str(error)))
             return
-        self.tell(self.follower.on_odometry(self.now(), stamp, state))
+        self.tell(self.controller.on_odometry(self.now(), stamp, state))
 
     def on_reference(self, serialized: bytes) -> None:
         """Keep the reference; answer the odometry that waits for it."""
@@ -153,7 +161,7 @@ class UkTorqueController(ManagedNode):
             self.say("reference", "refused", str(error))
             return
         self.say("reference", "")
-        self.tell(self.follower.on_reference(self.now(), preview))
+        self.tell(self.controller.on_reference(self.now(), preview))
 
     def on_pressure(self, message: FluidPressure) -> None:
         """Take the measured pressure difference into the model."""
@@ -170,7 +178,7 @@ class UkTorqueController(ManagedNode):
     def look(self) -> None:
         """Give the safe output if odometry or reference have stopped."""
         if self.inputs:
-            self.tell(self.follower.look(self.now()))
+            self.tell(self.controller.look(self.now()))
 
     def now(self) -> int:
         """Time of the node's clock [ns]; 0 while there is none."""
@@ -179,22 +187,22 @@ class UkTorqueController(ManagedNode):
 
     def tell(self, answer: Answer | None) -> None:
         """Say what has changed, and publish an answer if there is one."""
-        follower = self.follower
-        mode = follower.mode
+        controller = self.controller
+        mode = controller.mode
         if mode is not Mode.WAITING:  # a replay takes it for the mode of the next torque
             approaches = mode is Mode.APPROACHING
-            self.say("reference waits", mode.value if approaches else "", follower.detail, False)
+            self.say("reference waits", mode.value if approaches else "", controller.detail, False)
             trouble = "" if approaches or mode is Mode.FOLLOWING else mode.value
-            self.say("safe output", trouble, follower.detail, mode.is_fault)
+            self.say("safe output", trouble, controller.detail, mode.is_fault)
         if answer is not None:
             self.publish_torques(answer)
         self.tell_position()
-        offset = follower.clock_offset
+        offset = controller.clock_offset
         differ = "odometry's differs from this node's" if offset else ""
         detail = f"by {offset:.3f} s; if that is latency, set transport_delay"
         self.say("clock", differ, detail, is_fault=False)
         if answer is not None:
-            state = follower.state
+            state = controller.state
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command, state)
             if state is not None:
@@ -202,12 +210,12 @@ class UkTorqueController(ManagedNode):
 
     def tell_position(self) -> None:
         """Tell how far along the reference the climber is: its planner waits for it."""
-        follower, stamp = self.follower, self.follower.stamp
-        position = follower.course.position(stamp)
-        has_changed, self.told_mode = follower.mode is not self.told_mode, follower.mode
+        controller, stamp = self.controller, self.controller.stamp
+        position = controller.active.position(stamp)
+        has_changed, self.told_mode = controller.mode is not self.told_mode, controller.mode
         if position is not None and (self.is_position_due(stamp) or has_changed):
             self.reference_time.publish(
-                writing.time_reference(position, stamp, follower.mode.name.lower())
+                writing.time_reference(position, stamp, controller.mode.name.lower())
             )
 
     def publish_torques(self, answer: Answer) -> None:
@@ -224,20 +232,20 @@ class UkTorqueController(ManagedNode):
         """Publish what an answer came from."""
         self.answers += 1
         self.saturations += int(command.missing.any())
-        follower, base_frame = self.follower, self.names.base_frame
+        controller, base_frame = self.controller, self.names.base_frame
         self.force.publish(writing.wrench(command.constraint_force, stamp, base_frame))
         if self.is_due(stamp):
-            drive, turn = follower.tracker.disturbance
+            drive, turn = controller.sampled_controller.disturbance
             self.disturbance.publish(writing.wrench((drive, 0.0, turn), stamp, base_frame))
-        followed = follower.preview
-        desired = followed.at(follower.course.time_followed(stamp)) if followed else None
+        followed = controller.preview
+        desired = followed.at(controller.active.time_followed(stamp)) if followed else None
         if state is not None and desired is not None:
             error = tracking_error(state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
 
     def take_margins(self, answer: Answer, state: State) -> None:
         """Tell how near the torques bring the climber to slipping, and how near it is to tip."""
-        climber, hold = self.follower.tracker.controller.climber, self.hold
+        climber, hold = self.controller.sampled_controller.law.climber, self.hold
         drive, _ = climber.drive_and_turn(answer.torques)
         if answer.command is not None:
             lateral = float(answer.command.constraint_force[1])
@@ -260,29 +268,29 @@ class UkTorqueController(ManagedNode):
 
     def tell_delay(self) -> None:
         """Say where torques act much later than `transport_delay` says, or earlier."""
-        tracker = self.follower.tracker
-        late = tracker.latency.is_far_off
-        delay = tracker.timing.transport_delay + tracker.latency.delay
+        sampled_controller = self.controller.sampled_controller
+        late = sampled_controller.latency.is_far_off
+        delay = sampled_controller.timing.transport_delay + sampled_controller.latency.delay
         hint = f"set transport_delay to {delay:.3f}, or see check_driver --move"
         self.say("delay", "torques do not act when transport_delay says" * late, hint, False)
 
     def values(self) -> dict[str, object]:
         """Tell diagnostics how it goes."""
-        tracker = self.follower.tracker
-        drive, turn = tracker.disturbance
+        sampled_controller = self.controller.sampled_controller
+        drive, turn = sampled_controller.disturbance
         return {
             "state": self.life,
-            "mode": self.follower.mode.value,
-            "constraints": self.parameters.read(Choice).constraints,
+            "mode": self.controller.mode.value,
+            "constraints": self.parameters.read(ConstraintChoice).constraints,
             "answers": self.answers,
             "saturated answers": self.saturations,
-            "odometry period [s]": tracker.period,
-            "clock offset [s]": self.follower.clock_offset,
-            "reference waits [s]": self.follower.course.waited,
-            "delay learnt [s]": tracker.latency.delay,
+            "odometry period [s]": sampled_controller.period,
+            "clock offset [s]": self.controller.clock_offset,
+            "reference waits [s]": self.controller.active.waited,
+            "delay learnt [s]": sampled_controller.latency.delay,
             "disturbance of the drive [N]": drive,
             "disturbance of the turn [N m]": turn,
-            "suction pressure [Pa]": tracker.controller.climber.suction_pressure,
+            "suction pressure [Pa]": sampled_controller.law.climber.suction_pressure,
         }
 
 

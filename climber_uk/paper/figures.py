@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 
 from climber_uk.paper.consistent import PAPER_PATH
 from climber_uk.paper.drift import Drift
-from climber_uk.paper.motion import Motion
+from climber_uk.paper.motion import PaperMotion
 
 AXES = ("x", "y")
 
@@ -25,7 +25,7 @@ COLUMNS, ROWS = 4, 3
 PANEL_DPI, SHEET_DPI = 120, 60
 
 
-def draw(name: str, plain: Motion, corrected: Motion, directory: Path) -> list[Path]:
+def draw(name: str, plain: PaperMotion, corrected: PaperMotion, directory: Path) -> list[Path]:
     """Write figure_02_`name`.png to figure_13, and all on one sheet, figures_`name`.png."""
     figure = plt.figure(figsize=(16, 11))
     for place, (number, draw_on) in enumerate(FIGURES.items()):
@@ -48,8 +48,8 @@ def draw(name: str, plain: Motion, corrected: Motion, directory: Path) -> list[P
     return [*paths, _save(figure, directory / f"figures_{name}.png", SHEET_DPI)]
 
 
-def _coordinate(index: int, modified: bool) -> Callable[[Axes, Motion, Motion], None]:
-    def draw_on(axes: Axes, plain: Motion, corrected: Motion) -> None:
+def _coordinate(index: int, modified: bool) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
+    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
         motion = corrected if modified else plain
         name, ending = AXES[index], "-num-M" if modified else "-num"
         desired = PAPER_PATH.at(motion.time).pose[:, index]
@@ -60,8 +60,8 @@ def _coordinate(index: int, modified: bool) -> Callable[[Axes, Motion, Motion], 
     return draw_on
 
 
-def _error(index: int, compared: bool) -> Callable[[Axes, Motion, Motion], None]:
-    def draw_on(axes: Axes, plain: Motion, corrected: Motion) -> None:
+def _error(index: int, compared: bool) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
+    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
         name = AXES[index]
         axes.plot(plain.time, plain.error[:, index], label=f"{name}-error")
         if compared:
@@ -71,8 +71,8 @@ def _error(index: int, compared: bool) -> Callable[[Axes, Motion, Motion], None]
     return draw_on
 
 
-def _trajectory(modified: bool) -> Callable[[Axes, Motion, Motion], None]:
-    def draw_on(axes: Axes, plain: Motion, corrected: Motion) -> None:
+def _trajectory(modified: bool) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
+    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
         if modified:
             axes.plot(*corrected.pose[:, :2].T, label="modified numerical")
             axes.plot(*plain.pose[:, :2].T, "--", label="numerical")
@@ -86,8 +86,10 @@ def _trajectory(modified: bool) -> Callable[[Axes, Motion, Motion], None]:
     return draw_on
 
 
-def _torques(labels: tuple[str, str], of_wheels: bool) -> Callable[[Axes, Motion, Motion], None]:
-    def draw_on(axes: Axes, plain: Motion, corrected: Motion) -> None:
+def _torques(
+    labels: tuple[str, str], of_wheels: bool
+) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
+    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
         values = corrected.torques if of_wheels else corrected.drive_torques
         for torque, label in zip(values.T, labels, strict=True):
             axes.plot(corrected.time, torque, label=label, linewidth=1)

@@ -27,7 +27,7 @@ Derivative = Callable[[float, Array], Array]
 
 
 @dataclass(frozen=True)
-class Motion:
+class PaperMotion:
     """What a climber does at n instants."""
 
     time: Array  # (n,) [s]
@@ -114,16 +114,18 @@ def runge_kutta(
     return times, np.array(y)
 
 
-def printed_motion(system: PrintedSystem, corrected: bool, times: Array, y: Array) -> Motion:
+def printed_motion(system: PrintedSystem, corrected: bool, times: Array, y: Array) -> PaperMotion:
     """Motion of y (n, 6), integrated from (30) or (26) of the printed system."""
     q, v = y[:, :3], y[:, 3:]
     Qc = system.constraint_force(times, q, v)
     derivative = system.corrected if corrected else system.uncorrected
     velocity = derivative(times, y)[:, :3]
-    return Motion(times, q, velocity, system.torques(Qc), Qc[:, 2])
+    return PaperMotion(times, q, velocity, system.torques(Qc), Qc[:, 2])
 
 
-def consistent_motion(system: ConsistentSystem, corrected: bool, times: Array, y: Array) -> Motion:
+def consistent_motion(
+    system: ConsistentSystem, corrected: bool, times: Array, y: Array
+) -> PaperMotion:
     """Motion of y (n, 6), integrated from (30) or (26) of the consistent system."""
     state = State(y[:, :3], y[:, 3:])
     if corrected:
@@ -131,10 +133,10 @@ def consistent_motion(system: ConsistentSystem, corrected: bool, times: Array, y
     acceleration = system.uncorrected(times, np.concatenate([state.pose, state.velocity], -1))
     torques = system.torques(times, state)
     third = _no_slip_residual(state, acceleration[:, 3:])
-    return Motion(times, state.pose, state.velocity, torques, third)
+    return PaperMotion(times, state.pose, state.velocity, torques, third)
 
 
-def open_loop(system: ConsistentSystem, step: float) -> Motion:
+def open_loop(system: ConsistentSystem, step: float) -> PaperMotion:
     """The climber without side slip under the torques τ(t) alone, by (30) and Runge-Kutta.
 
     It is the plant of the simulation, but for the torques: these are functions of time also within
@@ -162,7 +164,7 @@ def open_loop(system: ConsistentSystem, step: float) -> Motion:
     return _rolled(system, times, y, system.reference_torques(times))
 
 
-def driven_by(system: ConsistentSystem, printed: Motion, step: float) -> Motion:
+def driven_by(system: ConsistentSystem, printed: PaperMotion, step: float) -> PaperMotion:
     """The simulated climber under the torques (25) of a printed motion, held for `step` each."""
     plant = Plant(system.climber, step)
     times = np.arange(round(DURATION / step) + 1) * step
@@ -176,11 +178,11 @@ def driven_by(system: ConsistentSystem, printed: Motion, step: float) -> Motion:
     return _rolled(system, times, y, torques)
 
 
-def _rolled(system: ConsistentSystem, times: Array, y: Array, torques: Array) -> Motion:
+def _rolled(system: ConsistentSystem, times: Array, y: Array, torques: Array) -> PaperMotion:
     state = State(y[:, :3], y[:, 3:])
     direction = np.sign(state.forward_speed)
     q_2 = system.climber.rolling_acceleration(state, torques, direction)
-    return Motion(times, state.pose, state.velocity, torques, _no_slip_residual(state, q_2))
+    return PaperMotion(times, state.pose, state.velocity, torques, _no_slip_residual(state, q_2))
 
 
 def _no_slip_residual(state: State, acceleration: Array) -> Array:

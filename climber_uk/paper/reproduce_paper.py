@@ -17,8 +17,8 @@ from climber_uk.paper.study import (
     OFF_DURATION,
     OFF_STEP,
     QUICK,
-    Extent,
     Results,
+    StudyExtent,
     compute,
     jobs,
 )
@@ -32,7 +32,7 @@ DRIFT_COLUMNS = (
 )
 
 
-def comparison(results: Results, extent: Extent) -> list[tuple[str, ...]]:
+def comparison(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
     """Cells of the table, and what the climber does under the torques (25)."""
     tight = f"tolerance {extent.tolerance[0]:g}"
     named = {
@@ -56,7 +56,7 @@ def comparison(results: Results, extent: Extent) -> list[tuple[str, ...]]:
     return [table.PRINTED_UNCORRECTED, table.PRINTED_CORRECTED, *(row.cells for row in rows)]
 
 
-def drift_cells(results: Results, extent: Extent) -> list[tuple[str, ...]]:
+def drift_cells(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
     """Cells of the drift study."""
     integrators = {"step": "RK4 {:g} s", "variant": "RK4 {:g} s", "tolerance": "RK45 {:g}"}
     end = extent.drift_time
@@ -82,7 +82,7 @@ def drift_cells(results: Results, extent: Extent) -> list[tuple[str, ...]]:
 def write(
     pool: ProcessPoolExecutor,
     results: Results,
-    extent: Extent,
+    extent: StudyExtent,
     directory: Path,
 ) -> list[Path]:
     """Write all tables and figures; print the tables."""

@@ -24,7 +24,7 @@ OFF_STEP, OFF_DURATION = 0.005, 20.0  # [s]
 
 
 @dataclass(frozen=True)
-class Extent:
+class StudyExtent:
     """How much is computed."""
 
     tolerance: tuple[float, float]
@@ -36,7 +36,7 @@ class Extent:
     nodes: bool
 
 
-FULL = Extent(
+FULL = StudyExtent(
     tolerance=motion.PRINTED_TOLERANCE,
     step=0.001,
     drift_time=1000.0,
@@ -45,7 +45,7 @@ FULL = Extent(
     attempts=tuple(attempts.ATTEMPTS),
     nodes=True,
 )
-QUICK = Extent(
+QUICK = StudyExtent(
     tolerance=(1e-6, 1e-9),
     step=0.01,
     drift_time=20.0,
@@ -56,13 +56,13 @@ QUICK = Extent(
 )
 
 
-def printed(corrected: bool, tolerance: tuple[float, float]) -> motion.Motion:
+def printed(corrected: bool, tolerance: tuple[float, float]) -> motion.PaperMotion:
     """As printed, by Dormand and Prince."""
     derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
     return motion.printed_motion(PRINTED, corrected, *motion.dormand_prince(derivative, tolerance))
 
 
-def coarse(corrected: bool) -> motion.Motion | str:
+def coarse(corrected: bool) -> motion.PaperMotion | str:
     """As printed, at the default tolerance, or why not: rounding may lead such steps astray."""
     try:
         return printed(corrected, motion.DEFAULT_TOLERANCE)
@@ -70,7 +70,7 @@ def coarse(corrected: bool) -> motion.Motion | str:
         return str(why).split(":")[0]
 
 
-def euler(corrected: bool) -> motion.Motion:
+def euler(corrected: bool) -> motion.PaperMotion:
     """As printed, by semi-implicit Euler of 10 ms."""
     derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
     return motion.printed_motion(
@@ -78,19 +78,19 @@ def euler(corrected: bool) -> motion.Motion:
     )
 
 
-def consistent(corrected: bool, tolerance: tuple[float, float]) -> motion.Motion:
+def consistent(corrected: bool, tolerance: tuple[float, float]) -> motion.PaperMotion:
     """Consistent, by Dormand and Prince."""
     derivative = CONSISTENT.corrected if corrected else CONSISTENT.uncorrected
     times, y = motion.dormand_prince(derivative, tolerance)
     return motion.consistent_motion(CONSISTENT, corrected, times, y)
 
 
-def jobs(extent: Extent) -> Jobs:
+def jobs(extent: StudyExtent) -> Jobs:
     """Return what can be computed at once, by key, the longest first."""
     return twenty_seconds(extent) | drifts(extent)
 
 
-def twenty_seconds(extent: Extent) -> Jobs:
+def twenty_seconds(extent: StudyExtent) -> Jobs:
     """Return what the comparison needs, and the attempts."""
     tight = extent.tolerance
     todo: Jobs = {}
@@ -108,7 +108,7 @@ def twenty_seconds(extent: Extent) -> Jobs:
     return todo
 
 
-def drifts(extent: Extent) -> Jobs:
+def drifts(extent: StudyExtent) -> Jobs:
     """Return what the drift study needs."""
     todo: Jobs = {}
     for step in extent.drift_steps:

@@ -9,7 +9,7 @@ import numpy as np
 
 from climber_uk.bags.run import RecordedRun
 from climber_uk.mechanics import Array
-from climber_uk.paper.motion import Motion
+from climber_uk.paper.motion import PaperMotion
 
 COLUMNS = (
     "motion",
@@ -33,7 +33,7 @@ PRINTED_CORRECTED = (
 
 
 @dataclass(frozen=True)
-class Row:
+class ComparisonRow:
     """Numbers of a motion, in the order of `COLUMNS`; None where it has none."""
 
     name: str
@@ -45,17 +45,19 @@ class Row:
         return self.name, *("" if n is None else f"{n:.3g}" for n in self.numbers)
 
 
-def row(name: str, motion: Motion | RecordedRun | str) -> Row:
+def row(name: str, motion: PaperMotion | RecordedRun | str) -> ComparisonRow:
     """Numbers of a motion, or why there is none."""
     if isinstance(motion, str):
-        return Row(f"{name}: {motion}", (None,) * (len(COLUMNS) - 1))
+        return ComparisonRow(f"{name}: {motion}", (None,) * (len(COLUMNS) - 1))
     if isinstance(motion, RecordedRun):  # a bag holds no accelerations, and so no third component
         error: Array = (motion.pose - motion.reference)[:, :2]
         third = None
     else:
         error, third = motion.error, _largest(motion.third)
     errors = (n for axis in error.T for n in _error_numbers(motion.time, axis))
-    return Row(name, (*errors, _largest(motion.side_slip), third, _largest(motion.torques)))
+    return ComparisonRow(
+        name, (*errors, _largest(motion.side_slip), third, _largest(motion.torques))
+    )
 
 
 def growth(time: Array, error: Array) -> float:

@@ -69,7 +69,7 @@ class Section:
         return bool(re.fullmatch("".join(said.get(p, "/" + re.escape(p)) for p in parts), node))
 
 
-class Given(NamedTuple):
+class GivenValue(NamedTuple):
     """A value, and whether nodes of any name are given it."""
 
     value: Any
@@ -107,10 +107,10 @@ def read_file(path: Path, node: str) -> dict[str, Any]:
     return {name: value for name, (value, _) in found.items()}
 
 
-def given(sections: Iterable[Section], node: str) -> dict[str, Given]:
+def given(sections: Iterable[Section], node: str) -> dict[str, GivenValue]:
     """What sections have for a node, of two entries the later one's."""
     return {
-        name: Given(value, section.is_shared)
+        name: GivenValue(value, section.is_shared)
         for section in sections
         if section.is_for(node)
         for name, value in section.values.items()

@@ -11,7 +11,7 @@ class ParameterFiles:
 
     def __init__(self, arguments: Sequence[str], node: str) -> None:
         self.node, self.names = node, list[str]()
-        self.given: dict[str, Any] = {}  # see `parameter_file.Given`
+        self.given: dict[str, Any] = {}  # see `parameter_file.GivenValue`
         self.sources: dict[str, str] = {}  # name of the file, by the parameter's
         self.idle: list[str] = []  # a line for each file that has nothing for the node
         for path in paths(arguments):

@@ -12,7 +12,7 @@ from typing import Any
 
 from climber_uk.bags.publishing_order import read_published
 from climber_uk.bags.topics import ODOMETRY, REFERENCE, TORQUES
-from climber_uk.control.build import KINDS, new_follower, settings
+from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.motion import Torques
@@ -31,7 +31,7 @@ Choose = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
 class Replay:
-    """A `Follower` that is told what the node was told; times are integers in nanoseconds.
+    """A `Controller` that is told what the node was told; times are integers in nanoseconds.
 
     `choose` makes the parameters of those that were in force.
     """
@@ -41,12 +41,12 @@ class Replay:
         self.parameters = Values(choose(recorded.parameters or {}))
         self.names = self.parameters.read(Names).within(namespace)
         self.pressure: float | None = None  # [Pa] as last measured
-        self.follower = new_follower(self.parameters, None)
+        self.controller = build_controller(self.parameters, None)
         self.settings = deque(recorded.settings)  # that are to come
         self.torques: dict[int, Array] = {}  # by stamp, right, left [N m]
         self.modes: Modes = []
         self.clock = self.looked = 0  # times of the node's clock, and of the wall clock
-        safety = self.follower.safety
+        safety = self.controller.safety
         self.look_period = round(
             min(safety.odometry_timeout, safety.reference_timeout) / 2 * SECOND
         )
@@ -91,7 +91,7 @@ class Replay:
         while self.looked + self.look_period <= at:
             self.looked += self.look_period
             self.pass_time(self.looked)
-            self.keep(self.follower.look(self.clock))
+            self.keep(self.controller.look(self.clock))
 
     def on_clock(self, _: int, message: Any) -> None:
         """Keep the simulated time."""
@@ -107,9 +107,9 @@ class Replay:
         try:
             state = reading.state(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
-            self.keep(self.follower.on_bad_odometry(self.clock, str(error)))
+            self.keep(self.controller.on_bad_odometry(self.clock, str(error)))
             return
-        self.keep(self.follower.on_odometry(self.clock, stamp, state))
+        self.keep(self.controller.on_odometry(self.clock, stamp, state))
 
     def on_reference(self, _: int, message: Any) -> None:
         """Keep a reference, unless it is one that the node refuses."""
@@ -118,7 +118,7 @@ class Replay:
             preview.check_heading()
         except ValueError:
             return
-        self.keep(self.follower.on_reference(self.clock, preview))
+        self.keep(self.controller.on_reference(self.clock, preview))
 
     def on_pressure(self, _: int, message: Any) -> None:
         """Take the measured pressure into the model, unless it is one that the node refuses."""
@@ -134,23 +134,23 @@ class Replay:
         """Look when the node did, and answered an odometry once more."""
         if at != self.recorded.published.get(reading.nanoseconds(message.header.stamp)):
             self.set(at)
-            self.keep(self.follower.look(self.clock))
+            self.keep(self.controller.look(self.clock))
 
     def set(self, at: int) -> None:
         """Set what others had set before the torques of some time were published."""
         while self.settings and self.settings[0][0] <= at:
             _, setting = self.settings.popleft()
-            self.follower.enable(setting.enabled)
+            self.controller.enable(setting.enabled)
             self.parameters = Values(self.choose(setting.parameters or {}))
             self.retune()
 
     def retune(self) -> None:
         """Follow as the parameters, and the measured pressure, say now."""
-        self.follower.tracker.retune(*settings(self.parameters, self.pressure))
+        self.controller.sampled_controller.retune(*settings(self.parameters, self.pressure))
 
     def keep(self, answer: Answer | None) -> None:
         """Keep the mode and the first answer to an odometry; go on from what was sent."""
-        mode = self.follower.mode.value
+        mode = self.controller.mode.value
         if not self.modes or mode != self.modes[-1][1]:
             self.modes.append((self.clock, mode))
         if answer is None or answer.stamp == 0:  # to no odometry
@@ -159,4 +159,4 @@ class Replay:
             self.torques[answer.stamp] = answer.torques
             sent = self.recorded.torques.get(answer.stamp)
             if sent is not None:
-                self.follower.tracker.correct(Torques(*sent.tolist()))
+                self.controller.sampled_controller.correct(Torques(*sent.tolist()))

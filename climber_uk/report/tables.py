@@ -38,7 +38,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """A metric of all columns, in a unit in which it reads well."""
 
     metric: Metric
@@ -52,7 +52,7 @@ def number(value: float, digits: int = 6) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else UNKNOWN
 
 
-def groups(columns: Sequence[Column]) -> Iterator[tuple[str, list[Row]]]:
+def groups(columns: Sequence[Column]) -> Iterator[tuple[str, list[TableRow]]]:
     """Titles and rows, without metrics that no run has."""
     for title, metrics in GROUPS.items():
         rows = [_row(metric, columns) for metric in metrics]
@@ -60,11 +60,11 @@ def groups(columns: Sequence[Column]) -> Iterator[tuple[str, list[Row]]]:
             yield title, known
 
 
-def _row(metric: Metric, columns: Sequence[Column]) -> Row:
+def _row(metric: Metric, columns: Sequence[Column]) -> TableRow:
     values = [column.values[metric.name] for column in columns]
     factor, unit = prefix(values, metric.unit)
     bases = [column.base.values[metric.name] if column.base else None for column in columns]
-    return Row(
+    return TableRow(
         metric,
         unit,
         [number(factor * value) for value in values],

@@ -2,9 +2,9 @@
 
 from geometry_msgs.msg import Vector3Stamped
 
-from climber_uk.mechanics.adhesion import AMPLE, Alarm
+from climber_uk.mechanics.adhesion import MAX_MARGIN, Alarm
 from climber_uk.messages import writing
-from climber_uk.ros.running import SLOW, ClimberNode, Rhythm
+from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 
 LEVELS = writing.OK, writing.WARN, writing.ERROR
 
@@ -15,8 +15,8 @@ class Margins:
     def __init__(self, node: ClimberNode, alarm: Alarm) -> None:
         self.node, self.alarm = node, alarm
         self.publisher = node.publisher(Vector3Stamped, "~/margins")
-        self.is_due = Rhythm(SLOW)
-        self.last = self.lowest = self.unpublished = AMPLE, AMPLE  # slip, tip
+        self.is_due = Throttle(PUBLISH_PERIOD)
+        self.last = self.lowest = self.unpublished = MAX_MARGIN, MAX_MARGIN  # slip, tip
         self.told = 0  # level of alarm
 
     def take(self, slip: float, tip: float, load: float, stamp: int) -> None:
@@ -27,7 +27,7 @@ class Margins:
         if self.is_due(stamp):
             frame = self.node.names.base_frame
             self.publisher.publish(writing.vector((*self.unpublished, load), stamp, frame))
-            self.unpublished = AMPLE, AMPLE
+            self.unpublished = MAX_MARGIN, MAX_MARGIN
         if self.alarm.level(min(self.last)) > self.told:
             self.node.diagnose()
 

@@ -25,7 +25,7 @@ Field = dataclasses.Field[Any]
 QOS = "qos_overrides."
 
 
-class Parameters:
+class NodeParameters:
     """The parameters of a node, kept as the dataclasses that they fill.
 
     Every one is read-only but those declared with `runtime=True`: these are checked when they

@@ -5,27 +5,27 @@ from typing import Any
 from climber_uk.mechanics.adhesion import Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
-from climber_uk.ros.parameters import Parameters
+from climber_uk.ros.parameters import NodeParameters
 from climber_uk.simulation.motors import Motors
-from climber_uk.simulation.options import Options
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import VARIANTS, Parts, Physics
 
 
-def declare(parameters: Parameters) -> None:
-    """Declare all parameters of a plant; raises as `Parameters.declare` does."""
-    for kind in (Options, Climber, Physics, Grip, Motors, Sensors, Alarm):
+def declare(parameters: NodeParameters) -> None:
+    """Declare all parameters of a plant; raises as `NodeParameters.declare` does."""
+    for kind in (SimulationOptions, Climber, Physics, Grip, Motors, Sensors, Alarm):
         parameters.declare(kind)
     for variants in VARIANTS.values():
         for name, variant in variants.items():
             parameters.declare(variant, f"{name}.")
 
 
-def parts(parameters: Parameters) -> Parts:
-    """What the parameters say now; raises as `Parameters.read` does."""
+def parts(parameters: NodeParameters) -> Parts:
+    """What the parameters say now; raises as `NodeParameters.read` does."""
     read = parameters.read
-    physics, step = read(Physics), read(Options).integration_step
+    physics, step = read(Physics), read(SimulationOptions).integration_step
     chosen: dict[str, Any] = {}
     for group, variants in VARIANTS.items():
         name = getattr(physics, group)

@@ -10,8 +10,8 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
-from climber_uk.ros.running import WALL_CLOCK, ClimberNode, Rhythm
-from climber_uk.simulation.options import Options
+from climber_uk.ros.running import WALL_CLOCK, ClimberNode, Throttle
+from climber_uk.simulation.options import SimulationOptions
 
 ASK_AGAIN = 0.2  # [s] of wall-clock time, for a torque that does not come
 FALLEN_BEHIND = 1.0  # [s] from which lost wall-clock time is not made up for
@@ -30,7 +30,7 @@ SHARED = (
 class Simulated(Protocol):
     """A climber that lives in this time."""
 
-    options: Options
+    options: SimulationOptions
     origin: int  # stamp of its first odometry
     fallen: bool  # it takes no further part
     answered: bool  # its last odometry, by a torque
@@ -54,7 +54,7 @@ class Simulated(Protocol):
 class PlantTime:
     """Steps its climbers together; in lock-step when each of them has its torque."""
 
-    def __init__(self, node: ClimberNode, options: Options) -> None:
+    def __init__(self, node: ClimberNode, options: SimulationOptions) -> None:
         self.options, self.clock, self.log = options, node.get_clock(), node.get_logger()
         self.climbers: list[Simulated] = []
         self.period = round(options.control_period * SECOND)
@@ -62,7 +62,7 @@ class PlantTime:
         # 0 would mean that there is no time yet
         self.stamp: int = SECOND if options.simulated_time else self.clock.now().nanoseconds
         self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
-        self.topic, self.is_due = None, Rhythm(TICK)
+        self.topic, self.is_due = None, Throttle(TICK)
         self.waits, self.looks = bool(options.wait_for), 0
         if self.waits:
             self.log.info(f"time does not run until {options.wait_for} listens")

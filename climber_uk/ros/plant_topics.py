@@ -4,8 +4,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, JointState
 
 from climber_uk.messages import writing
-from climber_uk.ros.running import SLOW, ClimberNode, Rhythm
-from climber_uk.simulation.simulated_robot import Machine
+from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
+from climber_uk.simulation.simulated_robot import SimulatedRobot
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -17,34 +17,34 @@ class PlantTopics:
     """The publishers of a node."""
 
     def __init__(self, node: ClimberNode) -> None:
-        self.names, self.is_due = node.names, Rhythm(SLOW)
+        self.names, self.is_due = node.names, Throttle(PUBLISH_PERIOD)
         self.odometry = node.publisher(Odometry, "odom")
         self.truth = node.publisher(Odometry, "ground_truth")
         self.joints = node.publisher(JointState, "joint_states")
         self.pressure = node.publisher(FluidPressure, "suction_pressure")
         self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
 
-    def publish_odometry(self, machine: Machine, measured_at: int) -> None:
+    def publish_odometry(self, robot: SimulatedRobot, measured_at: int) -> None:
         """Publish what the sensors tell, measured at a time [ns]."""
         names = self.names
-        _, measured = machine.odometer.latest()
+        _, measured = robot.odometer.latest()
         message = writing.odometry(measured, measured_at, names.odom_frame, names.base_frame)
         self.odometry.publish(message)
 
-    def publish_others(self, machine: Machine, now: int) -> None:
+    def publish_others(self, robot: SimulatedRobot, now: int) -> None:
         """Publish how things are now [ns]."""
         names, stamp = self.names, writing.time(now)
-        truth = writing.odometry(machine.state, now, names.odom_frame, names.base_frame)
+        truth = writing.odometry(robot.state, now, names.odom_frame, names.base_frame)
         self.truth.publish(truth)
         joints = writing.wheel_torques(
-            machine.torques, now, names.left_wheel_joint, names.right_wheel_joint
+            robot.torques, now, names.left_wheel_joint, names.right_wheel_joint
         )
-        joints.position = machine.angles[::-1].tolist()
-        joints.velocity = machine.rates[::-1].tolist()
+        joints.position = robot.angles[::-1].tolist()
+        joints.velocity = robot.rates[::-1].tolist()
         self.joints.publish(joints)
         if self.transform is not None:
             self.transform.publish(TFMessage(transforms=[writing.transform(truth)]))
         if self.is_due(now):
-            pressure = FluidPressure(fluid_pressure=machine.pressure)
+            pressure = FluidPressure(fluid_pressure=robot.pressure)
             pressure.header.stamp = stamp
             self.pressure.publish(pressure)

@@ -30,7 +30,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.messages.names import Names
 from climber_uk.parameters.parameter_files import ParameterFiles
-from climber_uk.ros.parameters import QOS, Parameters
+from climber_uk.ros.parameters import QOS, NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.signals import ignore_end, on_end
 
@@ -40,7 +40,9 @@ SENT = QoSProfile(depth=1000)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 LONGEST_END = 4  # [s] from a signal to the end of the process, whatever hangs
-SLOW = SECOND // 20  # [ns] from one message to the next of what need not be told each time
+PUBLISH_PERIOD = (
+    SECOND // 20
+)  # [ns] from one message to the next of what need not be told each time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LINES, LINES_PERIOD = 6, 10.0  # [s]: of the log, on one subject
 EPILOG = (
@@ -69,7 +71,7 @@ class Ration:
         return True
 
 
-class Rhythm:
+class Throttle:
     """Says of the first stamp in each `period` [ns] that it is."""
 
     def __init__(self, period: int) -> None:
@@ -92,7 +94,7 @@ class ClimberNode(Node):
     ) -> None:
         super().__init__(name, namespace=namespace)
         arguments = sys.argv if arguments is None else arguments
-        self.parameters = Parameters(self, arguments, self.on_parameters)
+        self.parameters = NodeParameters(self, arguments, self.on_parameters)
         self.parameters.declare(Names)
         self.names = self.parameters.read(Names).within(self.get_namespace())
         self._troubles: dict[str, tuple[str, bool]] = {}

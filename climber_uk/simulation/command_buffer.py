@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class Schedule(Generic[T]):
+class CommandBuffer(Generic[T]):
     """Values with the times at which they begin; a timeout of 0 is none. All times in ns."""
 
     def __init__(self, timeout: int = 0) -> None:

@@ -24,7 +24,9 @@ class Cone(NamedTuple):
     limit: float  # L of the impulse [N s]
 
 
-def opposed(velocity: Array, lightness: Array, cones: list[Cone]) -> tuple[Array, list[bool]]:
+def solve_friction_impulses(
+    velocity: Array, lightness: Array, cones: list[Cone]
+) -> tuple[Array, list[bool]]:
     """ν⁺ (n,) of ν (n,) and the diagonal (n,) of M⁻¹, and whether each contact holds."""
     velocity = velocity.copy()
     impulses: list[Array] = [np.zeros(len(cone.rows)) for cone in cones]

@@ -23,7 +23,7 @@ class NotFinite(ArithmeticError):  # noqa: N818
     """The numbers of a plant have come to their end."""
 
 
-class Given(NamedTuple):
+class Inputs(NamedTuple):
     """What acts on a climber whatever it does [N, N m]."""
 
     drive: float  # of the motors, along the climber
@@ -33,7 +33,7 @@ class Given(NamedTuple):
     push_turn: float
 
     @classmethod
-    def of(cls, climber: Climber, torques: Array, push: Array) -> "Given":
+    def of(cls, climber: Climber, torques: Array, push: Array) -> "Inputs":
         """Of wheel torques (2,) right, left, and a push (3,) in the wall's frame."""
         drive: Any
         turn: Any
@@ -47,7 +47,7 @@ class Given(NamedTuple):
 class PlantState(State):
     """Where a climber is, how it moves, and what else its contacts remember."""
 
-    bent: Array  # (3,) bristles of the seal: forward, to the left, around the ring [m]
+    deflection: Array  # (3,) bristles of the seal: forward, to the left, around the ring [m]
     slip: Array  # (2,) forward speed of the right and left wheel's rim over the wall [m/s]
 
     @classmethod

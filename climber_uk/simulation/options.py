@@ -9,7 +9,7 @@ from climber_uk.parameters.declaration import check, parameter
 
 
 @dataclass(frozen=True)
-class Options:
+class SimulationOptions:
     """How time passes, and where the climber starts."""
 
     simulated_time: bool = parameter(

@@ -14,10 +14,10 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY, Climber, State
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.wall import Plane, Wall
-from climber_uk.simulation.inputs import NO_PUSH, FellOff, Given, NotFinite, PlantState
-from climber_uk.simulation.rigid_body import Body, forward_speed
-from climber_uk.simulation.rolling import Rolling
-from climber_uk.simulation.sliding import Sliding
+from climber_uk.simulation.inputs import NO_PUSH, FellOff, Inputs, NotFinite, PlantState
+from climber_uk.simulation.rigid_body import RigidBody, forward_speed
+from climber_uk.simulation.rolling import NoSlipStepper
+from climber_uk.simulation.sliding import ContactStepper
 
 CONTACT, UPRIGHT = Contact(), Plane()
 SIDEWAYS = 1e-9  # of the speed, and of 1 m/s: more than rounding makes of rolling
@@ -48,7 +48,7 @@ class Plant:
         `push` (3,) acts on the centre of mass, in the wall's frame [N, N, N m]. Raises `FellOff`
         where nothing holds the climber on its wall, `NotFinite` where numbers end.
         """
-        given = Given.of(self.climber, torques, push)
+        given = Inputs.of(self.climber, torques, push)
         try:
             end = self._advance(state, given, steps)
         except (ValueError, ArithmeticError, RuntimeWarning) as error:  # numpy warns, or raises
@@ -57,7 +57,7 @@ class Plant:
             raise NotFinite(f"{end} after {steps} steps from {state}")
         return end
 
-    def _advance(self, state: State, given: Given, steps: int) -> State:
+    def _advance(self, state: State, given: Inputs, steps: int) -> State:
         y = np.concatenate([state.pose, state.velocity])
         if self._is_plain:
             one_step, held = self._rolling.exact_step, self._is_held_everywhere
@@ -67,7 +67,7 @@ class Plant:
                 y = one_step(y, given)
             return State(y[:3], y[3:])
         more = PlantState.of(state)
-        y, slip = np.concatenate([y, more.bent]), more.slip
+        y, slip = np.concatenate([y, more.deflection]), more.slip
         for _ in range(steps):
             self._check_hold(y)
             y, slip = self._step(y, slip, given)
@@ -95,7 +95,7 @@ class Plant:
 
     def margins(self, state: State, torques: Array, push: Array = NO_PUSH) -> tuple[float, float]:
         """Slip and tip margin (§7): of the drive force and the no-slip row's lateral reaction."""
-        climber, given = self.climber, Given.of(self.climber, torques, push)
+        climber, given = self.climber, Inputs.of(self.climber, torques, push)
         y = np.concatenate([state.pose, state.velocity])
         into = self._body.into_wall(y)
         lateral = self._body.lateral(y, given, climber.mass)
@@ -106,16 +106,16 @@ class Plant:
         )
 
     @cached_property
-    def _body(self) -> Body:
-        return Body(self.climber, self.contact, self.wall, self.step)
+    def _body(self) -> RigidBody:
+        return RigidBody(self.climber, self.contact, self.wall, self.step)
 
     @cached_property
-    def _rolling(self) -> Rolling:
-        return Rolling(self._body)
+    def _rolling(self) -> NoSlipStepper:
+        return NoSlipStepper(self._body)
 
     @cached_property
-    def _sliding(self) -> Sliding:
-        return Sliding(self._body, self.slip)
+    def _sliding(self) -> ContactStepper:
+        return ContactStepper(self._body, self.slip)
 
     @cached_property
     def _is_plain(self) -> bool:
@@ -128,14 +128,14 @@ class Plant:
     def _load(self, y: Array) -> float:
         return float(self.contact.wheel_load(self.climber, self._body.into_wall(y)))
 
-    def _step(self, y: Array, slip: Array, given: Given) -> tuple[Array, Array]:
+    def _step(self, y: Array, slip: Array, given: Inputs) -> tuple[Array, Array]:
         """One step, implicit if something may stick, slip or be caught within it."""
         end = None if slip.any() else self._regular_step(y, given)
         if end is not None:
             return end, slip
         return self._sliding.advance(y, slip, given, self._load(y))
 
-    def _regular_step(self, y: Array, given: Given) -> Array | None:
+    def _regular_step(self, y: Array, given: Inputs) -> Array | None:
         """End of a step without change between sticking and slipping; None if there is one."""
         load, turn = self._load(y), given.turn + given.push_turn
         resistance = float(self.contact.locomotion.turning_resistance(load))
@@ -152,7 +152,7 @@ class Plant:
             return None
         return end if self._wheels_hold(end, given, resisted) else None
 
-    def _wheels_hold(self, y: Array, given: Given, resisted: Given) -> bool:
+    def _wheels_hold(self, y: Array, given: Inputs, resisted: Inputs) -> bool:
         if not self.slip:
             return True
         if abs(State(y[:3], y[3:6]).side_slip) > SIDEWAYS * (1 + abs(forward_speed(y))):

@@ -17,14 +17,14 @@ from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import LuGre
 from climber_uk.mechanics.wall import Wall
-from climber_uk.simulation.inputs import Given
+from climber_uk.simulation.inputs import Inputs
 
 # Relaxation lengths within a step after which bristles are where they end up: exp(-20) = 2e-9.
 SETTLED = 20.0
 
 
 @dataclass(frozen=True)
-class Body:
+class RigidBody:
     """A climber with all that acts on it; y = (q, v), then the bristles (3,) if there are any."""
 
     climber: Climber
@@ -51,18 +51,18 @@ class Body:
         weight = self.climber.mass * GRAVITY
         return weight * s_x, weight * s_y
 
-    def outside(self, height: float, given: Given) -> tuple[float, float]:
+    def outside(self, height: float, given: Inputs) -> tuple[float, float]:
         """Weight and push along the wall (x, y) [N], at y = `height` [m]."""
         w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
         return given.push_x + w_x, given.push_y + w_y
 
-    def push(self, y: Array, given: Given) -> float:
+    def push(self, y: Array, given: Inputs) -> float:
         """Force along the climber that friction is up against [N]."""
         _, height, heading, *_ = y.tolist()
         f_x, f_y = self.outside(height, given)
         return float(given.drive + f_x * math.cos(heading) + f_y * math.sin(heading))
 
-    def lateral(self, y: Array, given: Given, mass: float) -> float:
+    def lateral(self, y: Array, given: Inputs, mass: float) -> float:
         """What the wheels have to take to the left, for `mass` to follow the heading [N]."""
         _, height, heading, *_ = y.tolist()
         f_x, f_y = self.outside(height, given)
@@ -76,7 +76,7 @@ class Body:
         """What presses the climber's mass into the wall: g_n with the way's curvature [m/s²]."""
         return float(self.wall.into(self.climber.inclination, float(y[1]), float(y[4])))
 
-    def runge_kutta(self, y: Array, given: Given, direction: float | None, h: float) -> Array:
+    def runge_kutta(self, y: Array, given: Inputs, direction: float | None, h: float) -> Array:
         """y after `h` [s], by the classic method of fourth order; see `derivative`."""
         k1 = self.derivative(y, given, direction)
         k2 = self.derivative(y + h / 2 * k1, given, direction)
@@ -86,7 +86,7 @@ class Body:
         end[3:6] = self.derivative(end, given, direction)[:3]
         return end
 
-    def derivative(self, y: Array, given: Given, direction: float | None) -> Array:
+    def derivative(self, y: Array, given: Inputs, direction: float | None) -> Array:
         """(q̇, v̇) of (30), both (3,), and the bristles' rates (3,) if there are any.
 
         A = [sinθ -cosθ 0] has unit length and M weighs x and y alike, so that M^(-1/2) B⁺ = Aᵀ.
@@ -94,10 +94,10 @@ class Body:
         climber: [cosθ sinθ 0] is a second row with b_q = b = 0. For None see `_ring`.
         """
         climber = self.climber
-        _, height, heading, v_x, v_y, yaw_rate, *bent = y.tolist()
+        _, height, heading, v_x, v_y, yaw_rate, *deflection = y.tolist()
         cosine, sine = math.cos(heading), math.sin(heading)
         force, turn = given.drive, given.turn + given.push_turn
-        bending = [0.0] * len(bent)
+        bending = [0.0] * len(deflection)
         if direction == 0:
             held = [0.0, 0.0, yaw_rate, 0.0, 0.0, turn / climber.yaw_inertia]
             return np.array(held + bending)
@@ -106,7 +106,7 @@ class Body:
         x_dot, y_dot = v_x - sine * A_v, v_y + cosine * A_v
         speed = x_dot * cosine + y_dot * sine
         if direction is None:
-            resistance, moment, bending = self._ring(speed, yaw_rate, bent)
+            resistance, moment, bending = self._ring(speed, yaw_rate, deflection)
             force, turn = force - resistance, turn - moment
         else:
             sliding = direction * speed
@@ -124,7 +124,9 @@ class Body:
         ]
         return np.array(rates + bending)
 
-    def _ring(self, v: float, omega: float, bent: list[float]) -> tuple[float, float, list[float]]:
+    def _ring(
+        self, v: float, omega: float, deflection: list[float]
+    ) -> tuple[float, float, list[float]]:
         """Force and moment of the seal against v and ω, and the rates of its bristles.
 
         A ring of radius R that slides at s = √(v² + (R ω)²): exact for sliding alone and for
@@ -135,13 +137,13 @@ class Body:
         speed = math.hypot(v, around)
         if isinstance(law, LuGre) and not self.has_settled(speed):
             relaxation = law.relaxation(speed)
-            ahead, aside, turned = bent
+            ahead, aside, turned = deflection
             ahead_1, turned_1 = v - relaxation * ahead, around - relaxation * turned
             moment = radius * law.force(f, around, turned, turned_1)
             rates = [ahead_1, -relaxation * aside, turned_1]
             return law.force(f, v, ahead, ahead_1), moment, rates
         share = law.level(f, speed) / speed if speed > 0 else 0.0
-        return share * v, share * around * radius, [0.0] * len(bent)
+        return share * v, share * around * radius, [0.0] * len(deflection)
 
     def has_settled(self, speed: float) -> bool:
         """Whether bristles are, within a step, where they end up at a sliding `speed` [m/s]."""

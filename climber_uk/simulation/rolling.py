@@ -12,8 +12,8 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.friction import LuGre
-from climber_uk.simulation.inputs import Given
-from climber_uk.simulation.rigid_body import SETTLED, Body, forward_speed
+from climber_uk.simulation.inputs import Inputs
+from climber_uk.simulation.rigid_body import SETTLED, RigidBody, forward_speed
 
 # More changes between sticking and sliding than this within one step are not followed.
 MAX_CHANGES_IN_A_STEP = 8
@@ -22,10 +22,10 @@ STIFF = 0.5
 MAX_PARTS = 100  # beyond that, what is stiff is left to an implicit method
 
 
-class Rolling:
+class NoSlipStepper:
     """One step of a body without side slip."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: RigidBody) -> None:
         self.body = body
 
     @cached_property
@@ -33,7 +33,7 @@ class Rolling:
         """Whether friction has an edge at rest, however small it may be."""
         return bool(self.body.contact.friction.stiction(1.0) > 0)
 
-    def step(self, y: Array, given: Given) -> Array | None:
+    def step(self, y: Array, given: Inputs) -> Array | None:
         """y after a step; None if a ring comes to rest or starts, or friction is too stiff."""
         if not self.sticks:
             return self._in_parts(y, given)
@@ -47,7 +47,7 @@ class Rolling:
         end = self._in_parts(y, given)
         return None if end is None or self._creeps(end) else end
 
-    def accelerations(self, y: Array, given: Given) -> tuple[float, float]:
+    def accelerations(self, y: Array, given: Inputs) -> tuple[float, float]:
         """v̇ [m/s²] and ω̇ [rad/s²]."""
         radius = self.body.contact.grip.seal_radius
         if self.sticks and radius > 0 and not y[3:6].any():
@@ -58,7 +58,7 @@ class Rolling:
 
     # A seal without radius
 
-    def exact_step(self, y: Array, given: Given) -> Array:
+    def exact_step(self, y: Array, given: Inputs) -> Array:
         """y after a step, in which a seal without radius may stick and slide."""
         for _ in range(self._steep_parts):
             y = self._exact_part(y, given, self.body.step / self._steep_parts)
@@ -76,7 +76,7 @@ class Rolling:
         """Whether a seal without radius is not too stiff for steps in parts."""
         return self._steep_parts <= MAX_PARTS
 
-    def _exact_part(self, y: Array, given: Given, left_over: float) -> Array:
+    def _exact_part(self, y: Array, given: Inputs, left_over: float) -> Array:
         direction = self._direction(y, given)
         for _ in range(MAX_CHANGES_IN_A_STEP):
             end = self.body.runge_kutta(y, given, direction, left_over)
@@ -89,7 +89,7 @@ class Rolling:
             direction = float(np.sign(push)) if gave_way else self._direction(y, given)
         return self.body.runge_kutta(y, given, direction, left_over)
 
-    def _direction(self, y: Array, given: Given) -> float:
+    def _direction(self, y: Array, given: Inputs) -> float:
         """Way the seal slides: 1 forwards, -1 backwards, 0 where friction holds it."""
         speed = forward_speed(y)
         if speed != 0:
@@ -97,14 +97,14 @@ class Rolling:
         push = self.body.push(y, given)
         return 0.0 if abs(push) <= self.body.stiction else float(np.sign(push))
 
-    def _margin(self, y: Array, given: Given, direction: float) -> float:
+    def _margin(self, y: Array, given: Inputs, direction: float) -> float:
         """Falls below 0 where sliding in `direction` ends or, for 0, where friction gives way."""
         if direction == 0:
             return self.body.stiction - abs(self.body.push(y, given))
         return direction * forward_speed(y)
 
     def _until_change(
-        self, y: Array, given: Given, direction: float, step: float
+        self, y: Array, given: Inputs, direction: float, step: float
     ) -> tuple[Array, float]:
         """State at the instant within `step` at which `_margin` reaches 0, and that instant."""
 
@@ -119,7 +119,7 @@ class Rolling:
 
     # A ring, or friction without an edge
 
-    def _ring_holds(self, y: Array, given: Given) -> bool:
+    def _ring_holds(self, y: Array, given: Inputs) -> bool:
         around = (given.turn + given.push_turn) / self.body.contact.grip.seal_radius
         return math.hypot(self.body.push(y, given), around) <= self.body.stiction
 
@@ -137,7 +137,7 @@ class Rolling:
         fastest = self.body.stiction * self.body.step
         return fastest > STIFF * self._lightest * self._sliding_speed(y)
 
-    def _in_parts(self, y: Array, given: Given) -> Array | None:
+    def _in_parts(self, y: Array, given: Inputs) -> Array | None:
         """y after a step, in as many parts as friction is stiff; None if it is too stiff."""
         body, law = self.body, self.body.contact.friction
         rate = law.steepness(body.friction) / self._lightest

@@ -66,7 +66,7 @@ class Sensors:
         return periods
 
     @cached_property
-    def are_exact(self) -> bool:
+    def is_ideal(self) -> bool:
         """Whether they tell the truth."""
         noise = self.position_noise, self.heading_noise, self.speed_noise, self.yaw_rate_noise
         place_bias = self.x_bias, self.y_bias, self.heading_bias
@@ -129,7 +129,7 @@ class Odometer:
         return State.rolling(self._pose, float(wheels.forward_speed), float(wheels.yaw_rate))
 
     def _measured(self, state: State) -> State:
-        if self.sensors.are_exact:
+        if self.sensors.is_ideal:
             return state
         noise = self._random.normal(size=5).tolist()
         told, aside = self.sensors.told(state.motion, noise), float(state.side_slip)

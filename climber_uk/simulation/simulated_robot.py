@@ -70,7 +70,7 @@ class Parts(NamedTuple):
     physics: Physics
 
 
-class Machine:
+class SimulatedRobot:
     """The state of all of it; `advance` raises what `Plant.advance` does, and changes nothing."""
 
     def __init__(self, parts: Parts, start: State, period: float) -> None:

@@ -15,22 +15,22 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.friction import LuGre, Stribeck
-from climber_uk.simulation.cones import Cone, opposed
-from climber_uk.simulation.inputs import Given
-from climber_uk.simulation.rigid_body import Body, forward_speed
+from climber_uk.simulation.cones import Cone, solve_friction_impulses
+from climber_uk.simulation.inputs import Inputs
+from climber_uk.simulation.rigid_body import RigidBody, forward_speed
 
 PARTS = 8  # of a step
 AT_REST = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds
 
 
-class Sliding:
+class ContactStepper:
     """Steps of a body whose wheels slip, if `slip`, where their load does not suffice.
 
     (11) and (15) count the inertia of rolling wheels into m and J; where wheels slip it is taken
     out again. Raises `ValueError` if it is more than there is.
     """
 
-    def __init__(self, body: Body, slip: bool) -> None:
+    def __init__(self, body: RigidBody, slip: bool) -> None:
         self.body, self.slip = body, slip
         if self.slip and min(self.mass, self.yaw_inertia) <= 0:
             inertia = self.body.contact.grip.wheel_inertia
@@ -55,7 +55,7 @@ class Sliding:
         return climber.yaw_inertia - 2 * self.rim * climber.half_track**2 * self.slip
 
     def wheels_hold(
-        self, y: Array, given: Given, accelerations: tuple[float, float], load: float
+        self, y: Array, given: Inputs, accelerations: tuple[float, float], load: float
     ) -> bool:
         """Whether wheels that share `load` [N] do what rolling on asks of them."""
         d, (v_1, omega_1) = self.body.climber.half_track, accelerations
@@ -67,7 +67,7 @@ class Sliding:
         sideways = math.sqrt(most**2 - right**2) + math.sqrt(most**2 - left**2)
         return abs(self.body.lateral(y, given, self.mass)) <= sideways
 
-    def advance(self, y: Array, slip: Array, given: Given, load: float) -> tuple[Array, Array]:
+    def advance(self, y: Array, slip: Array, given: Inputs, load: float) -> tuple[Array, Array]:
         """(y, rims' slip) after a step under `load` [N] on the wheels."""
         caught = False
         for _ in range(PARTS):
@@ -78,11 +78,11 @@ class Sliding:
         return self._rolling_on(y, slip) if caught else (y, slip)
 
     def _part(
-        self, y: Array, slip: Array, given: Given, load: float, h: float
+        self, y: Array, slip: Array, given: Inputs, load: float, h: float
     ) -> tuple[Array, Array, bool]:
         """(y, rims' slip) after `h` [s], and whether no wheel slips any more."""
         d = self.body.climber.half_track
-        x, height, heading, v_x, v_y, omega, *bent = y.tolist()
+        x, height, heading, v_x, v_y, omega, *deflection = y.tolist()
         middle = heading + h / 2 * omega if self.slip else heading
         cosine, sine = math.cos(middle), math.sin(middle)
         v, rolls = v_x * cosine + v_y * sine, forward_speed(y)
@@ -91,7 +91,7 @@ class Sliding:
 
         f_x, f_y = self.body.outside(height, given)
         pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, given.push_turn])
-        against, drag = self._smooth_friction(sliding, np.array(bent), h)
+        against, drag = self._smooth_friction(sliding, np.array(deflection), h)
         masses = np.array([self.mass, self.mass, self.yaw_inertia])
         free = masses * [v, u, omega] + h * (pull - against)
         if self.slip:
@@ -105,10 +105,12 @@ class Sliding:
             lightness = 1 / (masses + h * drag)
             free[1] = lightness[1] = 0.0
         cones = self._cones(load, float(np.linalg.norm(sliding)), h)
-        found, holds = opposed(free * lightness, lightness, cones)
+        found, holds = solve_friction_impulses(free * lightness, lightness, cones)
         v, u, omega = self._at_rest(found[:3], holds)
 
-        bent_1 = self._bent(sliding, np.array([v, u, omega * self._radius]), np.array(bent), h)
+        bent_1 = self._bent(
+            sliding, np.array([v, u, omega * self._radius]), np.array(deflection), h
+        )
         x, height = x + h * (v * cosine - u * sine), height + h * (v * sine + u * cosine)
         heading += h * omega
         if not self.slip:
@@ -164,14 +166,14 @@ class Sliding:
 
     # Friction without an edge: a + D s⁺ against the sliding s⁺ = (v, u, R ω) after h
 
-    def _smooth_friction(self, sliding: Array, bent: Array, h: float) -> tuple[Array, Array]:
+    def _smooth_friction(self, sliding: Array, deflection: Array, h: float) -> tuple[Array, Array]:
         """Force (3,) that is there already [N, N, N m], and drag (3,) [N s/m, N s/m, N m s]."""
         law, f = self.body.contact.friction, self.body.friction
         lever = np.array([1.0, 1.0, self._radius])
         speed = float(np.linalg.norm(sliding))
         if isinstance(law, LuGre):
             q, stiffness, T = 1 + h * law.relaxation(speed), law.stiffness(f), law.damping_time
-            there = stiffness * (bent / q + T * (bent / q - bent) / h)
+            there = stiffness * (deflection / q + T * (deflection / q - deflection) / h)
             drag = stiffness * (h + T) / q + f * law.viscous
             return lever * there, lever**2 * drag
         if law.stiction(1.0) > 0:
@@ -179,12 +181,12 @@ class Sliding:
         share = law.level(f, speed) / speed if speed > 0 else law.steepness(f)
         return np.zeros(3), lever**2 * share
 
-    def _bent(self, before: Array, after: Array, bent: Array, h: float) -> Array:
+    def _bent(self, before: Array, after: Array, deflection: Array, h: float) -> Array:
         """Bristles after `h`, in which they slid at `before` (3,), and at last `after` (3,)."""
         law = self.body.contact.friction
         if not isinstance(law, LuGre):
-            return bent
-        return (bent + h * after) / (1 + h * law.relaxation(float(np.linalg.norm(before))))
+            return deflection
+        return (deflection + h * after) / (1 + h * law.relaxation(float(np.linalg.norm(before))))
 
     def _rolling_on(self, y: Array, slip: Array) -> tuple[Array, Array]:
         """(y, no slip) with the momentum of rims and climber together: they roll on as one."""

@@ -6,7 +6,7 @@ from scipy.stats import truncnorm
 
 from climber_uk.campaign.distributions import (
     EXTREMES,
-    Choice,
+    Categorical,
     Uniform,
     distribution,
     drawn,
@@ -63,7 +63,7 @@ def test_nothing_is_drawn_beyond_its_extremes(name):
 
 
 def test_what_has_no_weight_is_never_chosen():
-    of = Choice((1.0, 2.0, 3.0), (0.0, 1.0, 0.0))
+    of = Categorical((1.0, 2.0, 3.0), (0.0, 1.0, 0.0))
     np.testing.assert_array_equal(of.quantile(np.append(EXTREMES, 0.5)), 2.0)
 
 

@@ -3,14 +3,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from climber_uk.closed_loop.batch import Change, Course, Loops
+from climber_uk.closed_loop.batch import BatchRun, Change, Loops
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.constraints import Exact, Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber, State
@@ -72,13 +72,13 @@ def alone(case, i, duration):
     """The same by the scalar tracker and the plant that integrates (30)."""
     trajectory, start, true, gains, known, steps, delay = case
     model = replace(BUILT if trajectory is EIGHT else PAPER, **known)
-    controller = Controller(as_floats(model, i), as_floats(gains, i), Law())
+    law = ControlLaw(as_floats(model, i), as_floats(gains, i), ControlOptions())
     timing = Timing(transport_delay=0.005 * delay)
-    tracker = Tracker(controller, Observer(), timing, Pacing(catch_up=0.0))
+    sampled_controller = SampledController(law, Observer(), timing, Pacing(catch_up=0.0))
     link = Link(step=0.005 / steps, delay=0.005 * delay)
     state = State.moving(Motion(*(float(number) for number in part(start, i))))
-    follower = Follower(tracker, Safety(max_jump=1e9))
-    return simulate(trajectory, state, duration, follower, as_floats(true, i), link)
+    controller = Controller(sampled_controller, Safety(max_jump=1e9))
+    return simulate(trajectory, state, duration, controller, as_floats(true, i), link)
 
 
 def as_floats(of, i):
@@ -92,9 +92,9 @@ def test_each_of_many_is_what_it_is_alone(name):
     trajectory, start, true, gains, known, steps, delay = case = CASES[name]
     model = replace(BUILT if trajectory is EIGHT else PAPER, **known)
     timing = Timing(transport_delay=0.005 * delay)
-    loops = Loops(start, true, Controller(model, gains, Law()), timing=timing)
+    loops = Loops(start, true, ControlLaw(model, gains, ControlOptions()), timing=timing)
     duration = 0.5
-    got = loops.run(Course(trajectory, duration, steps=steps, delay=delay), block=3)
+    got = loops.run(BatchRun(trajectory, duration, steps=steps, delay=delay), block=3)
     for i in range(N):
         run = alone(case, i, duration)
         assert got.rms[i] == pytest.approx(run.rms(), abs=1e-9)
@@ -113,13 +113,13 @@ def test_each_of_many_is_what_it_is_alone(name):
 
 def noisy(seeds):
     sensors = Sensors(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
-    controller = Controller(BUILT, SLOW, Law())
+    law = ControlLaw(BUILT, SLOW, ControlOptions())
     start = part(ON_EIGHT, np.arange(len(seeds)))
-    return Loops(start, BUILT, controller, sensors=sensors, seeds=seeds)
+    return Loops(start, BUILT, law, sensors=sensors, seeds=seeds)
 
 
 def test_a_seed_gives_the_same_noise_whatever_the_block_and_its_place_in_it():
-    course, seeds = Course(EIGHT, 0.5), np.array([5, 6, 7, 8])
+    course, seeds = BatchRun(EIGHT, 0.5), np.array([5, 6, 7, 8])
     whole, blocks = (noisy(seeds).run(course, block=block) for block in (4, 1))
     np.testing.assert_allclose(whole.rms, blocks.rms, rtol=1e-12)
     same = replace(noisy(seeds), start=part(ON_EIGHT, np.zeros(4, int)), seeds=np.full(4, 3))
@@ -142,23 +142,23 @@ def test_its_noise_is_that_of_the_plants_sensors():
 def test_lost_suction_is_a_fall_of_those_that_lose_it_when_they_do():
     none = replace(BUILT, suction_pressure=300.0)  # it tips below 327 Pa
     change = Change(np.array([0.1, np.inf, 0.2, np.inf]), none)
-    loops = Loops(ON_EIGHT, BUILT, Controller(BUILT, SLOW, Law()), changes=(change,))
-    outcome = loops.run(Course(EIGHT, 0.3))
+    loops = Loops(ON_EIGHT, BUILT, ControlLaw(BUILT, SLOW, ControlOptions()), changes=(change,))
+    outcome = loops.run(BatchRun(EIGHT, 0.3))
     np.testing.assert_allclose(outcome.fell, [0.1, np.inf, 0.2, np.inf])
     assert outcome.tip_margin[0] == pytest.approx(300 / 327)
     assert outcome.tip_margin[1] == pytest.approx(8000 / 327)
-    stays = replace(loops, changes=()).run(Course(EIGHT, 0.1))
+    stays = replace(loops, changes=()).run(BatchRun(EIGHT, 0.1))
     assert outcome.worst[0] == pytest.approx(stays.worst[0])  # what came after does not count
 
 
 def test_friction_that_jumps_is_learnt():
     rough = replace(BUILT, seal_friction_coefficient=0.9)
     change = Change(np.array([0.2, 0.2, np.inf, np.inf]), rough)
-    loops = Loops(ON_EIGHT, BUILT, Controller(BUILT, SLOW, Law()), changes=(change,))
-    outcome = loops.run(Course(EIGHT, 1.0))
+    loops = Loops(ON_EIGHT, BUILT, ControlLaw(BUILT, SLOW, ControlOptions()), changes=(change,))
+    outcome = loops.run(BatchRun(EIGHT, 1.0))
     assert (outcome.peak_torque[:2] > outcome.peak_torque[2:].max() + 0.1).all()
     assert (outcome.worst < 0.05).all()
-    all_of_them = replace(loops, changes=(Change(0.2, rough),)).run(Course(EIGHT, 1.0))
+    all_of_them = replace(loops, changes=(Change(0.2, rough),)).run(BatchRun(EIGHT, 1.0))
     np.testing.assert_allclose(all_of_them.rms[:2], outcome.rms[:2], rtol=1e-12)
     assert (all_of_them.peak_torque[2:] > outcome.peak_torque[2:] + 0.1).all()
 
@@ -176,4 +176,4 @@ def test_friction_that_jumps_is_learnt():
 )
 def test_what_only_one_climber_can_do_is_refused(changed, said):
     with pytest.raises(ValueError, match=said):
-        Loops(ON_EIGHT, BUILT, Controller(BUILT, SLOW, Law()), **changed)
+        Loops(ON_EIGHT, BUILT, ControlLaw(BUILT, SLOW, ControlOptions()), **changed)

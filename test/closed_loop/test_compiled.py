@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_plain import PAPER, many_starts, wheels
+from test_unicycle import PAPER, many_starts, wheels
 
 from climber_uk.closed_loop import unicycle as plain
-from climber_uk.closed_loop.unicycle import Plain
-from climber_uk.mechanics.motion import Wrench, forces
+from climber_uk.closed_loop.unicycle import UnicycleModel
+from climber_uk.mechanics.motion import Wrench, wrench_of_torques
 
 compiled = pytest.importorskip("climber_uk.closed_loop.compiled", reason="numba is not installed")
 
@@ -17,9 +17,9 @@ pytestmark = pytest.mark.slow
 def test_what_is_compiled_is_what_it_was_compiled_from(fastest):
     random, number = np.random.default_rng(3), 600  # more than a block
     masses = random.uniform(4, 6, number)
-    body, motion = Plain.of(replace(PAPER, mass=masses)), many_starts(number, fastest)
+    body, motion = UnicycleModel.of(replace(PAPER, mass=masses)), many_starts(number, fastest)
     for _ in range(60):
-        wrench = Wrench(*forces(PAPER, *wheels(random, motion)))
+        wrench = Wrench(*wrench_of_torques(PAPER, *wheels(random, motion)))
         expected = plain.advanced_often(body, motion, wrench, 0.0025, 2)
         motion = compiled.advanced(body, motion, wrench, 0.0025, 2)
         np.testing.assert_allclose(motion, expected, rtol=1e-12, atol=1e-12)
@@ -30,6 +30,6 @@ def test_what_turns_too_fast_for_the_series_is_left_to_numpy():
     motion = many_starts(5, 0.2)
     motion = motion._replace(yaw_rate=motion.yaw_rate + 1000.0)
     wrench = Wrench(np.zeros(5), np.zeros(5))
-    expected = plain.advanced_often(Plain.of(PAPER), motion, wrench, 0.0025, 3)
-    got = compiled.advanced(Plain.of(PAPER), motion, wrench, 0.0025, 3)
+    expected = plain.advanced_often(UnicycleModel.of(PAPER), motion, wrench, 0.0025, 3)
+    got = compiled.advanced(UnicycleModel.of(PAPER), motion, wrench, 0.0025, 3)
     np.testing.assert_array_equal(got, expected)

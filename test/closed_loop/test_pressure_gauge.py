@@ -5,11 +5,11 @@ import pytest
 
 from climber_uk.closed_loop.pressure_gauge import controllers
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller, Law
+from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.mechanics.climber import Climber
 
 HIGH, LOW = 8000.0, 3000.0
-CONTROLLER = Controller(Climber(mass=6.0, suction_pressure=2500.0), Guidance(), Law())
+CONTROLLER = ControlLaw(Climber(mass=6.0, suction_pressure=2500.0), Guidance(), ControlOptions())
 
 
 def known(lost, period, gauge, periods=30):
@@ -18,8 +18,8 @@ def known(lost, period, gauge, periods=30):
     after = replace(before, suction_pressure=LOW)
     climbers = [after if period >= lost else before for period in range(periods)]
     heard = list(controllers(CONTROLLER, climbers, period, gauge))
-    assert {controller.climber.mass for controller in heard} == {6.0}
-    return [controller.climber.suction_pressure for controller in heard]
+    assert {law.climber.mass for law in heard} == {6.0}
+    return [law.climber.suction_pressure for law in heard]
 
 
 # 20 times a second is every tenth period of 5 ms. What is told at period 10 is the pressure in

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from climber_uk.closed_loop.unicycle import Plain, advanced
+from climber_uk.closed_loop.unicycle import UnicycleModel, advanced
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.many import part
-from climber_uk.mechanics.motion import Motion, Wrench, forces
+from climber_uk.mechanics.motion import Motion, Wrench, wrench_of_torques
 from climber_uk.simulation.plant import Plant
 
 PAPER = Climber()
@@ -34,7 +34,7 @@ def wheels(random, motion):
 
 @pytest.mark.parametrize("fastest", [0.2, 6.0])
 def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest):
-    random, body, step = np.random.default_rng(7), Plain.of(PAPER), 0.0025
+    random, body, step = np.random.default_rng(7), UnicycleModel.of(PAPER), 0.0025
     plant, motion = Plant(PAPER, step), many_starts(12, fastest)
     states = [State.moving(floats(part(motion, i))) for i in range(12)]
     alone = [state.motion for state in states]
@@ -43,13 +43,15 @@ def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest):
         torques = wheels(random, motion)
         was = np.sign(motion.speed)
         for _ in range(2):
-            motion = advanced(body, motion, Wrench(*forces(PAPER, *torques)), step)
+            motion = advanced(body, motion, Wrench(*wrench_of_torques(PAPER, *torques)), step)
         changes += np.count_nonzero(np.sign(motion.speed) != was)
         for i in range(12):
             pair = torques[:, i]
             states[i] = plant.advance(states[i], pair, steps=2)
             for _ in range(2):
-                alone[i] = advanced(body, alone[i], Wrench(*forces(PAPER, *pair.tolist())), step)
+                alone[i] = advanced(
+                    body, alone[i], Wrench(*wrench_of_torques(PAPER, *pair.tolist())), step
+                )
             expected = states[i].motion
             np.testing.assert_allclose(floats(part(motion, i)), expected, atol=1e-9)
             np.testing.assert_allclose(alone[i], expected, atol=1e-9)
@@ -60,7 +62,7 @@ def test_friction_stops_it_where_the_brakes_law_says_whatever_the_step():
     floor = replace(PAPER, inclination=0.0)
     motion = State.rolling(np.array([0.0, 0.0, 0.5]), 1.0, 0.0).motion
     for _ in range(10):
-        motion = advanced(Plain.of(floor), motion, Wrench(0.0, 0.0), 0.1)
+        motion = advanced(UnicycleModel.of(floor), motion, Wrench(0.0, 0.0), 0.1)
     assert np.hypot(motion.x, motion.y) == pytest.approx(5.0 / (2 * floor.seal_friction), rel=1e-12)
     assert motion.speed == 0
 
@@ -68,7 +70,7 @@ def test_friction_stops_it_where_the_brakes_law_says_whatever_the_step():
 @pytest.mark.parametrize(("part_of", "slides"), [(1 + 1e-6, False), (1 - 1e-6, True)])
 def test_it_slides_just_below_the_critical_pressure(part_of, slides):
     pressure = part_of * 5 * 9.81 / (0.47 * 0.8 * 0.06)
-    body, motion = Plain.of(replace(PAPER, suction_pressure=pressure)), UPRIGHT.motion
+    body, motion = UnicycleModel.of(replace(PAPER, suction_pressure=pressure)), UPRIGHT.motion
     for _ in range(400):
         motion = advanced(body, motion, Wrench(0.0, 0.0), 0.0025)
     assert (motion.y < 6) is slides
@@ -81,7 +83,10 @@ def test_what_friction_holds_may_turn_on_the_spot_and_gives_way_at_its_angle():
     steps = 0
     while motion.speed == 0:
         assert motion.x == motion.y == 0
-        motion, steps = advanced(Plain.of(weak), motion, Wrench(0.0, 0.0), 0.0025), steps + 1
+        motion, steps = (
+            advanced(UnicycleModel.of(weak), motion, Wrench(0.0, 0.0), 0.0025),
+            steps + 1,
+        )
     since = steps * 0.0025 - np.arcsin(33.84 / 49.05)  # at 1 rad/s
     assert 0 < since <= 0.0025
     # v̇ grows from 0 as g cosθ t does

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.build import new_follower
+from climber_uk.control.build import build_controller
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics import trajectory_parameters as plan
@@ -30,18 +30,18 @@ def as_it_is(_, value):
 class Climb:
     """Odometry every 5 ms, torques that act at once; what spoils either is given by the time."""
 
-    def __init__(self, *, planner=None, offset=(0.0, 0.0, 0.0), scrubs=False, **controller):
-        planned = {**read_file(CONFIG, "/trajectory_publisher"), **(planner or {})}
-        self.trajectory = plan.planned(Values(planned).read)
-        given = {**read_file(CONFIG, "/uk_torque_controller"), **controller}
-        self.follower = new_follower(Values(given), None)
-        climber = replace(self.follower.tracker.controller.climber, max_wheel_torque=100.0)
+    def __init__(self, *, planner=None, offset=(0.0, 0.0, 0.0), scrubs=False, **parameters):
+        build_trajectory = {**read_file(CONFIG, "/trajectory_publisher"), **(planner or {})}
+        self.trajectory = plan.build_trajectory(Values(build_trajectory).read)
+        given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
+        self.controller = build_controller(Values(given), None)
+        climber = replace(self.controller.sampled_controller.law.climber, max_wheel_torque=100.0)
         self.plant = Plant(climber, STEP, **({"contact": SCRUB, "slip": True} if scrubs else {}))
         reference = self.trajectory.at(0.0)
         self.state = State(reference.pose + np.array(offset), reference.velocity)
         self.time, self.torques = 0.0, np.zeros(2)
         self.times, self.states, self.modes, self.sent = [], [], [], []
-        self.follower.on_reference(SECOND, sampled(self.trajectory, 60.0))
+        self.controller.on_reference(SECOND, sampled(self.trajectory, 60.0))
 
     def run(self, seconds, odometry=as_it_is, motors=as_it_is, push=NO_PUSH, clock=0.0):
         """Go on; `odometry` may be None for one that is lost, `clock` [s] is what stamps lack."""
@@ -50,13 +50,13 @@ class Climb:
             told = odometry(self.time, self.state)
             answer = None
             if told is not None:
-                answer = self.follower.on_odometry(now, now - round(clock * SECOND), told)
-            answer = answer or self.follower.look(now)
+                answer = self.controller.on_odometry(now, now - round(clock * SECOND), told)
+            answer = answer or self.controller.look(now)
             if answer is not None:
                 self.torques = answer.torques
             self.times.append(self.time)
             self.states.append(self.state)
-            self.modes.append(self.follower.mode)
+            self.modes.append(self.controller.mode)
             self.sent.append(self.torques)
             acting = motors(self.time, self.torques)
             self.state = self.plant.advance(self.state, acting, round(PERIOD / STEP), push)
@@ -104,8 +104,8 @@ class Climb:
     @property
     def position(self):
         """Time of the trajectory [s] that the climber has come to."""
-        follower = self.follower
-        return (follower.course.position(follower.stamp) - SECOND) / SECOND
+        controller = self.controller
+        return (controller.active.position(controller.stamp) - SECOND) / SECOND
 
     def follows(self):
-        return self.follower.mode is Mode.FOLLOWING
+        return self.controller.mode is Mode.FOLLOWING

@@ -9,7 +9,7 @@ from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion, Target
+from climber_uk.mechanics.motion import Motion, ReferencePoint
 
 slow = pytest.mark.slow
 
@@ -22,12 +22,12 @@ def is_at_rest(climb):
 @pytest.mark.parametrize("late", [5.0, 30.0, 600.0])
 def test_a_reference_waits_at_its_begin_for_a_controller_that_is_enabled_late(late):
     climb = Climb()
-    climb.follower.enable(False)
+    climb.controller.enable(False)
     climb.run(1.0)
     climb.time += late  # of which nothing is heard
     climb.run(0.5)
-    assert climb.follower.mode is Mode.DISABLED
-    climb.follower.enable(True)
+    assert climb.controller.mode is Mode.DISABLED
+    climb.controller.enable(True)
     begin = climb.time
     climb.run(20.0)
     assert climb.follows()
@@ -42,7 +42,7 @@ def test_a_reference_waits_while_odometry_is_gone_and_goes_on_where_it_was(gap):
     climb = Climb().run(12.0)
     position = climb.position
     climb.run(gap, odometry=lambda *_: None, motors=lambda _, torques: 0 * torques)
-    assert climb.follower.mode is Mode.NO_ODOMETRY
+    assert climb.controller.mode is Mode.NO_ODOMETRY
     begin = climb.time
     climb.run(15.0)
     assert climb.follows()
@@ -54,12 +54,12 @@ def test_a_reference_waits_while_odometry_is_gone_and_goes_on_where_it_was(gap):
 @slow
 def test_enabled_again_in_mid_course_it_goes_on_where_it_is():
     climb = Climb().run(12.0)
-    climb.follower.enable(False)
+    climb.controller.enable(False)
     climb.run(3.0)
     assert is_at_rest(climb)
     stopped = climb.position
     assert stopped == pytest.approx(12.0, abs=0.1)
-    climb.follower.enable(True)
+    climb.controller.enable(True)
     climb.run(10.0)
     assert climb.position == pytest.approx(stopped + 10.0, abs=0.5)
     assert climb.fastest() <= 1.3 * climb.reference_speed
@@ -69,8 +69,8 @@ def test_enabled_again_in_mid_course_it_goes_on_where_it_is():
 @slow
 def test_a_start_3_m_off_is_refused_with_the_distance():
     climb = Climb(offset=(3.0, 0.0, 0.0)).run(1.0)
-    assert climb.follower.mode is Mode.TOO_FAR
-    assert climb.follower.detail.startswith("3.00 m, from (3.00, 3.00) to (0.00, 3.00)")
+    assert climb.controller.mode is Mode.TOO_FAR
+    assert climb.controller.detail.startswith("3.00 m, from (3.00, 3.00) to (0.00, 3.00)")
     assert climb.fastest() < 1e-3
 
 
@@ -79,7 +79,7 @@ def test_a_start_3_m_off_is_refused_with_the_distance():
 def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned):
     climb = Climb(offset=(2.4, -1.8, turned), max_start_distance=5.0, approach_speed=0.2)
     climb.run(5.0)
-    assert climb.follower.mode is Mode.APPROACHING
+    assert climb.controller.mode is Mode.APPROACHING
     climb.run(40.0)
     approaching = [mode is Mode.APPROACHING for mode in climb.modes]
     speeds = [
@@ -106,7 +106,7 @@ def test_an_offset_of_the_clocks_is_no_latency(offset, since):
     ]
     assert max(distance) < 0.05
     assert max(np.abs(sent).max() for sent in climb.sent) < 3.9
-    told = climb.follower.ages.offset(0.02)
+    told = climb.controller.ages.offset(0.02)
     assert told == pytest.approx(offset if abs(offset) > 0.02 else 0.0, abs=0.006)
 
 
@@ -147,8 +147,8 @@ def test_odometry_that_is_slower_than_its_timeout_allows_is_refused_in_words():
         return state if round(time / 0.005) % 20 == 0 else None
 
     climb = Climb().run(1.0, odometry=seldom)
-    assert climb.follower.mode is Mode.SELDOM
-    assert climb.follower.detail == "every 0.10 s for a timeout of 0.1 s"
+    assert climb.controller.mode is Mode.SELDOM
+    assert climb.controller.detail == "every 0.10 s for a timeout of 0.1 s"
     slower = Climb(odometry_timeout=0.3).run(4.0, odometry=seldom)
     assert slower.off_the_path() < 0.05
 
@@ -162,7 +162,7 @@ place = st.floats(-3.0, 3.0)
 def test_an_approach_goes_from_rest_to_rest_no_faster_than_it_should(x, y, heading, x_d, y_d, end):
     options = Approach(approach_speed=0.1, approach_yaw_rate=0.5)
     motion = Motion(x, y, heading, np.cos(heading), np.sin(heading), 0.0, 0.0)
-    target = Target(x_d, y_d, end, *[0.3] * 8)
+    target = ReferencePoint(x_d, y_d, end, *[0.3] * 8)
     way = options.way(motion, target, SECOND)
     first, last = way.at(int(way.times[0])), way.at(int(way.times[-1]))
     assert way.times[0] == SECOND
@@ -187,16 +187,16 @@ def test_an_approach_goes_from_rest_to_rest_no_faster_than_it_should(x, y, headi
 @given(st.lists(st.integers(1, 200), min_size=1, max_size=60), st.booleans())
 def test_a_reference_that_nobody_follows_is_kept_in_part_only(steps, with_odometry):
     climb = Climb()
-    climb.follower.enable(False)
-    course, whole = climb.follower.course, climb.follower.course.preview
+    climb.controller.enable(False)
+    active, whole = climb.controller.active, climb.controller.active.preview
     shift = 0
     for step in steps:
         shift += step * SECOND // 20
         newer = type(whole)(
             whole.times[:40] + shift, whole.pose[:40], whole.velocity[:40], whole.acceleration[:40]
         )
-        course.take(newer)
+        active.take(newer)
         if with_odometry:
             now = SECOND + shift
-            climb.follower.on_odometry(now, now, climb.state)
-    assert len(course.preview.times) <= 5000
+            climb.controller.on_odometry(now, now, climb.state)
+    assert len(active.preview.times) <= 5000

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.build import new_follower
+from climber_uk.control.build import build_controller
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import ADHESION
-from climber_uk.mechanics.trajectory_parameters import planned
+from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.ros import plant_parts
-from climber_uk.simulation.options import Options
-from climber_uk.simulation.simulated_robot import Machine
+from climber_uk.simulation.options import SimulationOptions
+from climber_uk.simulation.simulated_robot import SimulatedRobot
 
 CONFIG = Path(__file__).parents[2] / "config"
 
@@ -25,19 +25,19 @@ def driven(file, duration, **common):
         for node in ("uk_torque_controller", "plant_simulator", "trajectory_publisher")
     )
     plants = Values({**plants.by_name, **common})
-    options, trajectory = plants.read(Options), planned(plan.read)
-    machine = Machine(plant_parts.parts(plants), options.initial_state, options.control_period)
-    follower = new_follower(Values({**ours.by_name, **common}), pressure=None)
-    follower.on_reference(SECOND, sampled(trajectory, duration))
+    options, trajectory = plants.read(SimulationOptions), build_trajectory(plan.read)
+    robot = SimulatedRobot(plant_parts.parts(plants), options.initial_state, options.control_period)
+    controller = build_controller(Values({**ours.by_name, **common}), pressure=None)
+    controller.on_reference(SECOND, sampled(trajectory, duration))
     torques, disturbances = [], []
     for period in range(round(duration / options.control_period)):
         stamp = SECOND + round(period * options.control_period * SECOND)
-        answer = follower.on_odometry(stamp, stamp, machine.odometer.latest()[1])
+        answer = controller.on_odometry(stamp, stamp, robot.odometer.latest()[1])
         torques.append(answer.torques)
-        disturbances.append(follower.tracker.disturbance)
+        disturbances.append(controller.sampled_controller.disturbance)
         for _ in range(options.steps):
-            machine.advance(answer.torques)
-        machine.measure()
+            robot.advance(answer.torques)
+        robot.measure()
     return np.array(torques), np.array(disturbances)
 
 
@@ -57,6 +57,6 @@ def test_without_suction_no_seal_is_driven_against(common):
 def test_plant_and_controller_have_the_same_friction(adhesion):
     values = Values({"adhesion": adhesion})
     plant = plant_parts.parts(values).plant
-    believed = new_follower(values, pressure=None).tracker.controller.climber
+    believed = build_controller(values, pressure=None).sampled_controller.law.climber
     assert believed.seal_friction == plant.contact.seal_friction(plant.climber)
     assert (believed.seal_friction > 0) is (adhesion == "suction")

@@ -33,7 +33,7 @@ def state_of(case):
     return State.rolling(trajectory.at(time).pose + offset, v, omega)
 
 
-def rolled(state, demand, h):
+def predict(state, demand, h):
     """State after h [s] of rolling with constant v̇ and θ̈, by the midpoint of speed and heading."""
     v_1, turning, _ = demand
     x, y, heading = state.pose
@@ -48,7 +48,7 @@ def rolled(state, demand, h):
 
 def differences(function, state, demand, time):
     """Value, first and second time derivative of function(state, time) along the motion."""
-    before, here, after = (function(rolled(state, demand, h), time + h) for h in (-H, 0.0, H))
+    before, here, after = (function(predict(state, demand, h), time + h) for h in (-H, 0.0, H))
     return here, (after - before) / (2 * H), (after - 2 * here + before) / H**2
 
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from climber_uk.control.constraints import Exact, Guidance, demanded, rows
-from climber_uk.control.control_law import Controller, Law, Situation
+from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
 from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, forces, limited
+from climber_uk.mechanics.motion import Motion, Torques, Wrench, saturate, wrench_of_torques
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -21,7 +21,7 @@ PERIOD = 0.005  # [s]
 
 
 def situation(state, held=(0.0, 0.0), disturbance=(0.0, 0.0)):
-    return Situation(state.motion, Torques(*held), Wrench(*disturbance), PERIOD)
+    return ControlInput(state.motion, Torques(*held), Wrench(*disturbance), PERIOD)
 
 
 @settings(max_examples=50, deadline=None)
@@ -38,7 +38,7 @@ def test_the_closed_form_is_the_udwadia_kalaba_force(time, offset, turned, v, di
     reference = PAPER.at(time)
     state = State.rolling(reference.pose + np.array([offset, -offset, turned]), v, turned)
     for constraints in (Guidance(), Exact()):
-        command = Controller(climber, constraints, Law(predict=False)).command(
+        command = ControlLaw(climber, constraints, ControlOptions(predict=False)).command(
             situation(state, disturbance=disturbance), reference.target
         )
         A, b = rows(state, demanded(constraints, state, reference))
@@ -59,10 +59,10 @@ bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[
 @given(st.floats(-50, 50), st.floats(-50, 50), bounds, bounds)
 def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
     climber = Climber()
-    wrench = forces(climber, right, left)
-    *done, one, other = limited(climber, *wrench, right_bounds, left_bounds)
+    wrench = wrench_of_torques(climber, right, left)
+    *done, one, other = saturate(climber, *wrench, right_bounds, left_bounds)
     got = one, other
-    np.testing.assert_allclose(done, forces(climber, *got), atol=1e-9)
+    np.testing.assert_allclose(done, wrench_of_torques(climber, *got), atol=1e-9)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
         assert low <= torque <= high  # not beyond it by as little as rounding
     turn, drive = (right - left) / 2, (right + left) / 2
@@ -88,15 +88,15 @@ def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
     limit, no_load, rate, motion, shares, many
 ):
     climber = Climber(max_wheel_torque=limit, no_load_wheel_rate=no_load)
-    controller = Controller(climber, Guidance(), Law(max_torque_rate=rate))
+    law = ControlLaw(climber, Guidance(), ControlOptions(max_torque_rate=rate))
     v, omega, drive, turn = (np.full(3, x) for x in motion) if many else motion
     pose = np.zeros((3, 3) if many else 3)
     at = State.rolling(pose, v, omega)
     held = limit * np.array(shares)
     if many:
         held = np.repeat(held[:, None], 3, axis=1)
-    of = Situation(at.motion, Torques(*held), Wrench(drive, turn), PERIOD)
-    for wheels in controller.command(of, PAPER.at(0.0).target).wheels, controller.holding(of, 5.0):
+    of = ControlInput(at.motion, Torques(*held), Wrench(drive, turn), PERIOD)
+    for wheels in law.command(of, PAPER.at(0.0).target).wheels, law.holding(of, 5.0):
         bounds = climber.torque_bounds(at)
         for torque, before, (low, high) in zip(wheels, held, bounds, strict=True):
             assert np.all(np.abs(torque) <= limit)
@@ -109,43 +109,43 @@ def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
 def test_what_the_limits_take_away_is_told():
     reference = PAPER.at(0.0)
     for limit, is_cut in ((20.0, False), (0.2, True)):
-        controller = Controller(Climber(max_wheel_torque=limit), Guidance(), Law())
-        command = controller.command(situation(START), reference.target)
+        law = ControlLaw(Climber(max_wheel_torque=limit), Guidance(), ControlOptions())
+        command = law.command(situation(START), reference.target)
         assert np.abs(command.torques).max() <= limit
         assert bool(np.abs(command.missing).max() > 1e-9) is is_cut
-        demanded = controller.climber.drive_and_turn(command.torques) + command.missing
+        demanded = law.climber.drive_and_turn(command.torques) + command.missing
         force = command.constraint_force
         np.testing.assert_allclose(demanded, [force[0], force[2]], atol=1e-9)
 
 
 def test_a_dc_motor_has_less_torque_the_faster_its_wheel_and_full_torque_to_brake():
     climber = Climber(no_load_wheel_rate=400.0)  # START turns its wheels at 364 and 377 rad/s
-    controller = Controller(climber, Guidance(), Law())
+    law = ControlLaw(climber, Guidance(), ControlOptions())
     uphill = replace(PAPER.at(0.0), acceleration=np.array([500.0, 0.0, 0.0]))
-    torques = controller.command(situation(START), uphill.target).torques
+    torques = law.command(situation(START), uphill.target).torques
     rates = climber.wheel_rates(START)
     assert (torques <= 20.0 * (1 - rates / 400.0) + 1e-12).all()
     assert (torques > 0).all()
     braking = replace(PAPER.at(0.0), acceleration=np.array([-500.0, 0.0, 0.0]))
-    torques = controller.command(situation(START), braking.target).torques
+    torques = law.command(situation(START), braking.target).torques
     assert torques.min() == -20.0
 
 
 def test_a_torque_changes_no_faster_than_its_limit():
-    law = Law(max_torque_rate=40.0)
-    controller = Controller(Climber(), Guidance(), law)
+    options = ControlOptions(max_torque_rate=40.0)
+    law = ControlLaw(Climber(), Guidance(), options)
     hard = replace(PAPER.at(0.0), acceleration=np.array([200.0, 0.0, 50.0]))
     held = np.array([0.3, -0.1])
-    torques = controller.command(situation(START, held), hard.target).torques
+    torques = law.command(situation(START, held), hard.target).torques
     assert np.abs(torques - held).max() == pytest.approx(40.0 * PERIOD)
 
 
 def test_holding_torques_keep_the_climber_where_it_is():
     climber = Climber(seal_friction_coefficient=0.0)
-    controller, plant = Controller(climber, Guidance(), Law()), Plant(climber, 0.0025)
+    law, plant = ControlLaw(climber, Guidance(), ControlOptions()), Plant(climber, 0.0025)
     state = State.rolling(np.array([0.0, 0.0, 1.0]), 0.3, 0.4)
     for _ in range(1000):
-        torques = controller.holding(situation(state), 5.0)
+        torques = law.holding(situation(state), 5.0)
         state = plant.advance(state, np.array(torques), steps=2)
     np.testing.assert_allclose(state.velocity, 0, atol=1e-6)
 
@@ -155,21 +155,21 @@ def test_holding_torques_keep_the_climber_where_it_is():
 def test_one_call_serves_many_climbers(constraints, limit):
     random, n = np.random.default_rng(9), 40
     climber = Climber(max_wheel_torque=limit)
-    controller = Controller(climber, constraints, Law(max_torque_rate=1000.0))
+    law = ControlLaw(climber, constraints, ControlOptions(max_torque_rate=1000.0))
     reference = PAPER.at(1.0)
     pose = reference.pose + random.normal(size=(n, 3)) * 0.1
     motion = State.rolling(pose, 8 + random.normal(size=n), random.normal(size=n)).motion
     held, disturbance = random.normal(size=(2, n)), 10 * random.normal(size=(2, n))
-    many = Situation(motion, Torques(*held), Wrench(*disturbance), PERIOD)
-    together = controller.command(many, reference.target)
+    many = ControlInput(motion, Torques(*held), Wrench(*disturbance), PERIOD)
+    together = law.command(many, reference.target)
     for i in range(n):
-        one = Situation(
+        one = ControlInput(
             Motion(*(float(number[i]) for number in motion)),
             Torques(*held[:, i].tolist()),
             Wrench(*disturbance[:, i].tolist()),
             PERIOD,
         )
-        alone = controller.command(one, reference.target)
+        alone = law.command(one, reference.target)
         for name in ("torques", "constraint_force", "missing"):
             expected = getattr(alone, name)
             got = getattr(together, name)[i]

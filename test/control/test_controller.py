@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber, State
@@ -30,16 +30,16 @@ class Loop:
     """A climber that is always where it should be, on a clock that the test turns."""
 
     def __init__(self, observer=None, **safety):
-        controller = Controller(Climber(), Guidance(), Law())
-        tracker = Tracker(controller, observer or Observer(), Timing(), Pacing())
+        law = ControlLaw(Climber(), Guidance(), ControlOptions())
+        sampled_controller = SampledController(law, observer or Observer(), Timing(), Pacing())
         # it is moved by no torque
         guard = replace(UNGUARDED, speed_margin=0.05, yaw_rate_margin=1.0)
-        self.follower = Follower(tracker, Safety(**safety), guard=guard)
+        self.controller = Controller(sampled_controller, Safety(**safety), guard=guard)
         self.now = SECOND
         self.answer = None
 
     def plan(self, trajectory=CIRCLE):
-        self.answer = self.follower.on_reference(self.now, sampled(trajectory, 10.0))
+        self.answer = self.controller.on_reference(self.now, sampled(trajectory, 10.0))
 
     def state(self, stamp):
         reference = CIRCLE.at((stamp - SECOND) / SECOND)
@@ -51,13 +51,13 @@ class Loop:
             at = self.now if stamp is None else stamp
             state = self.state(at)
             state = State(state.pose + np.array(moved), state.velocity)
-            self.answer = self.follower.on_odometry(self.now, at, state)
-        return self.follower.mode
+            self.answer = self.controller.on_odometry(self.now, at, state)
+        return self.controller.mode
 
     def look(self, after=PERIOD):
         self.now += after
-        self.answer = self.follower.look(self.now)
-        return self.follower.mode
+        self.answer = self.controller.look(self.now)
+        return self.controller.mode
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def test_it_follows_odometry_and_answers_with_its_stamp(loop):
 
 def test_the_same_odometry_again_gets_the_same_answer(loop):
     before = loop.answer
-    assert loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now)) is before
+    assert loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now)) is before
 
 
 def test_odometry_waits_for_a_reference_then_is_safe_then_is_answered():
@@ -90,20 +90,20 @@ def test_odometry_waits_for_a_reference_then_is_safe_then_is_answered():
     assert loop.tell(times=25) is Mode.NO_REFERENCE
     assert is_safe(loop)
     loop.plan()
-    assert loop.follower.mode is Mode.FOLLOWING
+    assert loop.controller.mode is Mode.FOLLOWING
     assert loop.answer.stamp == loop.now
 
 
 def test_a_clock_that_stands_still_waits_for_the_reference_for_ever():
     loop = Loop()
     for _ in range(100):
-        assert loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now)) is None
+        assert loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now)) is None
     loop.plan()
     assert loop.answer.command is not None
 
 
 def test_a_reference_that_ends_is_missed_after_its_timeout(loop):
-    loop.follower.on_reference(loop.now, sampled(CIRCLE, -1.0))  # to 2 s
+    loop.controller.on_reference(loop.now, sampled(CIRCLE, -1.0))  # to 2 s
     assert loop.tell(times=180) is Mode.FOLLOWING
     assert loop.tell(times=30) is Mode.NO_REFERENCE
     assert is_safe(loop)
@@ -115,10 +115,10 @@ def test_a_reference_that_begins_later_is_no_fault(loop):
     shifted = type(later)(
         later.times - SECOND + begin, later.pose + 1.0, later.velocity, later.acceleration
     )
-    loop.follower.on_reference(loop.now, shifted)
+    loop.controller.on_reference(loop.now, shifted)
     assert loop.tell() is Mode.NOT_BEGUN
     assert is_safe(loop)
-    assert not loop.follower.mode.is_fault
+    assert not loop.controller.mode.is_fault
 
 
 def test_odometry_that_stops_is_noticed_and_followed_when_it_is_back(loop):
@@ -162,20 +162,20 @@ def test_a_clock_that_went_back_starts_anew(loop):
 @pytest.mark.parametrize("back", [1, 20, 150])
 def test_a_clock_that_went_back_by_a_little_is_ridden_out(loop, back):
     loop.tell(times=100)
-    position = loop.follower.course.position(loop.follower.stamp)
+    position = loop.controller.active.position(loop.controller.stamp)
     loop.now -= back * MILLISECOND
     assert loop.tell() is Mode.FOLLOWING
-    here = loop.follower.course.position(loop.follower.stamp)
+    here = loop.controller.active.position(loop.controller.stamp)
     assert position <= here < position + PERIOD
     loop.tell(times=2)
-    assert loop.follower.course.position(loop.follower.stamp) == here + 2 * PERIOD
+    assert loop.controller.active.position(loop.controller.stamp) == here + 2 * PERIOD
 
 
 def test_a_clock_that_was_set_back_holds_the_climber_as_before():
     loop = Loop(safe_output="hold")
     loop.plan()
     loop.tell(times=20)
-    loop.follower.enable(False)
+    loop.controller.enable(False)
     loop.tell()
     real = loop.state
     loop.state = lambda stamp: State(real(stamp).pose, 2 * real(stamp).velocity)
@@ -193,9 +193,9 @@ def test_odometry_that_stops_with_a_clock_set_back_is_noticed(loop):
 
 
 def test_bad_odometry_is_safe_at_once(loop):
-    answer = loop.follower.on_bad_odometry(loop.now, "nan")
+    answer = loop.controller.on_bad_odometry(loop.now, "nan")
     assert answer.command is None
-    assert (loop.follower.mode, loop.follower.detail) == (Mode.BAD_ODOMETRY, "nan")
+    assert (loop.controller.mode, loop.controller.detail) == (Mode.BAD_ODOMETRY, "nan")
     assert loop.tell() is Mode.FOLLOWING
 
 
@@ -214,9 +214,9 @@ def test_a_single_wrong_odometry_never_reaches_the_wheels(loop):
 
 
 def test_a_fault_forgets_what_was_learnt(loop):
-    loop.follower.tracker.disturbance = Wrench(5.0, 1.0)
+    loop.controller.sampled_controller.disturbance = Wrench(5.0, 1.0)
     loop.tell(moved=(1.0, 0.0, 0.0))
-    np.testing.assert_array_equal(loop.follower.tracker.disturbance, 0)
+    np.testing.assert_array_equal(loop.controller.sampled_controller.disturbance, 0)
 
 
 def test_a_twist_of_zero_while_the_pose_moves_is_a_fault_until_there_is_one():
@@ -226,45 +226,45 @@ def test_a_twist_of_zero_while_the_pose_moves_is_a_fault_until_there_is_one():
     loop.state = lambda stamp: State(real(stamp).pose, np.zeros(3))
     while loop.tell() is Mode.FOLLOWING:
         assert loop.now < 2 * SECOND
-    assert loop.follower.mode is Mode.NO_TWIST
+    assert loop.controller.mode is Mode.NO_TWIST
     assert loop.tell() is Mode.NO_TWIST
     loop.state = real
     assert loop.tell() is Mode.FOLLOWING
 
 
 def test_disabled_it_is_safe_until_it_is_enabled(loop):
-    loop.follower.enable(False)
+    loop.controller.enable(False)
     assert loop.tell() is Mode.DISABLED
     assert is_safe(loop)
-    assert not loop.follower.mode.is_fault
-    loop.follower.enable(True)
+    assert not loop.controller.mode.is_fault
+    loop.controller.enable(True)
     assert loop.tell() is Mode.FOLLOWING
 
 
 def test_without_a_clock_it_follows_for_a_moment_only(loop):
-    assert loop.follower.mode is Mode.FOLLOWING
+    assert loop.controller.mode is Mode.FOLLOWING
     for _ in range(30):
-        answer = loop.follower.look(0)
-    assert loop.follower.mode is Mode.NO_CLOCK
+        answer = loop.controller.look(0)
+    assert loop.controller.mode is Mode.NO_CLOCK
     assert answer.command is None
 
 
 def test_a_clock_that_comes_right_after_the_first_odometry_is_in_time():
     loop = Loop()
     for _ in range(30):
-        loop.follower.look(0)
-    assert loop.follower.mode is Mode.NO_CLOCK
+        loop.controller.look(0)
+    assert loop.controller.mode is Mode.NO_CLOCK
     # a safe output would be an answer, with which lock-step would go on
-    assert loop.follower.on_odometry(0, loop.now, loop.state(loop.now)) is None
+    assert loop.controller.on_odometry(0, loop.now, loop.state(loop.now)) is None
 
 
 def test_hold_carries_the_weight_brakes_and_lets_the_brake_go_when_it_must_have_stopped():
     loop = Loop(safe_output="hold")
     loop.plan()
     loop.tell(times=20)
-    weight = loop.follower.tracker.controller.climber.weight_along_wall
+    weight = loop.controller.sampled_controller.law.climber.weight_along_wall
     heading = loop.state(loop.now).heading
-    loop.follower.enable(False)
+    loop.controller.enable(False)
     loop.tell()
     braking = loop.answer.torques.sum() / 0.027
     assert braking < weight * np.sin(heading) - 1.0
@@ -282,9 +282,9 @@ def test_a_new_reference_elsewhere_is_followed_within_the_limits(loop):
 def test_a_reference_far_away_is_refused_in_words_until_one_is_near(loop):
     loop.plan(Trajectory(Circle(), ConstantRate(rate=0.5), origin=(3.0, 4.0)))
     assert loop.tell() is Mode.TOO_FAR
-    assert loop.follower.mode.is_fault
+    assert loop.controller.mode.is_fault
     assert is_safe(loop)
-    assert loop.follower.detail.startswith("5.00 m, from (1.00, 0.0")
+    assert loop.controller.detail.startswith("5.00 m, from (1.00, 0.0")
     loop.plan()
     assert loop.tell() is Mode.FOLLOWING
 
@@ -308,7 +308,7 @@ def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source
         answer = None
         if kind == "odometry":
             shift, pose, velocity = details
-            answer = loop.follower.on_odometry(
+            answer = loop.controller.on_odometry(
                 loop.now, loop.now + shift // 10, State(pose, velocity)
             )
         elif kind == "reference":
@@ -320,15 +320,15 @@ def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source
                 preview.velocity + velocity,
                 preview.acceleration,
             )
-            answer = loop.follower.on_reference(loop.now, moved)
+            answer = loop.controller.on_reference(loop.now, moved)
         elif kind == "good":
-            answer = loop.follower.on_odometry(loop.now, loop.now, loop.state(loop.now))
+            answer = loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now))
         elif kind == "look":
-            answer = loop.follower.look(loop.now)
+            answer = loop.controller.look(loop.now)
         elif kind == "bad":
-            answer = loop.follower.on_bad_odometry(loop.now, "bad")
+            answer = loop.controller.on_bad_odometry(loop.now, "bad")
         else:
-            loop.follower.enable(kind == "enable")
+            loop.controller.enable(kind == "enable")
         if answer is not None:
             assert np.abs(answer.torques).max() <= 20.0  # and not nan
 
@@ -336,12 +336,12 @@ def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source
 def test_too_little_suction_stops_the_climber_until_it_is_back():
     loop = Loop(least_pressure=2000.0)
     loop.plan()
-    tracker = loop.follower.tracker
-    whole = tracker.controller
+    sampled_controller = loop.controller.sampled_controller
+    whole = sampled_controller.law
     assert loop.tell() is Mode.FOLLOWING
-    tracker.controller = replace(whole, climber=replace(whole.climber, suction_pressure=1999.0))
+    sampled_controller.law = replace(whole, climber=replace(whole.climber, suction_pressure=1999.0))
     assert loop.tell() is Mode.LOW_PRESSURE
-    assert loop.follower.mode.is_fault
+    assert loop.controller.mode.is_fault
     assert is_safe(loop)
-    tracker.controller = whole
+    sampled_controller.law = whole
     assert loop.tell() is Mode.FOLLOWING

@@ -50,10 +50,10 @@ def test_a_dead_motor_is_noticed_and_the_climber_comes_to_rest(side, scrubs, sin
 def test_a_dead_wheel_is_named_and_waits_for_somebody():
     climb = deepcopy(healthy(False, 13.0))
     climb.run(12.0, motors=dead(0, 13.0))
-    assert climb.follower.mode is Mode.DEAD_WHEEL
-    assert climb.follower.detail.startswith("the right one, at ")
-    assert climb.follower.detail.endswith("~/enable to go on")
-    climb.follower.enable(True)
+    assert climb.controller.mode is Mode.DEAD_WHEEL
+    assert climb.controller.detail.startswith("the right one, at ")
+    assert climb.controller.detail.endswith("~/enable to go on")
+    climb.controller.enable(True)
     climb.run(10.0)
     assert climb.follows()
     assert climb.off_the_path(since=climb.time - 1.0) < 0.02
@@ -62,16 +62,16 @@ def test_a_dead_wheel_is_named_and_waits_for_somebody():
 def test_motors_that_are_too_weak_stall_safely_and_give_up_after_some_attempts():
     climb = deepcopy(healthy(False, 7.0))
     climb.run(20.0, motors=lambda _, torques: 0.1 * torques)
-    assert climb.follower.mode in (Mode.STALLED, Mode.DISTURBED)
-    assert climb.follower.detail.endswith("~/enable to go on")
+    assert climb.controller.mode in (Mode.STALLED, Mode.DISTURBED)
+    assert climb.controller.detail.endswith("~/enable to go on")
     assert climb.fastest(7.0) < climb.reference_speed
 
 
 @pytest.mark.parametrize("turned", [0.0, 3.1, 1.6], ids=["ahead", "back", "around"])
 def test_a_push_is_ridden_out_and_the_path_goes_on_where_it_was_left(turned):
     climb = deepcopy(healthy(False, 7.0))
-    course = climb.state.heading + turned
-    climb.run(0.3, push=150.0 * np.array([np.cos(course), np.sin(course), 0.02]))
+    active = climb.state.heading + turned
+    climb.run(0.3, push=150.0 * np.array([np.cos(active), np.sin(active), 0.02]))
     climb.run(40.0)
     assert climb.follows()
     assert climb.off_the_path(since=climb.time - 5.0) < 0.02
@@ -103,7 +103,7 @@ def test_a_speed_is_a_fault_only_where_two_odometries_in_a_row_tell_it():
 def test_each_check_can_be_switched_off(option, switched_off):
     climb = Climb(**{f"guard.{option}": 0.0}).run(2.0)
     climb.run(0.02, odometry=lambda _, state: State.rolling(state.pose, 0.8, state.yaw_rate))
-    assert (climb.follower.mode is not Mode.TOO_FAST) == switched_off
+    assert (climb.controller.mode is not Mode.TOO_FAST) == switched_off
 
 
 def test_faults_count_for_a_while_only():

@@ -9,13 +9,13 @@ from identification_experiments import SCENARIOS
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 
 BUILT = SCENARIOS["climber.yaml"]
@@ -24,12 +24,12 @@ ENCODERS = Link(encoder_counts=4096, delay=0.005, torque_lag=0.005)
 
 def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, **timing):
     """Run of climber.yaml's climber, and the controller after it."""
-    controller = Controller(BUILT.believed, guidance, Law())
-    tracker = Tracker(controller, Observer(), Timing(**timing), Pacing())
-    follower = Follower(tracker, Safety(), ANYWHERE, UNGUARDED)
-    run = simulate(BUILT.trajectory, BUILT.start, duration, follower, climber, link)
-    assert follower.mode is Mode.FOLLOWING
-    return run, follower.tracker
+    law = ControlLaw(BUILT.believed, guidance, ControlOptions())
+    sampled_controller = SampledController(law, Observer(), Timing(**timing), Pacing())
+    controller = Controller(sampled_controller, Safety(), ANYWHERE, UNGUARDED)
+    run = simulate(BUILT.trajectory, BUILT.start, duration, controller, climber, link)
+    assert controller.mode is Mode.FOLLOWING
+    return run, controller.sampled_controller
 
 
 @pytest.mark.slow
@@ -73,11 +73,11 @@ def test_a_model_that_is_wrong_as_well_ends_in_no_limit_cycle(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [0.03, 0.04])
 def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
-    run, tracker = drive(Link(delay=delay), duration=15.0)
+    run, sampled_controller = drive(Link(delay=delay), duration=15.0)
     assert run.rms() < 5e-3
     assert run.chatter(10.0) < 0.05
     assert (
-        delay - 0.021 < tracker.latency.delay < 1.3 * delay
+        delay - 0.021 < sampled_controller.latency.delay < 1.3 * delay
     )  # what is beyond the margin, at least
     lost, _ = drive(Link(delay=delay), learn_delay=False)
     assert lost.chatter(4.0) > 0.5
@@ -86,9 +86,11 @@ def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
 @pytest.mark.slow
 def test_a_delay_that_is_told_but_not_there_is_unlearnt():
     """Of encoders with a slow period, where it would not be borne."""
-    run, tracker = drive(replace(ENCODERS, period=0.02), transport_delay=0.05, duration=15.0)
+    run, sampled_controller = drive(
+        replace(ENCODERS, period=0.02), transport_delay=0.05, duration=15.0
+    )
     assert run.chatter(10.0) < 0.05
-    assert tracker.latency.delay <= 0
+    assert sampled_controller.latency.delay <= 0
 
 
 @pytest.mark.slow
@@ -96,8 +98,8 @@ def test_a_delay_that_is_told_but_not_there_is_unlearnt():
 def test_friction_that_is_wrong_is_taken_for_no_delay(share):
     coefficient = share * BUILT.believed.seal_friction_coefficient
     true = replace(BUILT.believed, seal_friction_coefficient=coefficient)
-    _, tracker = drive(Link(), climber=true)
-    assert tracker.latency.delay < 2e-3
+    _, sampled_controller = drive(Link(), climber=true)
+    assert sampled_controller.latency.delay < 2e-3
 
 
 def test_an_acceleration_oscillates_once_it_has_gone_to_and_fro_often():

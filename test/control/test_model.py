@@ -3,18 +3,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.control.model import Learnt, Observer, rolled
+from climber_uk.control.model import DisturbanceEstimate, Observer, predict
 from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.motion import Torques, Wrench, forces, torques
+from climber_uk.mechanics.motion import Torques, Wrench, torques, wrench_of_torques
 from climber_uk.simulation.plant import Plant
 
 CLIMBER = Climber()
-STILL, NONE, NOTHING = Torques(0.0, 0.0), Wrench(0.0, 0.0), Learnt()
+STILL, NONE, NOTHING = Torques(0.0, 0.0), Wrench(0.0, 0.0), DisturbanceEstimate()
 
 
 def after(climber, motion, wheels, disturbance, time):
-    drive, turn = forces(climber, *wheels)
-    return rolled(climber, motion, drive + disturbance.drive, turn + disturbance.turn, time)
+    drive, turn = wrench_of_torques(climber, *wheels)
+    return predict(climber, motion, drive + disturbance.drive, turn + disturbance.turn, time)
 
 
 @given(
@@ -87,5 +87,7 @@ def test_what_friction_holds_teaches_nothing():
 def test_switched_off_it_forgets(source):
     observer = Observer(bandwidth=0.0, velocity_source=source)
     rolling = State.rolling(np.zeros(3), 1.0, 0.0)
-    _, _, found = learn(observer, SLIPPERY, SLIPPERY, rolling, STILL, Learnt(9.0, 1.0), 400)
+    _, _, found = learn(
+        observer, SLIPPERY, SLIPPERY, rolling, STILL, DisturbanceEstimate(9.0, 1.0), 400
+    )
     np.testing.assert_allclose(found, 0, atol=1e-3)

@@ -5,11 +5,11 @@ import pytest
 
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.constraints import Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import SPEED_TIME, Mode, Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber, State
@@ -55,16 +55,18 @@ def test_a_heading_a_turn_away_is_none_and_what_is_not_finite_has_jumped():
     assert Safety().has_jumped(HERE, elsewhere(speed=math.inf), HALF_TRACK)
 
 
-def follower(now=SECOND, **safety):
+def controller(now=SECOND, **safety):
     """A follower that has answered an odometry of 1 s on its path, and the climber's state."""
-    tracker = Tracker(Controller(Climber(), Guidance(), Law()), Observer(), Timing(), Pacing())
-    follower = Follower(tracker, Safety(**safety))
-    follower.on_reference(now, sampled(CIRCLE, 10.0))
+    sampled_controller = SampledController(
+        ControlLaw(Climber(), Guidance(), ControlOptions()), Observer(), Timing(), Pacing()
+    )
+    controller = Controller(sampled_controller, Safety(**safety))
+    controller.on_reference(now, sampled(CIRCLE, 10.0))
     start = CIRCLE.at(0.0)
     state = State(start.pose, start.velocity)
-    follower.on_odometry(now, SECOND, state)
-    assert follower.mode is Mode.FOLLOWING
-    return follower, state
+    controller.on_odometry(now, SECOND, state)
+    assert controller.mode is Mode.FOLLOWING
+    return controller, state
 
 
 @pytest.mark.parametrize(
@@ -76,13 +78,13 @@ def follower(now=SECOND, **safety):
     ],
 )
 def test_a_fault_forgets_what_was_learnt_of_disturbances(fault, mode):
-    following, state = follower()
+    following, state = controller()
     faster = State(state.pose, 1.02 * state.velocity)
     following.on_odometry(SECOND, SECOND + 5 * MILLISECOND, faster)
-    assert any(following.tracker.disturbance[:2])
+    assert any(following.sampled_controller.disturbance[:2])
     fault(following)
     assert following.mode is mode
-    assert not any(following.tracker.disturbance)
+    assert not any(following.sampled_controller.disturbance)
 
 
 @pytest.mark.parametrize(("older", "is_ignored"), [(1, True), (99, True), (101, False)])
@@ -90,7 +92,7 @@ def test_odometry_is_overtaken_within_its_timeout_and_beyond_it_time_has_started
     older, is_ignored
 ):
     """Without a clock, by which it would be refused."""
-    following, state = follower(now=0, odometry_timeout=0.1)
+    following, state = controller(now=0, odometry_timeout=0.1)
     moved = State(state.pose + 0.01, state.velocity)
     following.on_odometry(0, SECOND - older * MILLISECOND, moved)
     assert (following.state.pose[0] == state.pose[0]) == is_ignored

@@ -6,12 +6,12 @@ import pytest
 from climber_uk.closed_loop.simulate import Link, sampled, simulate
 from climber_uk.control.approach import ANYWHERE, Approach
 from climber_uk.control.constraints import Exact, Guidance
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber, State
@@ -33,14 +33,20 @@ BUILT = Climber(
 )
 BUILT_GAINS = Guidance(cross_track_gain=3.0, fade_speed=0.1)
 FIXED_MODEL = Observer(bandwidth=0.0)
-GUIDANCE, LAW, OBSERVER, TIMING, PACING = Guidance(), Law(), Observer(), Timing(), Pacing()
+GUIDANCE, LAW, OBSERVER, TIMING, PACING = (
+    Guidance(),
+    ControlOptions(),
+    Observer(),
+    Timing(),
+    Pacing(),
+)
 SAFETY, IDEAL = Safety(), Link()
 
 
-def follower(
+def controller(
     climber=CLIMBER,
     constraints=GUIDANCE,
-    law=LAW,
+    options=LAW,
     observer=OBSERVER,
     timing=TIMING,
     pacing=PACING,
@@ -48,8 +54,8 @@ def follower(
     approach=None,
     guard=None,
 ):
-    controller = Controller(climber, constraints, law)
-    return Follower(Tracker(controller, observer, timing, pacing), safety, approach, guard)
+    law = ControlLaw(climber, constraints, options)
+    return Controller(SampledController(law, observer, timing, pacing), safety, approach, guard)
 
 
 def lap(controlling, climber=CLIMBER, link=IDEAL, duration=10.0):
@@ -58,50 +64,52 @@ def lap(controlling, climber=CLIMBER, link=IDEAL, duration=10.0):
 
 @pytest.mark.parametrize("constraints", [Guidance(), Exact()], ids=["guidance", "exact"])
 def test_the_papers_ellipse_is_tracked_to_hundredths_of_a_millimetre(constraints):
-    run = lap(follower(constraints=constraints), duration=20.0)
+    run = lap(controller(constraints=constraints), duration=20.0)
     assert run.rms() <= 0.02e-3
     assert run.distance.max() <= 0.05e-3
 
 
 def test_prediction_takes_the_error_of_holding_a_torque_away():
-    def error(law=LAW, delay=0.0, known=True):
+    def error(options=LAW, delay=0.0, known=True):
         timing = Timing(transport_delay=delay * known)
-        run = lap(follower(law=law, timing=timing, observer=FIXED_MODEL), link=Link(delay=delay))
+        run = lap(
+            controller(options=options, timing=timing, observer=FIXED_MODEL), link=Link(delay=delay)
+        )
         return run.rms(after=1.0)
 
-    assert error() < error(Law(predict=False)) / 50
+    assert error() < error(ControlOptions(predict=False)) / 50
     assert error(delay=0.005) < error(delay=0.005, known=False) / 50
 
 
 def test_the_delay_that_the_clock_shows_need_not_be_known():
     late = Link(jitter=0.02)
-    measured = lap(follower(observer=FIXED_MODEL), link=late).rms(after=2.0)
-    ignored = lap(follower(observer=FIXED_MODEL, timing=Timing(measure_delay=False)), link=late)
+    measured = lap(controller(observer=FIXED_MODEL), link=late).rms(after=2.0)
+    ignored = lap(controller(observer=FIXED_MODEL, timing=Timing(measure_delay=False)), link=late)
     assert measured < ignored.rms(after=2.0) / 3
 
 
 @pytest.mark.parametrize("share", [0.5, 1.5])
 def test_friction_that_is_not_known_is_learnt(share):
     other = replace(CLIMBER, seal_friction_coefficient=0.8 * share)
-    ours = follower()
+    ours = controller()
     assert lap(ours, other).rms(after=2.0) < 0.02e-3
     more = other.seal_friction - CLIMBER.seal_friction
-    assert ours.tracker.disturbance[0] == pytest.approx(-more, abs=0.1)
-    assert lap(follower(observer=FIXED_MODEL), other).rms(after=2.0) > 0.1
+    assert ours.sampled_controller.disturbance[0] == pytest.approx(-more, abs=0.1)
+    assert lap(controller(observer=FIXED_MODEL), other).rms(after=2.0) > 0.1
 
 
 def test_mass_and_inertia_may_be_off_by_a_fifth():
     other = replace(CLIMBER, mass=6.0, yaw_inertia=1.2 * 0.33)
-    assert lap(follower(), other).rms() < 1e-3
+    assert lap(controller(), other).rms() < 1e-3
 
 
 def test_odometry_may_be_noisy():
     noise = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
-    assert lap(follower(), link=noise).rms() < 1e-3
+    assert lap(controller(), link=noise).rms() < 1e-3
 
 
 def test_odometry_may_be_lost_and_late():
-    ours = follower()
+    ours = controller()
     run = lap(ours, link=Link(loss=0.3, jitter=0.02))
     assert run.rms() < 2e-3
     assert ours.mode is Mode.FOLLOWING
@@ -111,16 +119,16 @@ def test_odometry_may_be_lost_and_late():
 def test_odometry_may_come_at_other_rates(period):
     eight = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))
     start = State(np.array([0.0, 3.0, np.pi / 4]), np.zeros(3))
-    ours = follower(BUILT, BUILT_GAINS)
+    ours = controller(BUILT, BUILT_GAINS)
     run = simulate(eight, start, 10.0, ours, BUILT, Link(step=0.001, period=period))
     assert run.rms() < 1e-3
-    assert ours.tracker.period == pytest.approx(period, rel=1e-6)
+    assert ours.sampled_controller.period == pytest.approx(period, rel=1e-6)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_odometry_may_lack_the_twist(noise):
     link = Link(with_twist=False, position_noise=noise, heading_noise=noise)
-    ours = follower(observer=Observer(velocity_source="pose"))
+    ours = controller(observer=Observer(velocity_source="pose"))
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
     run = simulate(RAMPED, start, 10.0, ours, CLIMBER, link)
     assert run.rms(after=2.0) < 1e-3
@@ -128,7 +136,7 @@ def test_odometry_may_lack_the_twist(noise):
 
 
 def test_a_missing_twist_is_noticed():
-    ours = follower()
+    ours = controller()
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
     simulate(RAMPED, start, 3.0, ours, CLIMBER, Link(with_twist=False))
     assert ours.mode is Mode.NO_TWIST
@@ -141,7 +149,7 @@ def test_guidance_comes_back_from_far_off_without_spinning(seed):
     weak = replace(CLIMBER, max_wheel_torque=4.0)
     offset = np.array([*random.uniform(-0.5, 0.5, 2), random.uniform(-1, 1)])
     start = State(RAMPED.at(0.0).pose + offset, np.zeros(3))
-    run = simulate(RAMPED, start, 4.0, follower(weak), weak)
+    run = simulate(RAMPED, start, 4.0, controller(weak), weak)
     assert run.distance[run.time >= 3.0].max() < 0.01
     assert np.abs(run.error[:, 2]).max() < np.pi / 2
     assert np.abs(run.torques).max() <= 4.0
@@ -153,7 +161,7 @@ def test_a_slow_climber_comes_to_a_new_path_from_anywhere_on_the_old_one(time):
     eight = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))
     circle = Trajectory(Circle(0.5), RestToRest(rate=0.4, ramp_time=1.0), origin=(-0.5, 3.0))
     start = State(eight.at(time).pose, np.zeros(3))
-    ours = follower(BUILT, BUILT_GAINS, approach=Approach(max_distance=0.1, approach_speed=0.3))
+    ours = controller(BUILT, BUILT_GAINS, approach=Approach(max_distance=0.1, approach_speed=0.3))
     run = simulate(circle, start, 40.0, ours, BUILT)
     off_the_circle = np.hypot(run.pose[:, 0] + 0.5, run.pose[:, 1] - 3.0) - 0.5
     assert np.abs(off_the_circle[run.time > 35.0]).max() < 2e-3
@@ -166,7 +174,7 @@ def test_a_reference_that_has_left_is_approached_and_followed():
     start = State(np.array([3.0, 0.0, 2.0]), np.zeros(3))  # the reference has left at 10 m/s
     weak = replace(CLIMBER, max_wheel_torque=4.0)
     there = Approach(max_start_distance=10.0, approach_speed=2.0, approach_yaw_rate=2.0)
-    ours = follower(weak, approach=there)
+    ours = controller(weak, approach=there)
     run = simulate(PAPER, start, 30.0, ours, weak)
     assert ours.mode is Mode.FOLLOWING
     assert off_the_ellipse(run)[run.time > 25.0].max() < 1e-3
@@ -180,7 +188,7 @@ def test_it_stops_where_it_shall_and_reverses_there(share, most):
     line = Trajectory(Line(1.0, 0.5), RestToRest(rate=0.2, ramp_time=1.0, runs=2, pause=2.0))
     true = replace(BUILT, seal_friction_coefficient=0.6 * share)
     start = State(line.at(0.0).pose, np.zeros(3))
-    run = simulate(line, start, 16.0, follower(BUILT, BUILT_GAINS), true)
+    run = simulate(line, start, 16.0, controller(BUILT, BUILT_GAINS), true)
     for rests in (run.time > 6.5) & (run.time < 7.9), run.time > 14.5:
         assert run.distance[rests].max() < 0.2e-3
         assert np.abs(run.velocity[rests]).max() < 1e-9
@@ -193,8 +201,10 @@ def too_weak(controlling, weak, until):
 
     def climber(time):
         now = weak if 5.0 <= time < until else CLIMBER
-        if controlling.tracker.controller.climber is not now:
-            controlling.tracker.controller = replace(controlling.tracker.controller, climber=now)
+        if controlling.sampled_controller.law.climber is not now:
+            controlling.sampled_controller.law = replace(
+                controlling.sampled_controller.law, climber=now
+            )
         return now
 
     return simulate(PAPER, START, 25.0, controlling, climber)
@@ -210,19 +220,19 @@ def off_the_ellipse(run):
 
 def test_with_too_little_torque_it_stays_on_the_path_and_lags_along_it():
     weak = replace(CLIMBER, max_wheel_torque=0.7 * 1.5583)
-    run = too_weak(follower(), weak, until=7.0)
+    run = too_weak(controller(), weak, until=7.0)
     assert off_the_ellipse(run).max() < 0.05
     assert run.error[:, 0].min() < -3.0  # it really was too weak
     after = run.time > 7.5
     assert run.error[after, 0].max() < 0.1
     assert run.distance[-1] < 1e-2
-    alone = follower(pacing=Pacing(catch_up=0.0), approach=ANYWHERE, guard=UNGUARDED)
+    alone = controller(pacing=Pacing(catch_up=0.0), approach=ANYWHERE, guard=UNGUARDED)
     unpaced = too_weak(alone, weak, until=7.0)
     assert off_the_ellipse(unpaced).max() > 0.5  # what pacing is for
 
 
 def test_stalled_it_waits_on_the_path_without_chatter():
-    ours = follower(guard=UNGUARDED)
+    ours = controller(guard=UNGUARDED)
     run = too_weak(ours, replace(CLIMBER, max_wheel_torque=0.3), until=99.0)
     last = run.time > 20.0
     assert np.abs(np.diff(run.torques[last], axis=0)).max() < 1e-3
@@ -233,46 +243,50 @@ def test_gains_change_without_a_jump_of_the_torque():
     before, after = Guidance(), Guidance(along_track_gain=6.0, heading_frequency=20.0)
 
     def steps(change):
-        ours = follower(constraints=before)
+        ours = controller(constraints=before)
         offset = State(START.pose + np.array([-0.05, 0.05, 0.1]), START.velocity)
-        tracker = ours.tracker
-        tracker.see(SECOND, offset.motion)
+        sampled_controller = ours.sampled_controller
+        sampled_controller.see(SECOND, offset.motion)
         preview = sampled(PAPER, 1.0)
-        old = tracker.answer(preview, 0.0).torques
-        change(tracker)
+        old = sampled_controller.answer(preview, 0.0).torques
+        change(sampled_controller)
         stamp = SECOND + 5_000_000
-        tracker.see(stamp, tracker.expected_at(stamp))
-        return np.abs(tracker.answer(preview, 0.0).torques - old).max()
+        sampled_controller.see(stamp, sampled_controller.expected_at(stamp))
+        return np.abs(sampled_controller.answer(preview, 0.0).torques - old).max()
 
-    def retune(tracker):
-        controller = replace(tracker.controller, constraints=after)
-        tracker.retune(controller, tracker.observer, tracker.timing, tracker.pacing)
+    def retune(sampled_controller):
+        law = replace(sampled_controller.law, constraints=after)
+        sampled_controller.retune(
+            law, sampled_controller.observer, sampled_controller.timing, sampled_controller.pacing
+        )
 
-    def replace_at_once(tracker):
-        tracker.controller = replace(tracker.controller, constraints=after)
+    def replace_at_once(sampled_controller):
+        sampled_controller.law = replace(sampled_controller.law, constraints=after)
 
     assert steps(retune) < steps(lambda _: None) + 0.01 * steps(replace_at_once)
 
 
 def test_changed_gains_act_in_full_half_a_second_later():
-    ours = follower()
-    tracker = ours.tracker
-    tracker.see(SECOND, START.motion)
-    changed = replace(tracker.controller, constraints=Guidance(along_track_gain=6.0))
-    tracker.retune(changed, tracker.observer, tracker.timing, tracker.pacing)
-    assert tracker._constraints().along_track_gain == 5.0
-    tracker.stamp += SECOND // 4
-    assert tracker._constraints().along_track_gain == pytest.approx(5.5)
-    tracker.stamp += SECOND // 4
-    assert tracker._constraints() is changed.constraints
+    ours = controller()
+    sampled_controller = ours.sampled_controller
+    sampled_controller.see(SECOND, START.motion)
+    changed = replace(sampled_controller.law, constraints=Guidance(along_track_gain=6.0))
+    sampled_controller.retune(
+        changed, sampled_controller.observer, sampled_controller.timing, sampled_controller.pacing
+    )
+    assert sampled_controller._constraints().along_track_gain == 5.0
+    sampled_controller.stamp += SECOND // 4
+    assert sampled_controller._constraints().along_track_gain == pytest.approx(5.5)
+    sampled_controller.stamp += SECOND // 4
+    assert sampled_controller._constraints() is changed.constraints
 
 
 def test_a_torque_limit_does_not_wind_the_observer_up():
     weak = replace(CLIMBER, max_wheel_torque=0.9)
-    ours = follower(weak)
+    ours = controller(weak)
     lap(ours, replace(weak, seal_friction_coefficient=1.0), duration=3.0)
     more = 0.2 * 0.47 * 150
-    assert abs(ours.tracker.disturbance[0]) < 2 * more
+    assert abs(ours.sampled_controller.disturbance[0]) < 2 * more
 
 
 def test_times_without_sense_are_refused():

@@ -1,13 +1,13 @@
 import pytest
 
-from climber_uk.control.torque_history import Acting
+from climber_uk.control.torque_history import TorqueHistory
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.motion import Torques
 
 
 @pytest.fixture
 def acting():
-    acting = Acting()
+    acting = TorqueHistory()
     for second, torque in ((1, 1.0), (2, 2.0), (4, 3.0)):
         acting.add(second * SECOND, Torques(torque, torque))
     return acting
@@ -45,5 +45,5 @@ def test_after_a_restart_the_last_torques_have_always_acted(acting):
 
 
 def test_nothing_is_known_at_first():
-    assert not Acting().are_known_since(0)
-    assert Acting().last == (0, 0)
+    assert not TorqueHistory().are_known_since(0)
+    assert TorqueHistory().last == (0, 0)

@@ -5,11 +5,11 @@ import pytest
 from identification_experiments import SCENARIOS
 
 from climber_uk.closed_loop.simulate import Link, simulate
-from climber_uk.control.control_law import Controller, Law
-from climber_uk.control.controller import Follower
+from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import Timing, Tracker
+from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.twist import mean_twist
 from climber_uk.mechanics.climber import State
@@ -18,11 +18,11 @@ BUILT = SCENARIOS["climber.yaml"]
 
 
 def driven(link, twist="auto", duration=4.0):
-    controller = Controller(BUILT.believed, BUILT.guidance, Law())
+    law = ControlLaw(BUILT.believed, BUILT.guidance, ControlOptions())
     observer, timing = Observer(twist=twist), Timing(learn_delay=False)
-    follower = Follower(Tracker(controller, observer, timing, Pacing()), Safety())
-    run = simulate(BUILT.trajectory, BUILT.start, duration, follower, BUILT.believed, link)
-    return run, follower.tracker
+    controller = Controller(SampledController(law, observer, timing, Pacing()), Safety())
+    run = simulate(BUILT.trajectory, BUILT.start, duration, controller, BUILT.believed, link)
+    return run, controller.sampled_controller
 
 
 def test_a_mean_twist_leads_from_one_pose_to_the_other():
@@ -49,8 +49,8 @@ def test_a_mean_twist_leads_from_one_pose_to_the_other():
     ids=["truth", "noise", "noise of the twist", "few counts", "many counts"],
 )
 def test_it_is_told_which_twist_odometry_has(period, link, is_mean):
-    _, tracker = driven(Link(period=period, **link))
-    assert tracker.twist.is_mean is is_mean
+    _, sampled_controller = driven(Link(period=period, **link))
+    assert sampled_controller.twist.is_mean is is_mean
 
 
 def test_a_mean_twist_taken_for_one_of_its_stamp_costs_the_margin_of_slow_odometry():

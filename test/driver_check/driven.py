@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from climber_uk.driver_check import listening
-from climber_uk.driver_check.evidence import Arrival, Endpoint, Evidence, Expected, Graph
+from climber_uk.driver_check.evidence import Arrival, Endpoint, Evidence, ExpectedDriver, Graph
 from climber_uk.driver_check.trial import Bounds, Trial
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber, State
@@ -13,7 +13,7 @@ from climber_uk.mechanics.contact import Contact
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
-from climber_uk.simulation.simulated_robot import Machine, Parts, Physics
+from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 CLIMBER = Climber(
     seal_friction_coefficient=0.6,
@@ -63,7 +63,7 @@ def arrived(message, age=0):
 
 
 def evidence(arrivals, trial=None, graph=ALONE, **others):
-    given = {"expected": Expected(), "frames": FRAMES, "use_sim_time": False, **others}
+    given = {"expected": ExpectedDriver(), "frames": FRAMES, "use_sim_time": False, **others}
     return Evidence(CLIMBER, graph=graph, arrivals=arrivals, trial=trial, **given)
 
 
@@ -76,7 +76,7 @@ def tried(
     """
     contact = Contact() if law is None else Contact(friction=law)
     parts = Parts(Plant(climber, PERIOD / 2, contact), Motors(), sensors or Sensors(), Physics())
-    machine = Machine(parts, start, PERIOD)
+    machine = SimulatedRobot(parts, start, PERIOD)
     heard, coming, trial = [], [np.zeros(2)] * late, None
     missed = []
     for number in range(4000):

@@ -9,7 +9,7 @@ import pytest
 from driven import ALONE, DRIVER, MOTOR, arrived, evidence, odometry
 
 from climber_uk.driver_check import checks, listening, moving, report, timing
-from climber_uk.driver_check.evidence import Expected
+from climber_uk.driver_check.evidence import ExpectedDriver
 from climber_uk.driver_check.report import Verdict
 from climber_uk.mechanics import SECOND
 
@@ -195,7 +195,7 @@ def test_odometry_must_be_fresh(age, wanted):
     found = timing.age(with_arrivals(age))
     assert found.verdict is wanted
     assert found.values["age"] == pytest.approx(age)
-    patient = Expected(odometry_timeout=10.0)
+    patient = ExpectedDriver(odometry_timeout=10.0)
     assert timing.age(with_arrivals(abs(age), expected=patient)).verdict is PASS
 
 

@@ -19,7 +19,7 @@ from climber_uk.parameters.parameter_file import Values, read_file
 
 SIDES = "right", "left"
 CONFIG = Path(__file__).parents[2] / "config" / "climber.yaml"
-LIMITS = excitation.Limits(size=1.0, speed=0.2, duration=20.0)
+LIMITS = excitation.ExcitationLimits(size=1.0, speed=0.2, duration=20.0)
 
 
 def run(monkeypatch, *arguments):

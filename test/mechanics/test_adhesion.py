@@ -4,11 +4,19 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from climber_uk.mechanics.adhesion import ADHESION, AMPLE, Grip, Hold, Magnetic, NoAdhesion, Suction
+from climber_uk.mechanics.adhesion import (
+    ADHESION,
+    MAX_MARGIN,
+    Attachment,
+    Grip,
+    Magnetic,
+    NoAdhesion,
+    Suction,
+)
 from climber_uk.mechanics.climber import GRAVITY, Climber
 
 PAPER = Climber()  # P S = 150 N, k = 0.53
-HELD = Hold()
+HELD = Attachment()
 
 
 def test_the_papers_wheels_carry_k_p_s_and_its_seal_rubs_with_f():
@@ -30,10 +38,10 @@ def test_wheels_never_pull_at_the_wall():
 
 
 def test_without_seal_all_adhesion_is_on_the_wheels():
-    magnetic = Hold(adhesion=Magnetic(force_at_contact=200.0))
+    magnetic = Attachment(adhesion=Magnetic(force_at_contact=200.0))
     assert magnetic.wheel_load(PAPER, 0.0) == pytest.approx(200.0)
     assert magnetic.seal_friction(PAPER) == 0
-    on_floor = Hold(adhesion=NoAdhesion())
+    on_floor = Attachment(adhesion=NoAdhesion())
     assert on_floor.wheel_load(PAPER, GRAVITY) == pytest.approx(49.05)
 
 
@@ -63,7 +71,7 @@ def test_without_lag_the_pressure_is_the_pumps():
 def test_the_slip_margin_is_that_by_hand():
     # 0.8 · 79.5 N / √(30² + 40²) N
     assert HELD.slip_margin(PAPER, 0.0, 30.0, -40.0) == pytest.approx(1.272)
-    assert HELD.slip_margin(PAPER, 0.0, 0.0, 0.0) == AMPLE
+    assert HELD.slip_margin(PAPER, 0.0, 0.0, 0.0) == MAX_MARGIN
 
 
 def test_the_tip_margin_is_that_by_hand_and_one_at_the_critical_pressure():
@@ -79,9 +87,14 @@ def test_a_margin_of_nothing_held_is_below_one():
     loose = replace(PAPER, suction_pressure=0.0)
     assert HELD.slip_margin(loose, 0.0, 1.0, 0.0) == 0
     assert HELD.tip_margin(loose, -GRAVITY, 1.0) < 0
-    assert HELD.tip_margin(loose, -GRAVITY, 0.0) == -AMPLE  # it falls, and need not tip for that
+    assert (
+        HELD.tip_margin(loose, -GRAVITY, 0.0) == -MAX_MARGIN
+    )  # it falls, and need not tip for that
     none = np.zeros(2)
-    assert HELD.tip_margin(loose, np.array([-GRAVITY, GRAVITY]), none).tolist() == [-AMPLE, AMPLE]
+    assert HELD.tip_margin(loose, np.array([-GRAVITY, GRAVITY]), none).tolist() == [
+        -MAX_MARGIN,
+        MAX_MARGIN,
+    ]
 
 
 def test_margins_of_many_are_those_of_each():

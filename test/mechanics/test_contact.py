@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from climber_uk.mechanics.adhesion import Grip, Hold, Magnetic
+from climber_uk.mechanics.adhesion import Attachment, Grip, Magnetic
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import LOCOMOTION, Contact, Tracked
 
@@ -23,5 +23,5 @@ def test_a_contact_holds_as_its_hold_alone_whatever_it_runs_on():
     hold = {"adhesion": Magnetic(200.0), "grip": Grip(0.5)}
     contact, climber = Contact(**hold, locomotion=Tracked()), Climber()
     drive, lateral = np.array([[3.0, -20.0], [0.0, 50.0]])
-    expected = Hold(**hold).slip_margin(climber, GRAVITY, drive, lateral)
+    expected = Attachment(**hold).slip_margin(climber, GRAVITY, drive, lateral)
     np.testing.assert_array_equal(contact.slip_margin(climber, GRAVITY, drive, lateral), expected)

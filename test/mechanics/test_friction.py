@@ -37,9 +37,9 @@ def test_levels_are_those_by_hand():
 @pytest.mark.parametrize("speed", [1e-4, 0.01, 0.03, 1.0])
 def test_bristles_that_bend_no_more_rub_as_stribeck_says(speed):
     law = LuGre(viscous=0.4)
-    bent = speed / law.relaxation(speed)  # ż = 0
+    deflection = speed / law.relaxation(speed)  # ż = 0
     stribeck = Stribeck(viscous=0.4).level(F, speed)
-    assert law.force(F, speed, bent, 0.0) == pytest.approx(stribeck, rel=1e-12)
+    assert law.force(F, speed, deflection, 0.0) == pytest.approx(stribeck, rel=1e-12)
 
 
 def test_bristles_first_act_as_a_spring():

@@ -14,7 +14,7 @@ from std_msgs.msg import Float64MultiArray
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.plant_simulator import PlantSimulator
 from climber_uk.ros.running import BEST_EFFORT, run
-from climber_uk.simulation.command_buffer import Schedule
+from climber_uk.simulation.command_buffer import CommandBuffer
 
 
 class Driver(PlantSimulator):
@@ -162,7 +162,7 @@ ODOMETRY = {
 
 
 def no_watchdog(driver):
-    driver.commands = Schedule(0)
+    driver.commands = CommandBuffer(0)
 
 
 def wrong_type(driver):

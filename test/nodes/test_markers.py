@@ -12,7 +12,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.reference import Reference
 from climber_uk.messages import reading, writing
-from climber_uk.ros.running import SLOW
+from climber_uk.ros.running import PUBLISH_PERIOD
 
 pytestmark = pytest.mark.nodes
 NAMESPACE, FRAMES = "climber_1", ("climber_1/odom", "climber_1/base_link")
@@ -94,7 +94,7 @@ def test_all_that_is_told_is_drawn_in_the_namespace_and_what_is_old_is_not(world
     (force,) = (points(arrow) for arrow in seen["constraint_force"])
     np.testing.assert_allclose(force, [(1, 2), (1 + 60 * 0.005, 2 - 20 * 0.005)])
     stamps = [reading.nanoseconds(array.markers[0].header.stamp) for array in drawn]
-    assert len(stamps) <= (stamps[-1] - stamps[0]) / SLOW + 2  # told 5 times as often
+    assert len(stamps) <= (stamps[-1] - stamps[0]) / PUBLISH_PERIOD + 2  # told 5 times as often
 
     silent = set(tell.publishers) - {"odom"}
     world.wait(lambda: tell(but=silent) or counts() == {"climber": 4, "way": 1}, "what is left")

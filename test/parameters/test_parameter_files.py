@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.parameters.parameter_file import Values, read_argument, read_file
-from climber_uk.ros.parameters import Parameters
+from climber_uk.ros.parameters import NodeParameters
 
 SCALARS = """\
 5 5. 5.0 .5 -.5 +5 5e0 8e3 33e-2 1E5 1e+5 -1e-5 5.e3 08 010 -010 0x1F 0x1p3 0o17 0b1 1_000 1:30 00
@@ -49,7 +49,7 @@ def test_a_parameter_is_taken_under_its_former_name_with_a_remark(given, length)
     context = Context()
     rclpy.init(args=arguments, context=context)
     node = Node("x", context=context, start_parameter_services=False, enable_rosout=False)
-    parameters = Parameters(node, arguments)
+    parameters = NodeParameters(node, arguments)
     parameters.declare(Renamed, "part.")
     parameters.refuse_unknown()
     assert parameters.read(Renamed, "part.") == Renamed(length)

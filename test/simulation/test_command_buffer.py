@@ -2,11 +2,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.simulation.command_buffer import Schedule
+from climber_uk.simulation.command_buffer import CommandBuffer
 
 
 def test_what_is_sent_acts_from_its_time_on_and_the_last_to_begin_acts():
-    schedule = Schedule()
+    schedule = CommandBuffer()
     schedule.add(10, "first")
     schedule.add(20, "second")
     assert [schedule.at(time)[0] for time in (9, 10, 19, 20, 1000)] == [
@@ -19,7 +19,7 @@ def test_what_is_sent_acts_from_its_time_on_and_the_last_to_begin_acts():
 
 
 def test_what_was_to_begin_later_than_the_last_one_sent_is_dropped():
-    schedule = Schedule()
+    schedule = CommandBuffer()
     schedule.add(10, "first")
     schedule.add(30, "overtaken")
     schedule.add(20, "last")
@@ -27,7 +27,7 @@ def test_what_was_to_begin_later_than_the_last_one_sent_is_dropped():
 
 
 def test_of_two_at_one_time_the_later_acts():
-    schedule = Schedule()
+    schedule = CommandBuffer()
     schedule.add(10, "one")
     schedule.add(10, "other")
     assert schedule.at(10) == ("other", False)
@@ -38,19 +38,19 @@ def test_of_two_at_one_time_the_later_acts():
     [(9, None, False), (10, "one", False), (110, "one", False), (111, None, True)],
 )
 def test_after_its_timeout_nothing_acts_and_that_is_told(time, acts, is_stale):
-    schedule = Schedule(timeout=100)
+    schedule = CommandBuffer(timeout=100)
     schedule.add(10, "one")
     assert schedule.at(time) == (acts, is_stale)
 
 
 def test_an_empty_one_is_not_stale():
-    assert Schedule(timeout=1).at(1000) == (None, False)
+    assert CommandBuffer(timeout=1).at(1000) == (None, False)
 
 
 @given(st.lists(st.integers(0, 20), max_size=8), st.lists(st.integers(0, 20), min_size=1))
 def test_it_is_what_a_list_of_all_that_was_sent_says(begins, times):
     """Sent in order, each drops those that begin after it; what acts is the last that has begun."""
-    schedule, kept = Schedule(), []
+    schedule, kept = CommandBuffer(), []
     for value, begin in enumerate(begins):
         schedule.add(begin, value)
         kept = [(earlier, sent) for earlier, sent in kept if earlier <= begin] + [(begin, value)]

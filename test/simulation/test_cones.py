@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from climber_uk.simulation.cones import Cone, impulse_against, opposed
+from climber_uk.simulation.cones import Cone, impulse_against, solve_friction_impulses
 
 numbers = st.floats(-10, 10)
 
@@ -27,7 +27,7 @@ def test_an_impulse_stops_sliding_or_opposes_what_remains_of_it(sliding, yieldin
 def test_a_block_on_a_cart_shares_its_momentum_until_both_move_alike():
     # 2 kg at 3 m/s on 4 kg at rest
     cone = Cone(np.array([[1.0, -1.0]]), 100.0)
-    velocity, holds = opposed(np.array([3.0, 0.0]), np.array([0.5, 0.25]), [cone])
+    velocity, holds = solve_friction_impulses(np.array([3.0, 0.0]), np.array([0.5, 0.25]), [cone])
     np.testing.assert_allclose(velocity, [1.0, 1.0])
     assert holds == [True]
 
@@ -39,7 +39,7 @@ def test_what_is_found_is_the_minimum_that_a_general_optimiser_finds(seed):
     before, masses = random.normal(size=4), random.uniform(0.5, 2.0, size=4)
     rows = [np.eye(2, 4), np.eye(2, 4, 2), np.array([[1.0, 0.0, -1.0, 0.0], [0, 1, 0, -1]])]
     cones = [Cone(row.astype(float), random.uniform(0, 2)) for row in rows]
-    found, _ = opposed(before, 1 / masses, cones)
+    found, _ = solve_friction_impulses(before, 1 / masses, cones)
 
     def cost(v):
         rubbing = sum(cone.limit * np.linalg.norm(cone.rows @ v) for cone in cones)

@@ -7,21 +7,21 @@ from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.wall import Plane
-from climber_uk.simulation.inputs import Given
-from climber_uk.simulation.rigid_body import Body
-from climber_uk.simulation.rolling import STIFF, Rolling
+from climber_uk.simulation.inputs import Inputs
+from climber_uk.simulation.rigid_body import RigidBody
+from climber_uk.simulation.rolling import STIFF, NoSlipStepper
 
 RADIUS = 0.1  # [m] of the ring
-FREE = Given(0.0, 0.0, 0.0, 0.0, 0.0)
+FREE = Inputs(0.0, 0.0, 0.0, 0.0, 0.0)
 FLOOR = Climber(inclination=0.0)
-BODY = Body(FLOOR, Contact(grip=Grip(seal_radius=RADIUS)), Plane(), 0.001)
+BODY = RigidBody(FLOOR, Contact(grip=Grip(seal_radius=RADIUS)), Plane(), 0.001)
 # friction changes the speed of what it moves most easily by STIFF of it within a step
 SLOWEST = BODY.stiction * BODY.step / min(FLOOR.mass, FLOOR.yaw_inertia / RADIUS**2) / STIFF
 
 
 def after_a_step(speed, yaw_rate):
     state = State.rolling(np.zeros(3), speed, yaw_rate)
-    return Rolling(BODY).step(np.concatenate([state.pose, state.velocity]), FREE)
+    return NoSlipStepper(BODY).step(np.concatenate([state.pose, state.velocity]), FREE)
 
 
 @pytest.mark.parametrize(("share_along", "share_around"), [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])

@@ -16,9 +16,9 @@ from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.udwadia_kalaba import constrained_acceleration, velocity_correction
 from climber_uk.mechanics.wall import WALLS, Cylinder, Plane
-from climber_uk.simulation.inputs import NO_PUSH, FellOff, Given, NotFinite, PlantState
+from climber_uk.simulation.inputs import NO_PUSH, FellOff, Inputs, NotFinite, PlantState
 from climber_uk.simulation.plant import Plant
-from climber_uk.simulation.rigid_body import Body
+from climber_uk.simulation.rigid_body import RigidBody
 
 PAPER = Climber()
 UPRIGHT = State(np.array([0.0, 6.0, np.pi / 2]), np.zeros(3))
@@ -71,8 +71,8 @@ def test_its_derivative_is_that_of_the_generic_equations():
     for _ in range(50):
         q, v = random.normal(size=3), random.normal(size=3)
         torques = random.normal(size=2)
-        body = Body(PAPER, Contact(), Plane(), 0.01)
-        inputs = Given.of(PAPER, torques, NO_PUSH)
+        body = RigidBody(PAPER, Contact(), Plane(), 0.01)
+        inputs = Inputs.of(PAPER, torques, NO_PUSH)
         got = body.derivative(np.concatenate([q, v]), inputs, 1.0)
         M = PAPER.mass_matrix
         row, _ = no_slip(State(q, v))
@@ -254,11 +254,11 @@ def test_lugre_gives_way_a_little_and_then_does_not_drift(heading, slip):
     law, start = LuGre(), State(np.array([0.0, 6.0, heading]), np.zeros(3))
     plant = Plant(PAPER, 0.0025, Contact(friction=law), slip=slip)
     settled = plant.advance(start, np.zeros(2), steps=4000)  # 10 s
-    bent = np.hypot(*(settled.pose - start.pose)[:2])
+    deflection = np.hypot(*(settled.pose - start.pose)[:2])
     # the weight is let go at once: it swings to at most twice where the spring holds it, but near
     # break-away the bristles slip meanwhile
     spring = 49.05 * np.sin(heading) / law.stiffness(PAPER.seal_friction)
-    assert spring <= bent < (2 * spring if heading < 1 else 0.01)
+    assert spring <= deflection < (2 * spring if heading < 1 else 0.01)
     end = plant.advance(settled, np.zeros(2), steps=20_000)  # 50 s
     assert np.abs(end.pose - settled.pose).max() < 1e-9
 
@@ -286,7 +286,7 @@ BALANCES = {
 
 def friction_power(plant, state):
     """Of the seal, from the plant's own law [W]."""
-    more = PlantState.of(state).bent.tolist()
+    more = PlantState.of(state).deflection.tolist()
     v, omega = float(state.forward_speed), float(state.yaw_rate)
     force, moment, _ = plant._body._ring(v, omega, more)
     return -force * v - moment * omega

@@ -9,7 +9,7 @@ from climber_uk.mechanics.contact import Contact
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Odometer, Sensors
-from climber_uk.simulation.simulated_robot import Machine, Parts, Physics
+from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 CLIMBER = Climber()
 START = State.rolling(np.array([1.0, 2.0, 0.5]), 0.3, 0.2)
@@ -85,12 +85,12 @@ WHEELS = Sensors(odometry_source="wheels")
 def reckoned(plant, torques, sensors=WHEELS, periods=200):
     """Truth and odometry after 1 s of torques."""
     parts = Parts(plant, Motors(), sensors, Physics())
-    machine = Machine(parts, State.rolling(np.zeros(3), 0.2, 0.3), PERIOD)
+    robot = SimulatedRobot(parts, State.rolling(np.zeros(3), 0.2, 0.3), PERIOD)
     for _ in range(periods):
-        machine.advance(torques)
-        machine.advance(torques)
-        machine.measure()
-    return machine.state, machine.odometer.latest()[1]
+        robot.advance(torques)
+        robot.advance(torques)
+        robot.measure()
+    return robot.state, robot.odometer.latest()[1]
 
 
 FLOOR = replace(CLIMBER, inclination=0.0)

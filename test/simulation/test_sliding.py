@@ -11,10 +11,10 @@ from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION
 from climber_uk.mechanics.wall import Plane
-from climber_uk.simulation.inputs import NO_PUSH, Given, PlantState
+from climber_uk.simulation.inputs import NO_PUSH, Inputs, PlantState
 from climber_uk.simulation.plant import Plant
-from climber_uk.simulation.rigid_body import Body
-from climber_uk.simulation.sliding import Sliding
+from climber_uk.simulation.rigid_body import RigidBody
+from climber_uk.simulation.sliding import ContactStepper
 
 PAPER = Climber()
 FLOOR = replace(PAPER, inclination=0.0)
@@ -86,10 +86,10 @@ def test_a_part_of_a_step_takes_no_more_energy_than_the_motors_give(seed, law, r
     random = np.random.default_rng(seed)
     grip = Grip(random.uniform(0, 1), seal_radius=radius)
     contact = Contact(friction=FRICTION[law](), locomotion=locomotion, grip=grip)
-    sliding = Sliding(Body(PAPER, contact, Plane(), 0.0025), slip=True)
+    sliding = ContactStepper(RigidBody(PAPER, contact, Plane(), 0.0025), slip=True)
     y = np.concatenate([random.normal(size=6), np.zeros(3)])
     slip, torques, h = random.normal(size=2) * 3, random.normal(size=2), 0.0025
-    given = Given.of(PAPER, torques, NO_PUSH)
+    given = Inputs.of(PAPER, torques, NO_PUSH)
     end, slipping, _ = sliding._part(y, slip, given, load=79.5, h=h)
     before = PlantState(y[:3], y[3:6], y[6:], slip)
     after = PlantState(end[:3], end[3:6], end[6:], slipping)
@@ -144,7 +144,7 @@ def test_a_ring_that_turns_alone_is_stopped_by_its_radius_times_its_friction():
 
 
 def test_the_rings_ellipse_is_near_the_integral_over_a_ring():
-    body = Body(PAPER, Contact(grip=Grip(seal_radius=0.1)), Plane(), 0.001)
+    body = RigidBody(PAPER, Contact(grip=Grip(seal_radius=0.1)), Plane(), 0.001)
     for v, rim in ((1.0, 0.0), (0.0, 1.0), (1.0, 1e-6), (1.0, 0.3), (1.0, 1.0), (0.3, 1.0)):
 
         def force(a, v=v, rim=rim):
