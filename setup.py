@@ -44,7 +44,7 @@ setup(
                 "uk_torque_controller": "nodes.uk_torque_controller",
                 "plant_simulator": "nodes.plant_simulator",
                 "markers": "nodes.markers",
-                "record_bag": "nodes.record_bag",
+                "record_bag": "recording.record_bag",
                 "run_demo": "demo.run_demo",
                 "check_driver": "driver_check.check_driver",
                 "analyze_bag": "report.analyze_bag",

@@ -19,12 +19,12 @@ from side_by_side import in_turns, rate, table, timed
 from climber_uk.closed_loop.batch import BLOCK, BatchRun, Loops
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.guidance import Guidance
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.many import keep_what_is_freed
-from climber_uk.mechanics.motion import Motion, Wrench
+from climber_uk.mechanics.quantities import Motion, Wrench
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

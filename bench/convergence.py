@@ -19,7 +19,7 @@ from robustness import ELLIPSE, IN_MOTION, PAPER, RAMPED, ours
 
 from climber_uk.closed_loop.simulate import Run, simulate
 from climber_uk.control.constraints import CONSTRAINTS
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 
 WEAK = replace(PAPER, max_wheel_torque=4.0)
 CASES = {"from rest, ramped up in 3 s": RAMPED, "at the reference's speed": ELLIPSE}

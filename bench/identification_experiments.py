@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from climber_uk.closed_loop.simulate import Controlling, Link, Run, simulate
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Answer, Controller
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
@@ -17,9 +17,10 @@ from climber_uk.identification.identified import NAMES, Choice, Identified
 from climber_uk.identification.integral_equations import Cut
 from climber_uk.identification.recorded_motion import RecordedMotion, impulse
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Tracked
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import ControlLaw
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber

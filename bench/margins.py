@@ -27,16 +27,17 @@ from scipy.linalg import expm
 
 from climber_uk.closed_loop.simulate import Link
 from climber_uk.control.approach import ANYWHERE
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.trajectory import Trajectory
 
 MILLISECOND = 1e-3

@@ -22,9 +22,10 @@ from plant_experiments import (
 )
 
 from climber_uk.mechanics.adhesion import Grip, NoAdhesion, Suction
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Coulomb, LuGre, Stribeck, Viscous
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

@@ -10,9 +10,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Friction, LuGre, Stribeck
+from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.plant import Plant
 
 BLOCK = Climber(

@@ -20,10 +20,11 @@ from climber_uk.control.controller import Answer
 from climber_uk.driver_check.evidence import Arrival, motion_of
 from climber_uk.driver_check.response import respond
 from climber_uk.driver_check.trial import Bounds, Trial
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Stribeck
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import State
 from climber_uk.messages import writing
 from climber_uk.simulation.plant import Plant
 

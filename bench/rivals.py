@@ -5,16 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.closed_loop.simulate import Link
-from climber_uk.control.constraints import ConstraintSet, Guidance, demanded, tracking_error
+from climber_uk.control.constraint_set import ConstraintSet, demanded
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import arctan, cos, sin
-from climber_uk.mechanics.motion import Wrench
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.reference import Reference
+from climber_uk.mechanics.quantities import State, Wrench
+from climber_uk.mechanics.reference import Reference, tracking_error
 
 IDEAL = Link()
 
@@ -106,15 +107,15 @@ class AdaptiveRobust(SampledController):
         if reference is not None and self.motion is not None:
             state = State.moving(self.motion)
             errors = constraint_errors(self.law.constraints, state, reference)
-            wrench_of_torques = []
+            forces = []
             for i, gains in enumerate((self.drive_gains, self.turn_gains)):
                 beta, bound = errors[i], self.bounds[i]
                 mu = beta * bound
                 gamma = 1 / max(abs(mu), gains.layer)
-                wrench_of_torques.append(-gamma * mu * bound)
+                forces.append(-gamma * mu * bound)
                 growth = gains.growth * abs(beta) - gains.leakage * bound
                 self.bounds[i] = max(bound + self.period * growth, 0.0)
-            self.disturbance = Wrench(*(-force for force in wrench_of_torques))
+            self.disturbance = Wrench(*(-force for force in forces))
         return super().answer(preview, age)
 
 

@@ -16,15 +16,18 @@ from scipy.spatial import cKDTree
 
 from climber_uk.closed_loop.simulate import Controlling, Link, Run, as_commanded, simulate
 from climber_uk.control.approach import ANYWHERE
-from climber_uk.control.constraints import ConstraintSet, Exact, Guidance
+from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
+from climber_uk.control.exact import Exact
 from climber_uk.control.guard import UNGUARDED
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory

@@ -1,7 +1,7 @@
 """`python bench/tick.py`: what a controller's tick costs, beside other ways to compute the same.
 
-A tick is what `SampledController` does from an odometry to its torques: prediction, constraints, UK,
-observer and saturation, without messages. All ways are measured in turns in one process; the
+A tick is what `SampledController` does from an odometry to its torques: prediction, constraints,
+UK, observer and saturation, without messages. All ways are measured in turns in one process; the
 least time of many counts.
 """
 
@@ -16,15 +16,25 @@ from limit import Limit, controller_numbers
 from scipy.linalg import sqrtm
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.constraints import CONSTRAINTS, rows
+from climber_uk.control.constraint_set import rows
+from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
 from climber_uk.control.model import Observer
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import DesiredAcceleration, Motion, ReferencePoint, Torques, Wrench
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import (
+    DesiredAcceleration,
+    Motion,
+    ReferencePoint,
+    State,
+    Torques,
+    Wrench,
+    across,
+    along,
+)
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -54,7 +64,7 @@ class WithMatrices(ControlLaw):
     def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
         """See `ControlLaw`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
-        direction = np.tanh(demand[2] / self.options.friction_speed)
+        direction = np.tanh(demand.speed / self.options.friction_speed)
         Q = climber.applied_force(heading, direction)
         Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
         return float(along(heading, Qc)), float(Qc[2]), float(across(heading, Qc))

@@ -4,7 +4,7 @@ from typing import Any
 
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.mechanics.elementary import tanh
-from climber_uk.mechanics.motion import DesiredAcceleration, Motion
+from climber_uk.mechanics.quantities import DesiredAcceleration, Motion
 
 
 class ByInverseDynamics(ControlLaw):

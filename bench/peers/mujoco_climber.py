@@ -16,7 +16,7 @@ from peers.inverse_dynamics import ByInverseDynamics
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion
 
 FULL_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 SIDEWAYS = {

@@ -11,7 +11,7 @@ import pinocchio
 from peers.inverse_dynamics import ByInverseDynamics
 
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion
 
 
 def model(climber: Climber) -> Any:

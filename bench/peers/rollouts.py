@@ -13,8 +13,7 @@ from side_by_side import in_turns, rate, table, timed
 
 from climber_uk.closed_loop.unicycle import UnicycleModel, advanced
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import State, across
-from climber_uk.mechanics.motion import Motion, Wrench, wrench_of_torques
+from climber_uk.mechanics.quantities import Motion, State, Wrench, across
 from climber_uk.paper.consistent import PAPER_PATH, ConsistentSystem
 from climber_uk.paper.motion import DURATION, START
 from climber_uk.simulation.plant import Plant
@@ -62,7 +61,7 @@ def by_us(climbers: int, given: Array) -> Motion:
     if climbers > 1:
         motion = Motion(*(np.full(climbers, part) for part in motion))
     for torques in given[:, :2].tolist():
-        motion = advanced(body, motion, Wrench(*wrench_of_torques(CLIMBER, *torques)), STEP)
+        motion = advanced(body, motion, Wrench(*CLIMBER.wrench(*torques)), STEP)
     return motion
 
 

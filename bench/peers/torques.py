@@ -19,8 +19,8 @@ from climber_uk.control.model import Observer
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.motion import Torques, Wrench
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State, Torques, Wrench
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

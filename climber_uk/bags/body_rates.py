@@ -6,7 +6,7 @@ Each step between two poses is turned by the heading midway, which is exact on a
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import across, along
+from climber_uk.mechanics.quantities import across, along
 
 
 def body_rates(time: Array, pose: Array, reach: float) -> Array:

@@ -13,10 +13,9 @@ from climber_uk.bags import topics
 from climber_uk.bags.body_rates import body_rates
 from climber_uk.bags.events import Event
 from climber_uk.bags.recorded import TimeSeries
-from climber_uk.control.constraints import tracking_error
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.reference import Reference
+from climber_uk.mechanics.reference import Reference, tracking_error
 from climber_uk.parameters.parameter_file import Values
 
 REACH = 0.1  # [s] to either side, over which a speed is taken from poses

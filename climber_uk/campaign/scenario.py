@@ -21,7 +21,7 @@ from climber_uk.control.build import settings
 from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.parameters.parameter_file import Values
 from climber_uk.simulation.options import SimulationOptions

@@ -28,15 +28,13 @@ from climber_uk.mechanics.contact import Contact, Wheeled
 from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, keep_what_is_freed, part
-from climber_uk.mechanics.motion import (
+from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import (
     Motion,
     ReferencePoint,
     Torques,
     Wrench,
-    torque_bounds,
-    wrench_of_torques,
 )
-from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.sensors import Sensors
 
@@ -134,7 +132,7 @@ class Loops:
             on_their_way.append(command.wheels)
             wheels = _within(on_their_way.popleft(), climber, motion)
             tally.add(tick * course.period, motion, target, command, wheels, climber)
-            wrench = Wrench(*wrench_of_torques(climber, *wheels))
+            wrench = Wrench(*climber.wrench(*wheels))
             on_period()
             motion = advance(UnicycleModel.of(climber), motion, wrench, step, course.steps)
         return tally.outcome()
@@ -184,5 +182,5 @@ def _advancing(compiled: bool) -> Callable[[UnicycleModel, Motion, Wrench, float
 
 
 def _within(torques: Torques, climber: Climber, motion: Motion) -> Torques:
-    right, left = torque_bounds(climber, motion)
+    right, left = climber.bounds(motion)
     return Torques(clipped(torques.right, *right), clipped(torques.left, *left))

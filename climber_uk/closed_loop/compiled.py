@@ -14,7 +14,7 @@ from numba.extending import overload, register_jitable
 from climber_uk.closed_loop import unicycle as plain
 from climber_uk.closed_loop.unicycle import Accelerations, UnicycleModel
 from climber_uk.mechanics import Array, elementary, many
-from climber_uk.mechanics.motion import Motion, Wrench
+from climber_uk.mechanics.quantities import Motion, Wrench
 
 BLOCK = 256  # climbers that are gone through together, so that their numbers stay in the cache
 SMALL = 0.1  # [rad] that no climber may turn by in a step: the series is good to 1e-16 up to that

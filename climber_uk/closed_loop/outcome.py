@@ -10,7 +10,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import MAX_MARGIN
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.motion import Motion, ReferencePoint, Torques, wrench_of_torques
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
 
 NEAR = 0.01  # [m] from the reference within which a loop has settled
 
@@ -67,9 +67,7 @@ class Tally:
             np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
         lateral = climber.mass * motion.speed * motion.yaw_rate
         lateral = lateral + climber.weight_along_wall * motion.cosine
-        margin = self.contact.slip_margin(
-            climber, self._into, wrench_of_torques(climber, *wheels)[0], lateral
-        )
+        margin = self.contact.slip_margin(climber, self._into, climber.wrench(*wheels)[0], lateral)
         np.minimum(self.slip, margin, out=self.slip, where=on)
 
     def _hold(self, time: float, climber: Climber) -> None:

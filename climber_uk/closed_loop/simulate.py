@@ -11,11 +11,12 @@ from typing import Protocol
 
 import numpy as np
 
-from climber_uk.control.constraints import tracking_error
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.reference import tracking_error
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant

@@ -21,7 +21,7 @@ from climber_uk.mechanics.elementary import (
     with_sign_of,
 )
 from climber_uk.mechanics.many import amended, keep_what_is_freed
-from climber_uk.mechanics.motion import Motion, Wrench
+from climber_uk.mechanics.quantities import Motion, Wrench
 
 ITERATIONS = 5  # of Newton's method to an instant within a step; each squares what is left
 

@@ -6,16 +6,16 @@ from typing import NamedTuple
 import numpy as np
 
 from climber_uk.control.approach import Approach
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import Command
 from climber_uk.control.guard import STANDS, Expected, Rates
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode
 from climber_uk.control.sampled_controller import SampledController
 from climber_uk.control.time_scaling import Progress, restarted
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion, ReferencePoint
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import Motion, ReferencePoint
 
 SAME = 0.05  # [m, rad] within which a new preview goes on with the old one
 AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastest motion counts

@@ -11,8 +11,8 @@ import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion, ReferencePoint
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import Motion, ReferencePoint
 from climber_uk.parameters.declaration import check, parameter
 
 PEAK = 15 / 8  # of p'

@@ -4,10 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
 from climber_uk.control.approach import Approach
-from climber_uk.control.constraints import CONSTRAINTS, Guidance
+from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
 from climber_uk.control.guard import GuardOptions
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing

@@ -11,22 +11,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from climber_uk.control.constraints import ConstraintSet
+from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.model import predict
 from climber_uk.mechanics import Array, pack
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
-from climber_uk.mechanics.motion import (
+from climber_uk.mechanics.quantities import (
     Bounds,
     DesiredAcceleration,
     Motion,
     ReferencePoint,
     Torques,
     Wrench,
-    named,
-    saturate,
-    torque_bounds,
-    wrench_of_torques,
 )
 from climber_uk.parameters.declaration import check, parameter
 
@@ -104,18 +100,20 @@ class ControlLaw:
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.options.lookahead(period)
-        prepared = self.constraints.prepared(target)
+        prepared = self.constraints.prepare(target)
         right, left = self._fixed_bounds or self._bounds(situation)
-        drive, turn = wrench_of_torques(climber, held.right, held.left)
+        drive, turn = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
             aim = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
-            wanted, turned, lateral = self.force(self.constraints.demand(prepared, aim), aim)
+            wanted, turned, lateral = self.force(
+                self.constraints.desired_acceleration(prepared, aim), aim
+            )
             wanted, turned = wanted - r_drive, turned - r_turn
-            drive, turn, one, other = saturate(climber, wanted, turned, right, left)
-        wheels, demanded = named(Torques, (one, other)), named(Wrench, (wanted, turned))
+            drive, turn, one, other = climber.saturate(wanted, turned, right, left)
+        wheels, demanded = Torques(one, other), Wrench(wanted, turned)
         fits = drive is wanted and turn is turned
-        lost = NOTHING if fits else named(Wrench, (wanted - drive, turned - turn))
-        return named(Command, (wheels, demanded, lateral, lost))
+        lost = NOTHING if fits else Wrench(wanted - drive, turned - turn)
+        return Command(wheels, demanded, lateral, lost)
 
     def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
         """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
@@ -130,7 +128,7 @@ class ControlLaw:
         weight = climber.weight_along_wall * motion.sine
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
-        return Torques(*saturate(climber, drive, turn, *self._bounds(situation))[2:])
+        return Torques(*climber.saturate(drive, turn, *self._bounds(situation))[2:])
 
     @cached_property
     def _fixed_bounds(self) -> tuple[Bounds, Bounds] | None:
@@ -142,7 +140,7 @@ class ControlLaw:
         return bounds, bounds
 
     def _bounds(self, situation: ControlInput) -> tuple[Bounds, Bounds]:
-        right, left = torque_bounds(self.climber, situation.motion)
+        right, left = self.climber.bounds(situation.motion)
         if everywhere(self.options.max_torque_rate == 0):
             return right, left
         change = self.options.max_torque_rate * situation.period

@@ -17,9 +17,8 @@ from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.sampled_controller import LONGEST_STEP, SampledController
 from climber_uk.control.twist_check import SUSPECTED, TwistCheck
 from climber_uk.mechanics import SECOND, Array, pack
-from climber_uk.mechanics.climber import State
-from climber_uk.mechanics.motion import Motion, Torques
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import Motion, State, Torques
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
 CLOCK_STEP = round(0.2 * SECOND)  # [ns] back, from which time has started anew

@@ -13,7 +13,7 @@ from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.climber import GRAVITY, Climber
-from climber_uk.mechanics.motion import Motion, Torques, Wrench
+from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.parameters.declaration import check, parameter
 
 IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong

@@ -20,7 +20,7 @@ from climber_uk.mechanics.elementary import (
     with_sign_of,
     wrapped,
 )
-from climber_uk.mechanics.motion import Motion, named
+from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import check, parameter
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
@@ -47,7 +47,7 @@ def predict(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float
     v_1 = (push - rubbing) / mass
     way = time * (v + half * v_1)
     v, omega = v + time * v_1, omega + time * omega_1
-    return named(Motion, (x + way * c, y + way * s, heading, cosine, sine, v, omega))
+    return Motion(x + way * c, y + way * s, heading, cosine, sine, v, omega)
 
 
 class DisturbanceEstimate(NamedTuple):
@@ -61,7 +61,7 @@ class DisturbanceEstimate(NamedTuple):
     @property
     def held(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
-        return named(DisturbanceEstimate, (self.drive, self.turn, 0.0, 0.0))
+        return DisturbanceEstimate(self.drive, self.turn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class Observer:
         slides = abs(expected.speed) > REST
         drive_rate = select(slides, drive_rate + newer / time * mass * faster, 0.0)
         turn_rate = turn_rate + newer / time * inertia * turning
-        return found, named(DisturbanceEstimate, (drive, turn, drive_rate, turn_rate))
+        return found, DisturbanceEstimate(drive, turn, drive_rate, turn_rate)
 
     def shares(self, time: float, delay: float) -> tuple[Any, Any]:
         """What of an acceleration that was not expected is put down to the disturbance.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import check, parameter
 
 SPEED_TIME = 0.1  # [s] in which a jump of the speed would become one of the place

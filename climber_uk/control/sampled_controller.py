@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from climber_uk.control.constraints import ConstraintSet
+from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.control_law import Command, ControlInput, ControlLaw
 from climber_uk.control.latency import Latency, Sample
 from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, predict
@@ -17,8 +17,8 @@ from climber_uk.control.torque_history import NONE, TorqueHistory
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, named, wrench_of_torques
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.parameters.declaration import check, parameter
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
@@ -102,7 +102,7 @@ class SampledController:
     @property
     def disturbance(self) -> Wrench:
         """What pushes and turns the climber besides what the model knows."""
-        return named(Wrench, self.learnt[:2])
+        return Wrench(self.learnt.drive, self.learnt.turn)
 
     @disturbance.setter
     def disturbance(self, disturbance: Wrench) -> None:
@@ -211,7 +211,7 @@ class SampledController:
         if stamp == self.stamp:
             return motion
         for torques, time in self._acting.between(self.stamp, stamp):
-            drive, turn = wrench_of_torques(climber, *torques)
+            drive, turn = climber.wrench(*torques)
             motion = predict(climber, motion, drive + r_drive, turn + r_turn, time)
         return motion
 
@@ -235,12 +235,12 @@ class SampledController:
     ) -> None:
         """Learn how much later than told torques act; `shares` are the observer's."""
         climber = self.law.climber
-        drive, turn = wrench_of_torques(climber, *self._acting.between(self.stamp, stamp)[-1][0])
+        drive, turn = climber.wrench(*self._acting.between(self.stamp, stamp)[-1][0])
         lever = climber.half_track
         accelerations = drive / climber.mass, lever * turn / climber.yaw_inertia
         errors = found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)
         time, slides = (stamp - self.stamp) / SECOND, abs(found.speed) > SLOW
-        sample = named(Sample, (accelerations, errors, time, slides))
+        sample = Sample(accelerations, errors, time, slides)
         self.latency.learn(sample, shares, self.timing.transport_delay)
 
     def _constraints(self) -> ConstraintSet:
@@ -271,8 +271,7 @@ class SampledController:
     def _situation(self, age: float) -> tuple[int, ControlInput]:
         begins = self.begin(age)
         motion = self.expected_at(begins)
-        situation = motion, self._acting.last, self.disturbance, self.period
-        return begins, named(ControlInput, situation)
+        return begins, ControlInput(motion, self._acting.last, self.disturbance, self.period)
 
     def _send(self, begins: int, torques: Torques) -> None:
         self._acting.add(begins, torques)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import compose
-from climber_uk.mechanics.motion import ReferencePoint
 from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import ReferencePoint
 from climber_uk.parameters.declaration import check, parameter
 
 SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for

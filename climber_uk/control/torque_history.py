@@ -3,7 +3,7 @@
 from collections import deque
 
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.motion import Torques
+from climber_uk.mechanics.quantities import Torques
 
 NONE = Torques(0.0, 0.0)
 

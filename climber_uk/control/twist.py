@@ -5,7 +5,7 @@ only together with the one before: (v + v₀)/2. What fits the poses better is t
 the twist is that of its stamp.
 """
 
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion
 
 MEMORY = 1.0  # [s]
 SURELY = 0.1  # share of the other's squares of misfits, below which a twist is taken for a mean

@@ -3,7 +3,7 @@
 import math
 
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion
 
 MEMORY = 0.5  # [s] in which a difference is forgotten
 SHARE = 0.3  # by which they may differ: slip, scale

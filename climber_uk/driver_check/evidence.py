@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from climber_uk.control.twist import TwistKind
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.motion import Motion as Rolling
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import Motion as Rolling
+from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading
 from climber_uk.parameters.declaration import check, parameter
 

@@ -12,8 +12,9 @@ import numpy as np
 
 from climber_uk.driver_check.response import PAIR, expected_gain
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, wrapped
+from climber_uk.mechanics.quantities import State
 
 GOALS = np.array([0.05, 0.2])  # [m/s], [rad/s] at which torques fall again: some 1 cm, 0.1 rad
 PLACES = np.array([0.01, 0.05])  # [m], [rad] at which they do if no speed is told

@@ -10,8 +10,9 @@ from climber_uk.driver_check.evidence import Arrival, Command, motion_of
 from climber_uk.driver_check.pulses import PUSHED_BY, Pulse, Silence, Stage
 from climber_uk.driver_check.response import expected_gain, respond
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.climber import Climber, State, along
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.quantities import State, along
 from climber_uk.messages import reading
 from climber_uk.parameters.declaration import check, parameter
 

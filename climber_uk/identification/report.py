@@ -6,7 +6,7 @@ from typing import Any
 from climber_uk.identification.identified import IN_TIME, NAMES, UNITS, Identified
 from climber_uk.identification.integral_equations import Site
 from climber_uk.mechanics.climber import Climber
-from climber_uk.paper.table import markdown
+from climber_uk.report.tables import markdown
 
 CONTROLLER, PLANT = "uk_torque_controller", "plant_simulator"
 COLUMNS = ("parameter", "estimate", "± 95 %", "unit", "nodes now", "")

@@ -7,66 +7,17 @@ from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (r
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from climber_uk.mechanics import Array, motion, pack, unpack
-from climber_uk.mechanics.elementary import cos, sin
-from climber_uk.mechanics.motion import Bounds, Motion
+from climber_uk.mechanics import Array, pack, unpack
+from climber_uk.mechanics.elementary import clipped, cos, everywhere, select, sin
+from climber_uk.mechanics.quantities import Bounds, Motion, State, Torques
 from climber_uk.parameters.declaration import check, parameter
 
 GRAVITY = 9.81  # [m/s²]
 DEGREE = math.pi / 180  # [rad]
-
-
-@dataclass(frozen=True)
-class State:
-    """Where the climber is and how it moves, both in the wall's frame."""
-
-    pose: Array  # (..., 3) x [m], y [m], θ [rad]
-    velocity: Array  # (..., 3) ẋ [m/s], ẏ [m/s], θ̇ [rad/s]
-
-    @classmethod
-    def rolling(cls, pose: Array, speed: Array | float, yaw_rate: Array | float) -> "State":
-        """State at `pose` (..., 3) that moves along its heading (17)."""
-        heading = unpack(pose)[2]
-        return cls(pose, pack(speed * cos(heading), speed * sin(heading), yaw_rate))
-
-    @classmethod
-    def moving(cls, motion: Motion) -> "State":
-        """State of a climber in `motion`."""
-        return cls(
-            pack(motion.x, motion.y, motion.heading),
-            pack(motion.speed * motion.cosine, motion.speed * motion.sine, motion.yaw_rate),
-        )
-
-    @cached_property
-    def motion(self) -> Motion:
-        """The same in components, without the side slip."""
-        x, y, heading = unpack(self.pose)
-        v_x, v_y, yaw_rate = unpack(self.velocity)
-        cosine, sine = cos(heading), sin(heading)
-        return Motion(x, y, heading, cosine, sine, v_x * cosine + v_y * sine, yaw_rate)
-
-    @cached_property
-    def heading(self) -> Array:
-        """θ (...) [rad]."""
-        return unpack(self.pose)[2]
-
-    @cached_property
-    def forward_speed(self) -> Array:
-        """v = ẋ cosθ + ẏ sinθ (12), (...) [m/s]."""
-        return along(self.heading, self.velocity)
-
-    @cached_property
-    def side_slip(self) -> Array:
-        """Velocity to the left, 0 where (17) holds, (...) [m/s]."""
-        return across(self.heading, self.velocity)
-
-    @cached_property
-    def yaw_rate(self) -> Array:
-        """ω = θ̇ (...) [rad/s]."""
-        return unpack(self.velocity)[2]
 
 
 @dataclass(frozen=True)
@@ -168,21 +119,78 @@ class Climber:
         drive, turn = self.drive_and_turn(torques)
         return pack(drive * cos(heading), drive * sin(heading), turn)
 
+    def wrench(self, right: Any, left: Any) -> tuple[Any, Any]:
+        """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
+        radius = self.wheel_radius
+        return (right + left) / radius, self.half_track * (right - left) / radius
+
+    def torques(self, drive: Any, turn: Any) -> Torques:
+        """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N."""
+        half = self.wheel_radius / 2
+        half_drive, half_turn = half * drive, half * turn / self.half_track
+        return Torques(half_drive + half_turn, half_drive - half_turn)
+
+    def rim_rates(self, motion: Motion) -> tuple[Any, Any]:
+        """Turning rates (v ± d ω) / r of the wheels, right and left [rad/s]."""
+        v, turning = motion.speed, self.half_track * motion.yaw_rate
+        return (v + turning) / self.wheel_radius, (v - turning) / self.wheel_radius
+
+    def bounds(self, motion: Motion) -> tuple[Bounds, Bounds]:
+        """Lowest and highest torque of the right wheel, and of the left one.
+
+        That of a DC motor falls in a straight line with the rate at which it drives its wheel, and
+        not with the rate at which it brakes it.
+        """
+        limit, no_load = self.max_wheel_torque, self.no_load_wheel_rate
+        if everywhere(no_load == 0):
+            return (-limit, limit), (-limit, limit)
+        no_load = select(no_load == 0, float("inf"), no_load)
+        right, left = self.rim_rates(motion)
+        return _bounds(limit, right / no_load), _bounds(limit, left / no_load)
+
+    def saturate(
+        self, drive: Any, turn: Any, right: Bounds, left: Bounds
+    ) -> tuple[Any, Any, Any, Any]:
+        """What wheels within their bounds can do of drive and turn, the turn served first.
+
+        Returns drive and turn, the very same ones if they fit, and the torques of the right wheel
+        and of the left one that do it.
+        """
+        (right_low, right_high), (left_low, left_high) = right, left
+        to_mean, to_twist = self.leverage
+        mean, twist = to_mean * drive, to_twist * turn  # τR,L = mean ± twist
+        one, other = mean + twist, mean - twist
+        fits = (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
+        if fits is True or everywhere(fits):
+            return drive, turn, one, other
+        twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
+        lowest, highest = right_low - twist, right_high - twist
+        lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
+        highest = highest - clipped(highest - (left_high + twist), 0.0, float("inf"))
+        mean = clipped(mean, lowest, highest)
+        # once more, as sums are rounded: no torque is beyond its bound by as little as that
+        return (
+            select(fits, drive, mean / to_mean),
+            select(fits, turn, twist / to_twist),
+            select(fits, one, clipped(mean + twist, right_low, right_high)),
+            select(fits, other, clipped(mean - twist, left_low, left_high)),
+        )
+
     def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:
         """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
-        return motion.wrench_of_torques(self, *unpack(torques))
+        return self.wrench(*unpack(torques))
 
     def wheel_torques(self, drive: Array, turn: Array) -> Array:
         """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N, (..., 2) [N m]."""
-        return pack(*motion.torques(self, drive, turn))
+        return pack(*self.torques(drive, turn))
 
     def wheel_rates(self, state: State) -> Array:
         """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
-        return pack(*motion.wheel_rates(self, state.motion))
+        return pack(*self.rim_rates(state.motion))
 
     def torque_bounds(self, state: State) -> tuple[Bounds, Bounds]:
         """Lowest and highest torque [N m] of the right wheel, and of the left one, each (...)."""
-        return motion.torque_bounds(self, state.motion)
+        return self.bounds(state.motion)
 
     def rolling_acceleration(self, state: State, torques: Array, direction: Array | float) -> Array:
         """q̈ of the climber that rolls without side slip under `torques`, (..., 3).
@@ -202,20 +210,12 @@ class Climber:
         )
 
 
-def along(heading: Array, vector: Array) -> Array:
-    """Forward component, (...), of a vector (..., 2 or 3) given in the wall's frame."""
-    x, y, *_ = unpack(vector)
-    return x * cos(heading) + y * sin(heading)
-
-
-def across(heading: Array, vector: Array) -> Array:
-    """Component to the left, (...), of a vector (..., 2 or 3) given in the wall's frame."""
-    x, y, *_ = unpack(vector)
-    return y * cos(heading) - x * sin(heading)
-
-
 def no_slip(state: State) -> tuple[Array, Array]:
     """Row A = [sinθ -cosθ 0] (..., 3) and b = -ω (ẋ cosθ + ẏ sinθ) (...) of (18)."""
     heading = state.heading
     row = pack(sin(heading), -cos(heading), 0 * heading)
     return row, -state.yaw_rate * state.forward_speed
+
+
+def _bounds(limit: Any, part: Any) -> Bounds:
+    return -limit * clipped(1 + part, 0.0, 1.0), limit * clipped(1 - part, 0.0, 1.0)

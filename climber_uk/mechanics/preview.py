@@ -13,9 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array, Stamps
-from climber_uk.mechanics.climber import across, along
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import ReferencePoint, named
+from climber_uk.mechanics.quantities import ReferencePoint, across, along
 from climber_uk.mechanics.reference import Reference
 
 MOST_SIDEWAYS = 0.1  # [rad] between heading and velocity, forwards or backwards
@@ -93,7 +92,7 @@ class Preview:
         x, v_x, a_x, j_x = _derivatives(along_x, t)
         y, v_y, a_y, j_y = _derivatives(along_y, t)
         heading, omega, omega_1, _ = _derivatives(turning, t)
-        return named(ReferencePoint, (x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y))
+        return ReferencePoint(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
 
     def fastest(self, begin: int, end: int) -> tuple[float, float]:
         """Fastest speed [m/s] and yaw rate [rad/s] at its points from `begin` to `end` [ns].

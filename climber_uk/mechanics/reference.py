@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.climber import along
-from climber_uk.mechanics.motion import ReferencePoint
+from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.quantities import ReferencePoint, across, along
 
 
 @dataclass(frozen=True)
@@ -54,3 +54,12 @@ class Reference:
     def speed_second_rate(self) -> Array:
         """v̈_d = p⃛·t + ω² v_d (...) [m/s³]."""
         return along(self.heading, self.jerk) + self.yaw_rate**2 * self.speed
+
+
+def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Array]:
+    """Actual minus desired pose along-track [m], cross-track [m] and in heading [rad], each (...).
+
+    Along and across are those of the reference's heading; the heading error is in [-π, π).
+    """
+    heading, offset = reference.heading, pose - reference.pose
+    return along(heading, offset), across(heading, offset), wrapped(unpack(offset)[2])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time

@@ -24,7 +24,7 @@ from sensor_msgs.msg import JointState, TimeReference
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 
 if TYPE_CHECKING:
     from climber_uk.mechanics.reference import Reference

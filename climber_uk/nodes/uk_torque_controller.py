@@ -16,12 +16,13 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.control.build import KINDS, ConstraintChoice, build_controller, settings
-from climber_uk.control.constraints import tracking_error
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.reference import tracking_error
 from climber_uk.messages import reading, reading_reference, writing
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.managed import ManagedNode

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.climber import Climber, State, across, along, no_slip
+from climber_uk.mechanics.climber import Climber, no_slip
+from climber_uk.mechanics.quantities import State, across, along
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate

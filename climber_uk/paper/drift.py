@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import ode
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 from climber_uk.paper.consistent import PAPER_PATH
 from climber_uk.paper.motion import START
 

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import State, no_slip
+from climber_uk.mechanics.climber import no_slip
+from climber_uk.mechanics.quantities import State
 from climber_uk.paper.consistent import PAPER_PATH, ConsistentSystem
 from climber_uk.paper.printed import PrintedSystem
 from climber_uk.simulation.plant import Plant

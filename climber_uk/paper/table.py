@@ -10,6 +10,7 @@ import numpy as np
 from climber_uk.bags.run import RecordedRun
 from climber_uk.mechanics import Array
 from climber_uk.paper.motion import PaperMotion
+from climber_uk.report.tables import markdown
 
 COLUMNS = (
     "motion",
@@ -63,17 +64,6 @@ def row(name: str, motion: PaperMotion | RecordedRun | str) -> ComparisonRow:
 def growth(time: Array, error: Array) -> float:
     """Slope [m/s] of the straight line that fits the error's size best."""
     return float(np.polyfit(time, np.abs(error), 1)[0])
-
-
-def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table, which reads well as text too."""
-    widths = [max(map(len, column)) for column in zip(columns, *rows, strict=True)]
-    lines = [columns, ["-" * width for width in widths], *rows]
-    padded = (
-        " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
-        for line in lines
-    )
-    return "\n".join(f"| {line} |" for line in padded) + "\n"
 
 
 def write(

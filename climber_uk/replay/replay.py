@@ -15,7 +15,7 @@ from climber_uk.bags.topics import ODOMETRY, REFERENCE, TORQUES
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.motion import Torques
+from climber_uk.mechanics.quantities import Torques
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.names import Names
 from climber_uk.parameters.parameter_file import Values

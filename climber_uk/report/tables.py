@@ -146,3 +146,14 @@ def to_json(columns: Sequence[Column]) -> str:
 def _event(time: float, event: Any) -> dict[str, Any]:
     told = {name: getattr(event, name) for name in ("node", "kind", "level", "text")}
     return {"time": round(time, 6), **told}
+
+
+def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table, which reads well as text too."""
+    widths = [max(map(len, column)) for column in zip(columns, *rows, strict=True)]
+    lines = [columns, ["-" * width for width in widths], *rows]
+    padded = (
+        " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        for line in lines
+    )
+    return "\n".join(f"| {line} |" for line in padded) + "\n"

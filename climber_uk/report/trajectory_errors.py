@@ -9,8 +9,8 @@ P is the pose x [m], y [m], θ [rad], and Q the reference at the same time; doi
 import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
-from climber_uk.mechanics.climber import across, along
 from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.quantities import across, along
 
 ROUNDING = 1e-9  # [s, m] by which a pair may fall short: stamps are nanoseconds
 

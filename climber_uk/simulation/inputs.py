@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from climber_uk.mechanics import Array, unpack
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
 
 NO_PUSH = np.zeros(3)
 

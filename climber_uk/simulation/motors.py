@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped
+from climber_uk.mechanics.quantities import State
 from climber_uk.parameters.declaration import check, parameter
 
 

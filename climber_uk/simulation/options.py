@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 from climber_uk.parameters.declaration import check, parameter
 
 

@@ -11,8 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import GRAVITY, Climber, State
+from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import Plane, Wall
 from climber_uk.simulation.inputs import NO_PUSH, FellOff, Inputs, NotFinite, PlantState
 from climber_uk.simulation.rigid_body import RigidBody, forward_speed

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import rotated
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.parameters.declaration import check, parameter
 
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import ADHESION, Suction
-from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.contact import LOCOMOTION
 from climber_uk.mechanics.friction import FRICTION
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import WALLS
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.simulation.inputs import NO_PUSH

@@ -5,18 +5,19 @@ import pytest
 
 from climber_uk.closed_loop.batch import BatchRun, Change, Loops
 from climber_uk.closed_loop.simulate import Link, simulate
-from climber_uk.control.constraints import Exact, Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
+from climber_uk.control.exact import Exact
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics.adhesion import Grip
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.many import part
-from climber_uk.mechanics.motion import Motion
+from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory

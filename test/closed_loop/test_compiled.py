@@ -6,7 +6,7 @@ from test_unicycle import PAPER, many_starts, wheels
 
 from climber_uk.closed_loop import unicycle as plain
 from climber_uk.closed_loop.unicycle import UnicycleModel
-from climber_uk.mechanics.motion import Wrench, wrench_of_torques
+from climber_uk.mechanics.quantities import Wrench
 
 compiled = pytest.importorskip("climber_uk.closed_loop.compiled", reason="numba is not installed")
 
@@ -19,7 +19,7 @@ def test_what_is_compiled_is_what_it_was_compiled_from(fastest):
     masses = random.uniform(4, 6, number)
     body, motion = UnicycleModel.of(replace(PAPER, mass=masses)), many_starts(number, fastest)
     for _ in range(60):
-        wrench = Wrench(*wrench_of_torques(PAPER, *wheels(random, motion)))
+        wrench = Wrench(*PAPER.wrench(*wheels(random, motion)))
         expected = plain.advanced_often(body, motion, wrench, 0.0025, 2)
         motion = compiled.advanced(body, motion, wrench, 0.0025, 2)
         np.testing.assert_allclose(motion, expected, rtol=1e-12, atol=1e-12)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from climber_uk.closed_loop.pressure_gauge import controllers
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.guidance import Guidance
 from climber_uk.mechanics.climber import Climber
 
 HIGH, LOW = 8000.0, 3000.0

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from climber_uk.closed_loop.unicycle import UnicycleModel, advanced
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.many import part
-from climber_uk.mechanics.motion import Motion, Wrench, wrench_of_torques
+from climber_uk.mechanics.quantities import Motion, State, Wrench
 from climber_uk.simulation.plant import Plant
 
 PAPER = Climber()
@@ -43,15 +43,13 @@ def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest):
         torques = wheels(random, motion)
         was = np.sign(motion.speed)
         for _ in range(2):
-            motion = advanced(body, motion, Wrench(*wrench_of_torques(PAPER, *torques)), step)
+            motion = advanced(body, motion, Wrench(*PAPER.wrench(*torques)), step)
         changes += np.count_nonzero(np.sign(motion.speed) != was)
         for i in range(12):
             pair = torques[:, i]
             states[i] = plant.advance(states[i], pair, steps=2)
             for _ in range(2):
-                alone[i] = advanced(
-                    body, alone[i], Wrench(*wrench_of_torques(PAPER, *pair.tolist())), step
-                )
+                alone[i] = advanced(body, alone[i], Wrench(*PAPER.wrench(*pair.tolist())), step)
             expected = states[i].motion
             np.testing.assert_allclose(floats(part(motion, i)), expected, atol=1e-9)
             np.testing.assert_allclose(alone[i], expected, atol=1e-9)

@@ -10,8 +10,8 @@ from climber_uk.control.build import build_controller
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics import trajectory_parameters as plan
-from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.contact import Contact, Tracked
+from climber_uk.mechanics.quantities import State
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.simulation.inputs import NO_PUSH
 from climber_uk.simulation.plant import Plant

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from climber_uk.control.approach import Approach
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.motion import Motion, ReferencePoint
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, State
 
 slow = pytest.mark.slow
 

@@ -3,15 +3,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from climber_uk.control.constraints import (
-    CONSTRAINTS,
-    Exact,
-    Guidance,
-    demanded,
-    rows,
-    tracking_error,
-)
-from climber_uk.mechanics.climber import Climber, State, across
+from climber_uk.control.constraint_set import demanded, rows
+from climber_uk.control.constraints import CONSTRAINTS
+from climber_uk.control.exact import Exact
+from climber_uk.control.guidance import Guidance
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State, across
+from climber_uk.mechanics.reference import tracking_error
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory

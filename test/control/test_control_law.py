@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from climber_uk.control.constraints import Exact, Guidance, demanded, rows
+from climber_uk.control.constraint_set import demanded, rows
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
-from climber_uk.mechanics.climber import Climber, State, across, along
-from climber_uk.mechanics.motion import Motion, Torques, Wrench, saturate, wrench_of_torques
+from climber_uk.control.exact import Exact
+from climber_uk.control.guidance import Guidance
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench, across, along
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -59,10 +61,10 @@ bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[
 @given(st.floats(-50, 50), st.floats(-50, 50), bounds, bounds)
 def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
     climber = Climber()
-    wrench = wrench_of_torques(climber, right, left)
-    *done, one, other = saturate(climber, *wrench, right_bounds, left_bounds)
+    wrench = climber.wrench(right, left)
+    *done, one, other = climber.saturate(*wrench, right_bounds, left_bounds)
     got = one, other
-    np.testing.assert_allclose(done, wrench_of_torques(climber, *got), atol=1e-9)
+    np.testing.assert_allclose(done, climber.wrench(*got), atol=1e-9)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
         assert low <= torque <= high  # not beyond it by as little as rounding
     turn, drive = (right - left) / 2, (right + left) / 2

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from climber_uk.control.constraints import REST_SPEED, Exact, demanded
-from climber_uk.mechanics.climber import State
+from climber_uk.control.constraint_set import demanded
+from climber_uk.control.exact import REST_SPEED, Exact
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

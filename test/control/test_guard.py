@@ -8,7 +8,7 @@ from climbs import LIMIT, Climb
 from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 
 pytestmark = pytest.mark.slow
 

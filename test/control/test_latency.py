@@ -8,10 +8,10 @@ from identification_experiments import SCENARIOS
 
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.approach import ANYWHERE
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety

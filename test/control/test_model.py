@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from climber_uk.control.model import DisturbanceEstimate, Observer, predict
-from climber_uk.mechanics.climber import Climber, State
-from climber_uk.mechanics.motion import Torques, Wrench, torques, wrench_of_torques
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State, Torques, Wrench
 from climber_uk.simulation.plant import Plant
 
 CLIMBER = Climber()
@@ -13,7 +13,7 @@ STILL, NONE, NOTHING = Torques(0.0, 0.0), Wrench(0.0, 0.0), DisturbanceEstimate(
 
 
 def after(climber, motion, wheels, disturbance, time):
-    drive, turn = wrench_of_torques(climber, *wheels)
+    drive, turn = climber.wrench(*wheels)
     return predict(climber, motion, drive + disturbance.drive, turn + disturbance.turn, time)
 
 
@@ -36,7 +36,7 @@ def test_the_model_rolls_as_the_plant_does(heading, v, omega, torques):
 def test_at_rest_friction_holds_what_it_can_and_no_more():
     rest = State(np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)).motion
     assert after(CLIMBER, rest, STILL, NONE, 0.1).speed == 0
-    more = torques(CLIMBER, CLIMBER.weight_along_wall + CLIMBER.seal_friction + 1.0, 0.0)
+    more = CLIMBER.torques(CLIMBER.weight_along_wall + CLIMBER.seal_friction + 1.0, 0.0)
     assert after(CLIMBER, rest, more, NONE, 0.1).speed == pytest.approx(0.02)
 
 
@@ -59,7 +59,7 @@ SLIPPERY = Climber(seal_friction_coefficient=0.4, **FLOOR)
 def test_the_observer_finds_the_friction_that_was_not_expected():
     believed = Climber(seal_friction_coefficient=0.8, **FLOOR)
     rolling = State.rolling(np.zeros(3), 1.0, 0.0)
-    _, _, found = learn(Observer(), SLIPPERY, believed, rolling, torques(believed, 30.0, 0.0))
+    _, _, found = learn(Observer(), SLIPPERY, believed, rolling, believed.torques(30.0, 0.0))
     less = believed.seal_friction - SLIPPERY.seal_friction
     np.testing.assert_allclose(found[:2], [less, 0.0], atol=1e-3)
 
@@ -67,7 +67,7 @@ def test_the_observer_finds_the_friction_that_was_not_expected():
 def test_without_a_twist_it_finds_friction_and_speeds_from_poses():
     believed = Climber(seal_friction_coefficient=0.8, **FLOOR)
     observer = Observer(velocity_source="pose")
-    wheels = torques(believed, 30.0, 0.1)
+    wheels = believed.torques(30.0, 0.1)
     start = State(np.zeros(3), np.zeros(3))
     state, seen, found = learn(observer, SLIPPERY, believed, start, wheels)
     less = believed.seal_friction - SLIPPERY.seal_friction

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.constraints import Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import SPEED_TIME, Mode, Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

@@ -5,16 +5,18 @@ import pytest
 
 from climber_uk.closed_loop.simulate import Link, sampled, simulate
 from climber_uk.control.approach import ANYWHERE, Approach
-from climber_uk.control.constraints import Exact, Guidance
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
+from climber_uk.control.exact import Exact
 from climber_uk.control.guard import UNGUARDED
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory

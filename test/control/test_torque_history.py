@@ -2,7 +2,7 @@ import pytest
 
 from climber_uk.control.torque_history import TorqueHistory
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.motion import Torques
+from climber_uk.mechanics.quantities import Torques
 
 
 @pytest.fixture

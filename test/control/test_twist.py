@@ -12,7 +12,7 @@ from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.twist import mean_twist
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 
 BUILT = SCENARIOS["climber.yaml"]
 

@@ -8,8 +8,9 @@ from climber_uk.driver_check import listening
 from climber_uk.driver_check.evidence import Arrival, Endpoint, Evidence, ExpectedDriver, Graph
 from climber_uk.driver_check.trial import Bounds, Trial
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors

@@ -11,8 +11,8 @@ from climber_uk.driver_check.evidence import Command, Pulse, Trial
 from climber_uk.driver_check.report import Verdict
 from climber_uk.driver_check.response import WIRINGS, expected_gain, response_of
 from climber_uk.driver_check.trial import Bounds
-from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.friction import FRICTION
+from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.sensors import Sensors
 
 RIGHT = np.eye(2)

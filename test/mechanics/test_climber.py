@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.mechanics.climber import Climber, State, along, no_slip
+from climber_uk.mechanics.climber import Climber, no_slip
+from climber_uk.mechanics.quantities import State, along
 from climber_uk.mechanics.udwadia_kalaba import constrained_acceleration
 
 PAPER = Climber()

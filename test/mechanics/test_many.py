@@ -4,7 +4,7 @@ import numpy as np
 
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.many import amended, chosen, part
-from climber_uk.mechanics.motion import Wrench
+from climber_uk.mechanics.quantities import Wrench
 
 MANY = replace(Climber(), mass=np.array([1.0, 2.0, 3.0]))
 

@@ -22,7 +22,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from world import TIMEOUT
 
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading, writing
 
 pytestmark = pytest.mark.nodes

@@ -9,7 +9,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.reference import Reference
 from climber_uk.messages import reading, writing
 from climber_uk.ros.running import PUBLISH_PERIOD

@@ -29,7 +29,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 from world import new_domain
 
 from climber_uk.bags.bag import read_messages
-from climber_uk.ros.offered_qos import is_compatible, request_for
+from climber_uk.recording.offered_qos import is_compatible, request_for
 
 # the wheels' generator of message types, which rclpy imports, uses deprecated modules
 pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")
@@ -57,7 +57,13 @@ class Recorder:
         directory.mkdir(exist_ok=True)
         self.bag = directory / "bag"
         self._log = directory / "log"
-        command = [sys.executable, "-m", "climber_uk.nodes.record_bag", "--output", str(self.bag)]
+        command = [
+            sys.executable,
+            "-m",
+            "climber_uk.recording.record_bag",
+            "--output",
+            str(self.bag),
+        ]
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
         with self._log.open("w") as log:
             self.process = subprocess.Popen(
@@ -504,7 +510,7 @@ def test_the_distribution_in_the_metadata_is_the_one_that_runs(graph, monkeypatc
 
 
 def run_record_bag(*options):
-    command = [sys.executable, "-m", "climber_uk.nodes.record_bag", *options]
+    command = [sys.executable, "-m", "climber_uk.recording.record_bag", *options]
     return subprocess.run(
         command,
         cwd=ROOT,

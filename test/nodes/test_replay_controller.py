@@ -16,7 +16,7 @@ from climber_uk.bags.bag import read_messages
 from climber_uk.bags.bag_writer import BagWriter
 from climber_uk.bags.storage import TYPESTORE
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

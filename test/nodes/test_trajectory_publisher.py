@@ -9,8 +9,8 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.preview import joined
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory

@@ -14,7 +14,7 @@ from world import CONFIG
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics import trajectory_parameters as plan
-from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading, writing
 from climber_uk.parameters.parameter_file import Values, read_file
 

@@ -4,7 +4,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import sqrtm
 
 from climber_uk.mechanics import udwadia_kalaba
-from climber_uk.mechanics.climber import Climber, State, no_slip
+from climber_uk.mechanics.climber import Climber, no_slip
+from climber_uk.mechanics.quantities import State
 from climber_uk.paper.printed import GAINS, A, PrintedSystem
 
 PRINTED = PrintedSystem()

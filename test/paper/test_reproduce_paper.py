@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from climber_uk.control.constraints import Exact, demanded, rows
-from climber_uk.mechanics.climber import State
+from climber_uk.control.constraint_set import demanded, rows
+from climber_uk.control.exact import Exact
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.udwadia_kalaba import velocity_correction
 from climber_uk.paper import attempts, closed_loop, drift, motion, study, table
 from climber_uk.paper.consistent import PAPER_PATH, ConsistentSystem

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from climber_uk.mechanics.climber import GRAVITY, Climber, State
+from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import LuGre
+from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.plant import Plant
 
 FLOOR = Climber(inclination=0.0)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from climber_uk.mechanics.adhesion import Grip
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import Plane
 from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import RigidBody

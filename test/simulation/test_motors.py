@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.motors import Motors
 
 CLIMBER = Climber(max_wheel_torque=4.0)

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from climber_uk.mechanics.adhesion import ADHESION, Grip, Magnetic
-from climber_uk.mechanics.climber import Climber, State, no_slip
+from climber_uk.mechanics.climber import Climber, no_slip
 from climber_uk.mechanics.contact import LOCOMOTION, Contact, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION, Coulomb, LuGre, Stribeck, Viscous
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory

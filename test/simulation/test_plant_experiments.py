@@ -13,8 +13,9 @@ from plant_experiments import (
     swinging,
 )
 
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.friction import FRICTION, Stribeck, Viscous
+from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.plant import Plant
 
 

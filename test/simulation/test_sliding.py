@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from climber_uk.mechanics.adhesion import Grip, Magnetic, NoAdhesion
-from climber_uk.mechanics.climber import Climber, State
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import Plane
 from climber_uk.simulation.inputs import NO_PUSH, Inputs, PlantState
 from climber_uk.simulation.plant import Plant

@@ -33,7 +33,7 @@ from rclpy.validate_topic_name import validate_topic_name
 from climber_uk.bags.bag_writer import NEVER, BagWriter
 from climber_uk.bags.log_clock import LogClock
 from climber_uk.bags.storage import STORAGES, is_known
-from climber_uk.ros.offered_qos import QUEUE_DEPTH, is_compatible, request_for, to_metadata
+from climber_uk.recording.offered_qos import QUEUE_DEPTH, is_compatible, request_for, to_metadata
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.signals import ignore_end, on_end

@@ -1,0 +1,40 @@
+"""The reference as a constraint on the climber: the accelerations with which it is met.
+
+A constraint set says what forward acceleration v̇ and yaw acceleration θ̈ it asks for. As rows of
+A q̈ = b these are [cosθ sinθ 0] q̈ = v̇ and [0 0 1] q̈ = θ̈; the wheels' no-slip row is the third.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from climber_uk.mechanics import Array, pack, unpack
+from climber_uk.mechanics.climber import no_slip
+from climber_uk.mechanics.quantities import DesiredAcceleration, Motion, ReferencePoint, State
+from climber_uk.mechanics.reference import Reference
+
+
+class ConstraintSet(Protocol):
+    """What makes the climber follow a reference, with gains as fields."""
+
+    def prepare(self, target: ReferencePoint) -> Any:
+        """All that can be said of a target before it is known where the climber is."""
+
+    def desired_acceleration(self, prepared: Any, motion: Motion) -> DesiredAcceleration:
+        """What is asked of a climber that moves like that."""
+
+    def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
+        """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""
+
+
+def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> DesiredAcceleration:
+    """What `constraints` ask of a state, each (...)."""
+    return constraints.demand(constraints.prepared(reference.target), state.motion)
+
+
+def rows(state: State, demand: DesiredAcceleration) -> tuple[Array, Array]:
+    """A (..., 3, 3) and b (..., 3) of a demand and of no-slip (18); A is orthonormal."""
+    slip_row, slip_b = no_slip(state)
+    sine, minus_cosine, zero = unpack(slip_row)
+    A = np.stack([pack(-minus_cosine, sine, zero), pack(zero, zero, zero + 1), slip_row], axis=-2)
+    return A, pack(*demand[:2], slip_b)

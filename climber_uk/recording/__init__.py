@@ -1,0 +1,1 @@
+"""`record_bag`: topics into a rosbag2 directory."""
