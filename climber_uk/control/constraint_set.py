@@ -29,7 +29,7 @@ class ConstraintSet(Protocol):
 
 def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> DesiredAcceleration:
     """What `constraints` ask of a state, each (...)."""
-    return constraints.demand(constraints.prepared(reference.target), state.motion)
+    return constraints.desired_acceleration(constraints.prepare(reference.target), state.motion)
 
 
 def rows(state: State, demand: DesiredAcceleration) -> tuple[Array, Array]:

@@ -23,6 +23,7 @@ from climber_uk.paper.study import (
     jobs,
 )
 from climber_uk.report.outputs import check_writable
+from climber_uk.report.tables import markdown
 from climber_uk.system.command_line import Parser
 from climber_uk.system.workers import workers
 
@@ -99,7 +100,7 @@ def write(
         ("attempts", attempts.COLUMNS, tried),
         ("drift", DRIFT_COLUMNS, drifted),
     ):
-        print(f"\n{name}\n{table.markdown(columns, cells)}")
+        print(f"\n{name}\n{markdown(columns, cells)}")
         paths += table.write(directory, name, columns, cells)
     runs = {
         kind: {key[1:]: results[key] for key in jobs(extent) if key[0] == kind}
