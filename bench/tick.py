@@ -8,7 +8,7 @@ least time of many counts.
 import argparse
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,6 @@ from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import (
-    DesiredAcceleration,
     Motion,
     ReferencePoint,
     State,
@@ -38,7 +37,6 @@ from climber_uk.mechanics.quantities import (
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.mechanics.udwadia_kalaba import constraint_force
 
 OURS = "closed form, floats"
 PAPER = Trajectory(Ellipse(), ConstantRate())
@@ -57,13 +55,14 @@ def as_the_paper(M: Array, Q: Array, A: Array, b: Array) -> Array:
 
 @dataclass(frozen=True)
 class WithMatrices(ControlLaw):
-    """The same law, but with M, Q, A and b, and a function that solves them."""
+    """The same law, but with M, Q, A and b, and another function that solves them."""
 
-    solve: Callable[[Array, Array, Array, Array], Array] = constraint_force
+    solve: Callable[[Array, Array, Array, Array], Array] = as_the_paper
 
-    def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
-        """See `ControlLaw`."""
+    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
+        """See `ControlLaw.generic`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
+        demand = self.constraints.desired_acceleration(prepared, motion)
         direction = np.tanh(demand.speed / self.options.friction_speed)
         Q = climber.applied_force(heading, direction)
         Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
@@ -183,7 +182,7 @@ def ways(constraints: str, options: ControlOptions) -> dict[str, ControlLaw]:
     gains = CONSTRAINTS[constraints]()
     return {
         OURS: ControlLaw(Climber(), gains, options),
-        "generic UK, numpy": WithMatrices(Climber(), gains, options),
+        "generic UK, numpy": ControlLaw(Climber(), gains, replace(options, solver="generic")),
         "the paper's formula": WithMatrices(Climber(), gains, options, as_the_paper),
     }
 

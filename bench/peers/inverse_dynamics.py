@@ -4,7 +4,7 @@ from typing import Any
 
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.mechanics.elementary import tanh
-from climber_uk.mechanics.quantities import DesiredAcceleration, Motion
+from climber_uk.mechanics.quantities import Motion
 
 
 class ByInverseDynamics(ControlLaw):
@@ -14,9 +14,9 @@ class ByInverseDynamics(ControlLaw):
         """What gives v̇ and θ̈ without friction: forward [N], to the left [N], about z [N m]."""
         raise NotImplementedError
 
-    def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
+    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
         """See `ControlLaw`."""
-        v_1, theta_2, speed = demand
+        v_1, theta_2, speed = self.constraints.desired_acceleration(prepared, motion)
         drive, lateral, turn = self.needed(v_1, theta_2, motion)
         rubbing = self.climber.seal_friction * tanh(speed / self.options.friction_speed)
         return drive + rubbing, turn, lateral

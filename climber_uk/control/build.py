@@ -57,12 +57,15 @@ def settings(
     name, climber = choice.constraints, with_its_seal(read(Climber), choice.adhesion)
     if pressure is not None:
         climber = replace(climber, suction_pressure=pressure)
-    law = ControlLaw(climber, read(CONSTRAINTS[name], f"{name}."), read(ControlOptions))
+    constraints, options = read(CONSTRAINTS[name], f"{name}."), read(ControlOptions)
+    if options.solver == "closed_form" and hasattr(constraints, "rows"):
+        raise ValueError(f"solver=closed_form must be generic for {name}, which gives rows")
+    law = ControlLaw(climber, constraints, options)
     return law, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
 
 
 def build_controller(parameters: ParameterSource, pressure: float | None) -> Controller:
-    """Follower as the parameters say, that has seen nothing yet."""
+    """Controller as the parameters say, that has seen nothing yet."""
     read, sampled_controller = parameters.read, SampledController(*settings(parameters, pressure))
     controller = Controller(
         sampled_controller, read(Safety), read(Approach), read(GuardOptions, "guard.")

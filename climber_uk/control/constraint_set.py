@@ -15,26 +15,31 @@ from climber_uk.mechanics.reference import Reference
 
 
 class ConstraintSet(Protocol):
-    """What makes the climber follow a reference, with gains as fields."""
+    """What makes the climber follow a reference, with gains as fields.
+
+    One that is not of this form has, in the place of `desired_acceleration`, a method
+    `rows(prepared, state)` that gives A (p, 3), b (p,), no-slip included, and the speed wanted
+    [m/s]; the option `solver` must be `generic` for it.
+    """
 
     def prepare(self, target: ReferencePoint) -> Any:
-        """All that can be said of a target before it is known where the climber is."""
+        """All that can be computed of a reference before the climber's motion is known."""
 
     def desired_acceleration(self, prepared: Any, motion: Motion) -> DesiredAcceleration:
-        """What is asked of a climber that moves like that."""
+        """Accelerations that the constraints ask of a climber in `motion`."""
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""
 
 
 def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> DesiredAcceleration:
-    """What `constraints` ask of a state, each (...)."""
+    """Accelerations that constraints ask of a climber in `state`, each (...)."""
     return constraints.desired_acceleration(constraints.prepare(reference.target), state.motion)
 
 
-def rows(state: State, demand: DesiredAcceleration) -> tuple[Array, Array]:
-    """A (..., 3, 3) and b (..., 3) of a demand and of no-slip (18); A is orthonormal."""
+def rows(state: State, desired: DesiredAcceleration) -> tuple[Array, Array]:
+    """A (..., 3, 3) and b (..., 3) of desired accelerations and of no-slip (18); A Aᵀ = 1."""
     slip_row, slip_b = no_slip(state)
     sine, minus_cosine, zero = unpack(slip_row)
     A = np.stack([pack(-minus_cosine, sine, zero), pack(zero, zero, zero + 1), slip_row], axis=-2)
-    return A, pack(*demand[:2], slip_b)
+    return A, pack(desired.forward, desired.yaw, slip_b)

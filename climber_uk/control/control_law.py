@@ -11,19 +11,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from climber_uk.control.constraint_set import ConstraintSet
+from climber_uk.control.constraint_set import ConstraintSet, rows
 from climber_uk.control.model import predict
-from climber_uk.mechanics import Array, pack
+from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
 from climber_uk.mechanics.quantities import (
     Bounds,
-    DesiredAcceleration,
     Motion,
     ReferencePoint,
+    State,
     Torques,
     Wrench,
+    across,
+    along,
 )
+from climber_uk.mechanics.udwadia_kalaba import constraint_force
 from climber_uk.parameters.declaration import check, parameter
 
 NOTHING = Wrench(0.0, 0.0)
@@ -41,6 +44,13 @@ class ControlOptions:
     )
     max_torque_rate: float = parameter(
         0.0, "N m/s", "fastest change of a torque; 0: none too fast", at_least=0, runtime=True
+    )
+
+    solver: str = parameter(
+        "closed_form",
+        "",
+        "of the Udwadia-Kalaba equation; generic: by matrices, the same, and 12 times slower",
+        choices=("closed_form", "generic"),
     )
 
     def __post_init__(self) -> None:
@@ -95,32 +105,49 @@ class ControlLaw:
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
 
-        The answer itself acts on the state it is for: it is computed twice, the second time
-        knowing what it will be.
+        Fixed-point iteration in two passes: the torques that are looked for move the state, by
+        half a period, to where they are computed.
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target)
         right, left = self._fixed_bounds or self._bounds(situation)
+        solve = self.generic if self.options.solver == "generic" else self.closed_form
         drive, turn = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
-            aim = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
-            wanted, turned, lateral = self.force(
-                self.constraints.desired_acceleration(prepared, aim), aim
-            )
-            wanted, turned = wanted - r_drive, turned - r_turn
-            drive, turn, one, other = climber.saturate(wanted, turned, right, left)
-        wheels, demanded = Torques(one, other), Wrench(wanted, turned)
-        fits = drive is wanted and turn is turned
-        lost = NOTHING if fits else Wrench(wanted - drive, turned - turn)
-        return Command(wheels, demanded, lateral, lost)
+            predicted = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
+            drive, turn, lateral = solve(prepared, predicted)
+            wanted = Wrench(drive - r_drive, turn - r_turn)
+            drive, turn, tau_r, tau_l, fits = climber.saturate(*wanted, right, left)
+        lost = NOTHING if fits else Wrench(wanted.drive - drive, wanted.turn - turn)
+        return Command(Torques(tau_r, tau_l), wanted, lateral, lost)
 
-    def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
-        """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
-        (v_1, turning, speed), (_, _, _, cosine, sine, v, omega) = demand, motion
+    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
+        """Qc = M Aᵀ b - Q (docs/theory.md, §4.2) in the climber's frame.
+
+        Forward [N], about z [N m] and to the left [N]; floats, or arrays (N,) of many climbers.
+        """
+        v_1, yaw_acceleration, speed = self.constraints.desired_acceleration(prepared, motion)
         mass, inertia, friction, weight = self.climber.inertial
-        drive = mass * v_1 + friction * tanh(speed / self.options.friction_speed) + weight * sine
-        return drive, inertia * turning, mass * v * omega + weight * cosine
+        rubbing = friction * tanh(speed / self.options.friction_speed)
+        force = mass * v_1 + rubbing + weight * motion.sine
+        lateral = mass * motion.speed * motion.yaw_rate + weight * motion.cosine
+        return force, inertia * yaw_acceleration, lateral
+
+    def generic(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
+        """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
+
+        Rows that constraints give themselves need no closed form.
+        """
+        state, heading, constraints = State.moving(motion), motion.heading, self.constraints
+        if hasattr(constraints, "rows"):
+            A, b, speed = constraints.rows(prepared, state)
+        else:
+            desired = constraints.desired_acceleration(prepared, motion)
+            (A, b), speed = rows(state, desired), desired.speed
+        Q = self.climber.applied_force(heading, tanh(speed / self.options.friction_speed))
+        Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
+        return along(heading, Qc), unpack(Qc)[2], across(heading, Qc)
 
     def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
@@ -128,7 +155,7 @@ class ControlLaw:
         weight = climber.weight_along_wall * motion.sine
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
-        return Torques(*climber.saturate(drive, turn, *self._bounds(situation))[2:])
+        return Torques(*climber.saturate(drive, turn, *self._bounds(situation))[2:4])
 
     @cached_property
     def _fixed_bounds(self) -> tuple[Bounds, Bounds] | None:

@@ -111,7 +111,7 @@ class Progress(NamedTuple):
 
     def target(self, preview: Preview, time: int) -> ReferencePoint | None:
         """Target for `time` [ns]; None outside of the preview."""
-        if self.pace is IN_TIME:
+        if self.pace == IN_TIME:
             return preview.target(time - self.waited)
         return self.pace.target(preview, time - self.waited)
 
@@ -122,7 +122,7 @@ class Progress(NamedTuple):
         passed = time - self.time
         if not 0 <= passed <= LONGEST_GAP * SECOND:
             return self._replace(time=time, waited=self.waited + passed)
-        if self.pace is IN_TIME:
+        if self.pace == IN_TIME:
             return self._replace(time=time)
         pace, waited = self.pace.after(passed / SECOND, pacing), self.waited
         is_restarting = self.is_restarting and pace.rate < 1 - IN_TIME_AGAIN
@@ -143,4 +143,4 @@ class Progress(NamedTuple):
 def restarted(time: int, position: int, rate: float) -> Progress:
     """Progress that goes on at `position` [ns] of the reference, at first at the rate σ `rate`."""
     pace = IN_TIME if rate > 1 - IN_TIME_AGAIN else Pace(rate=rate)
-    return Progress(time, time - position, pace, pace is not IN_TIME)
+    return Progress(time, time - position, pace, pace != IN_TIME)

@@ -150,11 +150,11 @@ class Climber:
 
     def saturate(
         self, drive: Any, turn: Any, right: Bounds, left: Bounds
-    ) -> tuple[Any, Any, Any, Any]:
-        """What wheels within their bounds can do of drive and turn, the turn served first.
+    ) -> tuple[Any, Any, Any, Any, bool]:
+        """Saturate the wheel torques at their bounds [N m]; the moment is served first.
 
-        Returns drive and turn, the very same ones if they fit, and the torques of the right wheel
-        and of the left one that do it.
+        Returns force [N] and moment [N m] that are left, the torques of the right and of the left
+        wheel [N m] that give them, and whether no bound acts (on any of many climbers).
         """
         (right_low, right_high), (left_low, left_high) = right, left
         to_mean, to_twist = self.leverage
@@ -162,7 +162,7 @@ class Climber:
         one, other = mean + twist, mean - twist
         fits = (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
         if fits is True or everywhere(fits):
-            return drive, turn, one, other
+            return drive, turn, one, other, True
         twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
         lowest, highest = right_low - twist, right_high - twist
         lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
@@ -174,6 +174,7 @@ class Climber:
             select(fits, turn, twist / to_twist),
             select(fits, one, clipped(mean + twist, right_low, right_high)),
             select(fits, other, clipped(mean - twist, left_low, left_high)),
+            False,
         )
 
     def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:

@@ -1,4 +1,5 @@
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -39,8 +40,9 @@ def test_the_closed_form_is_the_udwadia_kalaba_force(time, offset, turned, v, di
     climber = Climber(max_wheel_torque=1e9)
     reference = PAPER.at(time)
     state = State.rolling(reference.pose + np.array([offset, -offset, turned]), v, turned)
-    for constraints in (Guidance(), Exact()):
-        command = ControlLaw(climber, constraints, ControlOptions(predict=False)).command(
+    for constraints, solver in product((Guidance(), Exact()), ("closed_form", "generic")):
+        options = ControlOptions(predict=False, solver=solver)
+        command = ControlLaw(climber, constraints, options).command(
             situation(state, disturbance=disturbance), reference.target
         )
         A, b = rows(state, demanded(constraints, state, reference))
@@ -55,6 +57,28 @@ def test_the_closed_form_is_the_udwadia_kalaba_force(time, offset, turned, v, di
         np.testing.assert_allclose(command.missing, 0, atol=1e-12 * scale)
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Guidance with rows of its own, which nobody has solved by hand."""
+
+    guidance: Guidance = Guidance()  # noqa: RUF009 - it is frozen
+
+    def prepare(self, target):
+        return self.guidance.prepare(target)
+
+    def rows(self, prepared, state):
+        desired = self.guidance.desired_acceleration(prepared, state.motion)
+        A, b = rows(state, desired)
+        return 2.0 * A[::-1], 2.0 * b[::-1], desired.speed
+
+
+def test_constraints_that_give_rows_need_no_closed_form():
+    options = ControlOptions(solver="generic")
+    given = situation(START, disturbance=(3.0, -0.4)), PAPER.at(0.1).target
+    wanted, got = (ControlLaw(Climber(), c, options).command(*given) for c in (Guidance(), Rows()))
+    np.testing.assert_allclose(got.torques, wanted.torques, rtol=1e-12)
+
+
 bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[0] + b[1]))
 
 
@@ -62,7 +86,7 @@ bounds = st.tuples(st.floats(-20, 20), st.floats(0, 20)).map(lambda b: (b[0], b[
 def test_limits_keep_the_turn_before_the_drive(right, left, right_bounds, left_bounds):
     climber = Climber()
     wrench = climber.wrench(right, left)
-    *done, one, other = climber.saturate(*wrench, right_bounds, left_bounds)
+    *done, one, other, _ = climber.saturate(*wrench, right_bounds, left_bounds)
     got = one, other
     np.testing.assert_allclose(done, climber.wrench(*got), atol=1e-9)
     for torque, (low, high) in zip(got, (right_bounds, left_bounds), strict=True):
