@@ -62,7 +62,7 @@ def settings(
 
 
 def build_controller(parameters: ParameterSource, pressure: float | None) -> Controller:
-    """Follower as the parameters say, that has seen nothing yet."""
+    """Controller as the parameters say, that has seen nothing yet."""
     read, sampled_controller = parameters.read, SampledController(*settings(parameters, pressure))
     controller = Controller(
         sampled_controller, read(Safety), read(Approach), read(GuardOptions, "guard.")

@@ -15,13 +15,24 @@ from climber_uk.mechanics.reference import Reference
 
 
 class ConstraintSet(Protocol):
-    """What makes the climber follow a reference, with gains as fields."""
+    """What makes the climber follow a reference, with gains as fields.
+
+    The fields are numbers: where gains change while it runs, old and new ones are blended.
+    """
 
     def prepare(self, target: ReferencePoint) -> Any:
-        """All that can be said of a target before it is known where the climber is."""
+        """All that can be said of a target before it is known where the climber is.
+
+        What is dear to compute belongs here: it is done once for an answer, or for many climbers.
+        """
 
     def desired_acceleration(self, prepared: Any, motion: Motion) -> DesiredAcceleration:
-        """What is asked of a climber that moves like that."""
+        """What is asked of a climber that moves like that.
+
+        Floats of one, or arrays (N,) of many, go through the same lines: no `if` on numbers, but
+        `select`, `either` and `everywhere` of `mechanics.elementary`. The demand's `speed` is that
+        whose sign friction will have.
+        """
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""

@@ -75,7 +75,7 @@ class Command(NamedTuple):
 
     @property
     def constraint_force(self) -> Array:
-        """Drive [N], lateral [N], about z [N m], (..., 3)."""
+        """Drive [N], lateral [N], about z [N m], (..., 3): x, y, z of a wrench's message."""
         return pack(self.demanded.drive, self.lateral, self.demanded.turn)
 
     @property
@@ -86,7 +86,11 @@ class Command(NamedTuple):
 
 @dataclass(frozen=True)
 class ControlLaw:
-    """The control law: a model of the climber and a constraint set."""
+    """The control law: a model of the climber and a constraint set. It has no memory.
+
+    What it has to know of before comes in a `ControlInput`, from the `SampledController` that owns
+    it.
+    """
 
     climber: Climber
     constraints: ConstraintSet
@@ -95,8 +99,8 @@ class ControlLaw:
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
 
-        The answer itself acts on the state it is for: it is computed twice, the second time
-        knowing what it will be.
+        A fixed-point iteration of two passes: the answer itself moves the state to the time that it
+        is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.options.lookahead(period)
@@ -111,12 +115,17 @@ class ControlLaw:
             wanted, turned = wanted - r_drive, turned - r_turn
             drive, turn, one, other = climber.saturate(wanted, turned, right, left)
         wheels, demanded = Torques(one, other), Wrench(wanted, turned)
+        # `saturate` hands back the very objects it was given if no limit cuts, be they floats or
+        # arrays; that they are the same ones, not merely equal, says so without comparing numbers
         fits = drive is wanted and turn is turned
         lost = NOTHING if fits else Wrench(wanted - drive, turned - turn)
         return Command(wheels, demanded, lateral, lost)
 
     def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
-        """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
+        """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N].
+
+        The two that torques can do come first; messages have x, y, z: `Command.constraint_force`.
+        """
         (v_1, turning, speed), (_, _, _, cosine, sine, v, omega) = demand, motion
         mass, inertia, friction, weight = self.climber.inertial
         drive = mass * v_1 + friction * tanh(speed / self.options.friction_speed) + weight * sine

@@ -153,8 +153,9 @@ class Climber:
     ) -> tuple[Any, Any, Any, Any]:
         """What wheels within their bounds can do of drive and turn, the turn served first.
 
-        Returns drive and turn, the very same ones if they fit, and the torques of the right wheel
-        and of the left one that do it.
+        Returns drive and turn, and the torques of the right wheel and of the left one that do it.
+        Where nothing has to be cut, drive and turn are the very objects that were given: a caller
+        tells by `is` that no limit acted.
         """
         (right_low, right_high), (left_low, left_high) = right, left
         to_mean, to_twist = self.leverage
