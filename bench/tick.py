@@ -88,7 +88,7 @@ class Known:
 
 
 def ticks(sampled_controller: SampledController, known: bool = False) -> Callable[[], None]:
-    """Ticks of a tracker on its way along the paper's ellipse, with targets that are known or not.
+    """Ticks of a `SampledController` along the paper's ellipse, with targets that are known or not.
 
     A tick aims at the middle of the period that follows it.
     """
@@ -188,7 +188,7 @@ def ways(constraints: str, options: ControlOptions) -> dict[str, ControlLaw]:
 
 
 def check(sampled_controller: SampledController, run: Callable[[], None], torques: Array) -> None:
-    """Raise `RuntimeError` unless the C gives what the tracker answers."""
+    """Raise `RuntimeError` unless the C gives what the `SampledController` answers."""
     run()
     preview = sampled(PAPER, 1.0)
     for number, motion in enumerate(motions_on_the_way(TICKS)):

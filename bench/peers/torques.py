@@ -66,7 +66,7 @@ def check(controllers: Mapping[str, ControlLaw]) -> float:
 
 
 def in_c(limit: Limit, sampled_controller: SampledController) -> Callable[[], None]:
-    """Ticks of the law in C, which are those of `tracker`, for as long as there is `limit`."""
+    """Ticks of the law in C, those of `sampled_controller`, for as long as there is `limit`."""
     run, torques = tick.ticks_in_c(limit, sampled_controller)
     tick.check(sampled_controller, run, torques)
     return run

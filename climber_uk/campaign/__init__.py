@@ -1,1 +1,8 @@
-"""In how many of many runs does it fall: parameters, starts, noise and faults drawn at random."""
+"""`campaign`: in how many of many runs does it fall? Parameters, starts and noise are drawn.
+
+A campaign's file -> `campaign.read` (`names`, `distributions`, `limits`; all is checked before
+anything runs) -> parts of runs (`running`, in processes) -> each part's draws as closed loops
+(`parts`, `scenario`, `closed_loop.batch`) -> Parquet files (`parts.Store`) -> table (`results`,
+`counting`) and pictures (`figures`). One run again, through the nodes: `rerun`. `command` is the
+command line.
+"""

@@ -1,1 +1,9 @@
-"""Controller and simulated robot in one process: one, or thousands at once."""
+"""Controller and simulated robot in one process: one, or thousands at once.
+
+One: a trajectory -> `simulate.simulate` (the nodes' `Controller` and `SimulatedRobot`, and a `Link`
+of delay, jitter, loss and noise between them) -> `simulate.Run`.
+
+Many: arrays (N,) in the place of numbers -> `batch.Loops` (the nodes' `SampledController`, with
+`pressure_gauge` and `simulation.sensors`) -> steps of the plants (`unicycle`, or `compiled`, which
+is the same by numba) -> `outcome.Tally` -> `outcome.Outcome`.
+"""

@@ -122,7 +122,7 @@ class ActiveReference:
             self._position = self._first_position(stamp)
 
     def follow(self, age: float) -> Followed:
-        """Torques for the tracker's last odometry, of `age` [s]."""
+        """Torques for the last odometry that the `SampledController` saw, of `age` [s]."""
         if self.preview is None:
             return Followed(Mode.WAITING)
         try:

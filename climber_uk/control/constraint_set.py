@@ -17,16 +17,24 @@ from climber_uk.mechanics.reference import Reference
 class ConstraintSet(Protocol):
     """What makes the climber follow a reference, with gains as fields.
 
-    One that is not of this form has, in the place of `desired_acceleration`, a method
+    The fields are numbers: where gains change while it runs, old and new ones are blended. One that is not of this form has, in the place of `desired_acceleration`, a method
     `rows(prepared, state)` that gives A (p, 3), b (p,), no-slip included, and the speed wanted
     [m/s]; the option `solver` must be `generic` for it.
     """
 
     def prepare(self, target: ReferencePoint) -> Any:
-        """All that can be computed of a reference before the climber's motion is known."""
+        """All that can be computed of a reference before the climber's motion is known.
+
+        It is done once for an answer, or for many climbers.
+        """
 
     def desired_acceleration(self, prepared: Any, motion: Motion) -> DesiredAcceleration:
-        """Accelerations that the constraints ask of a climber in `motion`."""
+        """Accelerations that the constraints ask of a climber in `motion`.
+
+        Floats of one, or arrays (N,) of many, go through the same lines: no `if` on numbers, but
+        `select`, `either` and `everywhere` of `mechanics.elementary`. The `speed` is that whose
+        sign friction will have.
+        """
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""

@@ -85,7 +85,7 @@ class Command(NamedTuple):
 
     @property
     def constraint_force(self) -> Array:
-        """Drive [N], lateral [N], about z [N m], (..., 3)."""
+        """Drive [N], lateral [N], about z [N m], (..., 3): x, y, z of a wrench's message."""
         return pack(self.demanded.drive, self.lateral, self.demanded.turn)
 
     @property
@@ -96,7 +96,11 @@ class Command(NamedTuple):
 
 @dataclass(frozen=True)
 class ControlLaw:
-    """The control law: a model of the climber and a constraint set."""
+    """The control law: a model of the climber and a constraint set. It has no memory.
+
+    What it has to know of before comes in a `ControlInput`, from the `SampledController` that owns
+    it.
+    """
 
     climber: Climber
     constraints: ConstraintSet
@@ -105,8 +109,8 @@ class ControlLaw:
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
 
-        Fixed-point iteration in two passes: the torques that are looked for move the state, by
-        half a period, to where they are computed.
+        A fixed-point iteration of two passes: the answer itself moves the state to the time that it
+        is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.options.lookahead(period)

@@ -44,7 +44,16 @@ class Answer(NamedTuple):
 
 
 class Controller:
-    """Follows while all is well, else gives the safe output; `mode` and `detail` say why."""
+    """Follows while all is well, else gives the safe output; `mode` and `detail` say why.
+
+    It decides whether to follow. It owns a `SampledController`, which knows the state at each
+    odometry and what acts until the next; that owns a `ControlLaw`, which has no memory and turns
+    one motion and one reference into torques. What to follow is the `ActiveReference`'s.
+
+    The mode is found anew for every answer, from the fields below, the first that holds
+    (`_find_mode`). Good odometry without a reference is WAITING, without any output, for up to
+    `reference_timeout` since `_waiting_since`, and NO_REFERENCE, with the safe output, after that.
+    """
 
     def __init__(
         self,
@@ -59,7 +68,7 @@ class Controller:
         self.mode, self.detail = Mode.WAITING, ""
         self.answer: Answer | None = None  # the last one
         self._enabled = True
-        self._clockless_looks = 0
+        self._clockless_looks = 0  # in a row, of `look`: see `CLOCK_PATIENCE`
         self._heard: int | None = None  # [ns] time of the last odometry, good or bad
         self._trouble: Trouble | None = None  # with that odometry
         self._fault: Trouble | None = None  # found by the guard, until the climber has rested
@@ -108,7 +117,9 @@ class Controller:
     def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
         """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
         self._look_at_clock(now)
-        if self._stamp == 0:  # the first one: in simulated time the clock comes right after it
+        # a simulation publishes its first odometry right before its first /clock: how long there
+        # was no clock until then tells nothing, and is counted anew
+        if self._stamp == 0:
             self._clockless_looks = 0
         if stamp == self._stamp and self.mode in (Mode.FOLLOWING, Mode.APPROACHING):
             return self.answer  # it was not received: the same once more
@@ -172,7 +183,7 @@ class Controller:
     # What odometry says
 
     def _take(self, stamp: int, motion: Motion) -> Trouble | None:
-        """Give the tracker an odometry; return what is wrong with it."""
+        """Give the `SampledController` an odometry; return what is wrong with it."""
         sampled_controller, last = self.sampled_controller, self.sampled_controller.motion
         if last is None:
             sampled_controller.see(stamp, motion)

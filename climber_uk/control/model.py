@@ -32,7 +32,9 @@ MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 def predict(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float) -> Motion:
     """Motion `time` [s] later under a constant drive [N] and turn [N m], by the midpoint rule.
 
-    Both include the disturbance. At rest friction takes whatever value holds the climber, up to f.
+    Both include the disturbance. Below `SLOW`, where the sign of a measured speed tells nothing,
+    friction is taken to balance what pushes, up to f: while that suffices the speed stays as it is,
+    rather than being braked to rest (docs/theory.md, §8.2).
     """
     mass, inertia, friction, weight = climber.inertial
     x, y, heading, cosine, sine, v, omega = motion

@@ -66,7 +66,12 @@ class Timing:
 
 
 class SampledController:
-    """Answers odometry with torques, and learns from how the climber took the last ones."""
+    """Answers odometry with torques, and learns from how the climber took the last ones.
+
+    Owned by a `Controller`, which decides whether its answers are sent; owns a `ControlLaw`, the
+    state and the disturbance at the last odometry, and the history of torques. One climber, or many
+    in step: arrays (N,) where there are floats.
+    """
 
     def __init__(self, law: ControlLaw, observer: Observer, timing: Timing, pacing: Pacing) -> None:
         self.law, self.observer = law, observer
@@ -97,6 +102,8 @@ class SampledController:
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
         self.learnt = DisturbanceEstimate()
+        # whether no limit cut the last answer, so that what came out tells of the disturbance:
+        # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
 
     @property
@@ -116,7 +123,10 @@ class SampledController:
         self.timing, self.pacing = timing, pacing
 
     def see(self, stamp: int, motion: Motion, expected: Motion | None = None) -> None:
-        """Take in a newer odometry; who has asked for what is expected by then may hand it back."""
+        """Correct state and disturbance by an odometry of `stamp` [ns], newer than the last.
+
+        `expected` is `expected_at(stamp)`, where the caller has computed it already.
+        """
         if self.motion is not None:
             time = (stamp - self.stamp) / SECOND
             share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
@@ -133,7 +143,7 @@ class SampledController:
                 self.law.climber, self.learnt, expected, motion, time, shares
             )
             if is_known:
-                is_learnt = self._learning
+                is_learnt = self._learning  # of many, each learns or holds what it has learnt
                 self.learnt = (
                     learnt if is_learnt is True else chosen(is_learnt, learnt, self.learnt.held)
                 )

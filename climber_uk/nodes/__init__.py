@@ -1,1 +1,5 @@
-"""The ROS 2 nodes: declare, subscribe, publish."""
+"""The executables that are nodes: declare, subscribe, publish. What they share is in `ros`.
+
+`trajectory_publisher` -> reference -> `uk_torque_controller` -> wheel_torques -> `plant_simulator`
+-> odom, for both of them; `markers` draws it.
+"""

@@ -42,6 +42,7 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         Raises `ValueError` if it cannot listen.
         """
         LifecycleNodeMixin.__init__(self)
+        # private, as is `_state_machine`: there is no other way between a request and the mixin
         self._change_state = self._service_change_state.callback
         self._service_change_state.callback = self.on_change_state
         self.create_service(SetBool, "~/enable", self.on_enable)

@@ -79,6 +79,7 @@ class NodeParameters:
 
     def _given(self, name: str, prefix: str, field: Field) -> Any:
         """Value that is given for a parameter, if one is; an integer will do for a float."""
+        # private: rclpy tells only of what is declared, and only where the type is right
         overrides = self._node._parameter_overrides
         old = prefix + field.metadata["formerly"]
         if field.metadata["formerly"] and old in overrides:

@@ -1,1 +1,4 @@
-"""What a program needs of its system: a command line, signals, and processes that end with it."""
+"""What a program needs of its system: a command line, signals, and processes that end with it.
+
+`command_line` for every tool; `signals`, `processes` and `workers` for what starts others.
+"""

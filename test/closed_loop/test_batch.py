@@ -70,7 +70,7 @@ CASES = {
 
 
 def alone(case, i, duration):
-    """The same by the scalar tracker and the plant that integrates (30)."""
+    """The same by the scalar `SampledController` and the plant that integrates (30)."""
     trajectory, start, true, gains, known, steps, delay = case
     model = replace(BUILT if trajectory is EIGHT else PAPER, **known)
     law = ControlLaw(as_floats(model, i), as_floats(gains, i), ControlOptions())

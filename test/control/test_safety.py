@@ -57,7 +57,7 @@ def test_a_heading_a_turn_away_is_none_and_what_is_not_finite_has_jumped():
 
 
 def controller(now=SECOND, **safety):
-    """A follower that has answered an odometry of 1 s on its path, and the climber's state."""
+    """A controller that has answered an odometry of 1 s on its path, and the climber's state."""
     sampled_controller = SampledController(
         ControlLaw(Climber(), Guidance(), ControlOptions()), Observer(), Timing(), Pacing()
     )
