@@ -17,7 +17,9 @@ from climber_uk.mechanics.reference import Reference
 class ConstraintSet(Protocol):
     """What makes the climber follow a reference, with gains as fields.
 
-    The fields are numbers: where gains change while it runs, old and new ones are blended. One that is not of this form has, in the place of `desired_acceleration`, a method
+    The fields are numbers: where gains change while it runs, old and new ones are blended.
+
+    A set that is not of this form has, in the place of `desired_acceleration`, a method
     `rows(prepared, state)` that gives A (p, 3), b (p,), no-slip included, and the speed wanted
     [m/s]; the option `solver` must be `generic` for it.
     """
