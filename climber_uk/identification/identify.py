@@ -11,7 +11,8 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from climber_uk.bags.topics import PARAMETERS
+from climber_uk.bags.collecting import check_one_run
+from climber_uk.bags.topics import ODOMETRY, PARAMETERS, Topics
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
@@ -37,7 +38,8 @@ from climber_uk.identification.report import (
 from climber_uk.mechanics.climber import Climber
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, read_file
-from climber_uk.system.command_line import Parser
+from climber_uk.report.outputs import check_writable, printable
+from climber_uk.system.command_line import Parser, between
 
 PUBLISHER = "trajectory_publisher"
 SIDES = "right", "left"
@@ -52,6 +54,9 @@ def tell(options: argparse.Namespace) -> None:
     recorded = recorded_parameters(options.bag, topic)
     parameters = {**recorded, **file}
     believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
+    names = Topics({ODOMETRY: options.odometry})
+    for loss in check_one_run(options.bag, names, options.namespace.strip("/")):
+        print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
     motion, unfit = read_motion(options.bag, source(options, {**file, **recorded}, believed))
     found = identify(motion, believed, cut, site)
     print(table(found, believed), end="")
@@ -131,7 +136,7 @@ def main() -> None:
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument("--odometry", default="odom", help="topic (default: odom)")
     parser.add_argument(
-        "--delay", type=float, help="[s] of torques, unless joint_states tells them"
+        "--delay", type=between(0.0, 10.0), help="[s] of torques, unless joint_states tells them"
     )
     parser.add_argument("--output", "-o", type=Path, help="write a parameter file for the nodes")
     parser.add_argument("--json", type=Path, help="write the table as JSON")
@@ -148,6 +153,9 @@ def main() -> None:
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
     try:
+        for file in (options.output, options.json, options.figure, options.plan):
+            if file:
+                check_writable(file.parent)
         if options.plan:
             plan(options)
         else:

@@ -1,6 +1,6 @@
 """How a climber moved and what drove it, as arrays, from the messages of a bag."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.bags.bag import read_messages
+from climber_uk.bags.restarts import are_strays
+from climber_uk.bags.taking import FAULTS, STRAY
+from climber_uk.bags.topics import ODOMETRY, TYPES
 from climber_uk.identification.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading
@@ -147,24 +150,37 @@ def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]],
     """Contents by stamp [s] of odometry, commands, wheels and pressure; why others are unfit."""
     right, left = source.joints
     readers: dict[str, Callable[[Any], Any]] = {
-        source.odometry: lambda m: reading.state(m, m.header.frame_id, m.child_frame_id),
+        ODOMETRY: lambda m: reading.state(m, m.header.frame_id, m.child_frame_id),
         "wheel_torques": lambda m: reading.wheel_torques(m, left, right),
         "joint_states": lambda m: _wheels(m, source.joints),
         "suction_pressure": reading.pressure,
     }
-    topics = {source.topic(name): name for name in readers}
+    topics = {source.topic(source.odometry): ODOMETRY}
+    topics |= {source.topic(name): name for name in readers if name != ODOMETRY}
     found: dict[str, dict[float, Any]] = {name: {} for name in readers}
     unfit: list[str] = []
     for topic, _, message in read_messages(bag, topics):
         name = topics[topic]
         try:
+            if message.__msgtype__ != (wanted := TYPES[name]):
+                raise ValueError(f"type {message.__msgtype__} must be {wanted}")
             content = readers[name](message)
         except ValueError as error:
             unfit.append(str(error))
         else:
             if content is not None:
                 found[name][reading.nanoseconds(message.header.stamp) / SECOND] = content
-    return [dict(sorted(contents.items())) for contents in found.values()], unfit
+    return [dict(sorted(_at_sound_times(contents, unfit))) for contents in found.values()], unfit
+
+
+def _at_sound_times(contents: dict[float, Any], unfit: list[str]) -> Iterator[tuple[float, Any]]:
+    """Contents without those whose stamps are far off those recorded around them."""
+    strays = are_strays(np.array([round(time * SECOND) for time in contents], np.int64))
+    for item, is_stray in zip(contents.items(), strays.tolist(), strict=True):
+        if is_stray:
+            unfit.append(FAULTS[STRAY])
+        else:
+            yield item
 
 
 def _wheels(message: Any, joints: Sequence[str]) -> Wheels | None:

@@ -28,6 +28,7 @@ SPECIAL = re.compile(r"[-+]?(\.?(inf|nan)|infinity)", re.IGNORECASE)
 FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE)
 LEAST = sys.float_info.min
+LARGEST = 2**24  # [bytes] of a file
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,10 @@ class Section:
 
     @cached_property
     def is_shared(self) -> bool:
-        """Whether nodes of any name are meant: not each of them has all of these parameters."""
+        """Whether nodes of any name are meant: not each of them has all of these parameters.
+
+        `/**/x` means x, wherever it is: what x does not have can only be a mistake there.
+        """
         return self.name.endswith("*")
 
     def is_for(self, node: str) -> bool:
@@ -70,7 +74,7 @@ class Section:
 
 
 class GivenValue(NamedTuple):
-    """A value, and whether nodes of any name are given it."""
+    """A value, and whether it is given to nodes of any name, and never to one by its name."""
 
     value: Any
     is_shared: bool
@@ -109,12 +113,12 @@ def read_file(path: Path, node: str) -> dict[str, Any]:
 
 def given(sections: Iterable[Section], node: str) -> dict[str, GivenValue]:
     """What sections have for a node, of two entries the later one's."""
-    return {
-        name: GivenValue(value, section.is_shared)
-        for section in sections
-        if section.is_for(node)
-        for name, value in section.values.items()
-    }
+    found: dict[str, GivenValue] = {}
+    for section in sections:
+        for name, value in section.values.items() if section.is_for(node) else ():
+            is_shared = section.is_shared and (name not in found or found[name].is_shared)
+            found[name] = GivenValue(value, is_shared)
+    return found
 
 
 def similar(name: str, known: Iterable[str]) -> str:
@@ -182,9 +186,9 @@ def _value(text: str, style: str | None) -> bool | int | float | str:
 
 def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Keys and value of each entry of a file, in its order."""
-    tables = _Tables()
+    tables, line = _Tables(), 1
     try:
-        for event in yaml.parse(path.read_text(encoding="utf-8"), PARSER):
+        for event in yaml.parse(_text(path), PARSER):
             line = event.start_mark.line + 1  # type: ignore[union-attr]
             for value in tables.take(event):
                 yield tuple(tables.keys), value
@@ -193,6 +197,17 @@ def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
         raise ValueError(f"{path} is no parameter file: {' '.join(str(error).split())}") from None
     except ValueError as error:
         raise ValueError(f"{path} is no parameter file: line {line}: {error}") from None
+
+
+def _text(path: Path) -> str:
+    with path.open("rb") as stream:
+        content = stream.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise ValueError(f"larger than {LARGEST >> 20} MiB")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise ValueError("not a text in UTF-8") from None
 
 
 class _Tables:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from climber_uk.bags.publishing_order import read_published
-from climber_uk.bags.topics import ODOMETRY, REFERENCE, TORQUES
+from climber_uk.bags.topics import ODOMETRY, REFERENCE, TORQUES, types_of
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
@@ -21,6 +21,8 @@ from climber_uk.messages.names import Names
 from climber_uk.parameters.parameter_file import Values
 from climber_uk.replay.recorded_controller import CLOCK, Modes, RecordedController
 
+SHORTEST_LOOK = SECOND // 1000  # [ns] between two looks at whether inputs have stopped
+MOST_LOOKS = 10_000  # at inputs that have stopped: by then nothing changes any more
 PRESSURE = "suction_pressure"
 DEFAULTS = {
     prefix + field.name: field.default
@@ -47,9 +49,8 @@ class Replay:
         self.modes: Modes = []
         self.clock = self.looked = 0  # times of the node's clock, and of the wall clock
         safety = self.controller.safety
-        self.look_period = round(
-            min(safety.odometry_timeout, safety.reference_timeout) / 2 * SECOND
-        )
+        timeout = min(safety.odometry_timeout, safety.reference_timeout)
+        self.look_period = max(round(timeout / 2 * SECOND), SHORTEST_LOOK)
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
@@ -72,7 +73,7 @@ class Replay:
             f"{namespace}/{PRESSURE}": self.on_pressure,
             f"{namespace}/{TORQUES}": self.on_torques,
         }
-        for topic, at, message in read_published(bag, takers):
+        for topic, at, message in read_published(bag, types_of(takers)):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
@@ -87,7 +88,7 @@ class Replay:
 
     def look_until(self, at: int) -> None:
         """Look, at the node's intervals of the wall clock, whether inputs have stopped."""
-        self.looked = self.looked or at
+        self.looked = max(self.looked or at, at - MOST_LOOKS * self.look_period)
         while self.looked + self.look_period <= at:
             self.looked += self.look_period
             self.pass_time(self.looked)

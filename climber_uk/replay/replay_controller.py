@@ -15,8 +15,9 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
+from climber_uk.bags.collecting import check_one_run
 from climber_uk.bags.publishing_order import are_known
-from climber_uk.bags.topics import TORQUES
+from climber_uk.bags.topics import TORQUES, Topics
 from climber_uk.parameters.parameter_file import read_argument, read_file
 from climber_uk.replay.recorded_controller import NODE, PARAMETERS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
@@ -29,7 +30,7 @@ from climber_uk.replay.torque_comparison import (
     write_csv,
 )
 from climber_uk.report.outputs import output, printable
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, between
 
 
 def replayed(options: argparse.Namespace) -> Comparison:
@@ -49,6 +50,8 @@ def replayed(options: argparse.Namespace) -> Comparison:
         raise ValueError(
             f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
         )
+    for loss in check_one_run(options.bag, Topics(), namespace.strip("/")):
+        print(printable(f"replay_controller: {options.bag}: {loss}"), file=sys.stderr)
     if not are_known(options.bag, [f"{namespace}/{TORQUES}"]):
         print(
             f"replay_controller: {options.bag} does not tell when messages were published: they "
@@ -96,7 +99,10 @@ def main() -> None:
         help="directory (default: a new one, replay, in the bag or beside it)",
     )
     parser.add_argument(
-        "--fail-above", type=float, metavar="TORQUE", help="status 1 if a torque differs more [N m]"
+        "--fail-above",
+        type=between(0.0, 1e6),
+        metavar="TORQUE",
+        help="status 1 if a torque differs more [N m]",
     )
     options = parser.arguments()
     try:

@@ -2,9 +2,11 @@
 
 import argparse
 import io
+import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 PACKAGE = "climber_uk"
@@ -31,11 +33,40 @@ class Parser(argparse.ArgumentParser):
             sys.stdout = io.TextIOWrapper(
                 binary, out.encoding, out.errors, line_buffering=out.line_buffering
             )
-        return self.parse_args(given)
+        options = self.parse_args(given)
+        for name, value in vars(options).items():
+            setattr(options, name, self._at_home(value))
+        return options
+
+    def _at_home(self, value: Any) -> Any:
+        """The same, paths with the home directory for ~, which shells leave in `--output=~/x`."""
+        if isinstance(value, list):
+            return [self._at_home(one) for one in value]
+        try:
+            return value.expanduser() if isinstance(value, Path) else value
+        except RuntimeError:
+            self.error(f"{value}: there is no such user")
 
     def error(self, message: str) -> NoReturn:
         """Exit with one line."""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def between(least: float, most: float) -> Callable[[str], float]:
+    """For `type`: a number within bounds."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} must be a number from {least:g} to {most:g}"
+            )
+        return value
+
+    return read
 
 
 class _Version(argparse.Action):
@@ -47,12 +78,17 @@ class _Version(argparse.Action):
 
 
 class _Output(io.FileIO):
-    """Drops what is written after its reader has gone: files and exit status stay the same."""
+    """Drops what is written after its reader has gone, or the disk is full, which it says.
+
+    Files and exit status stay the same.
+    """
 
     def write(self, data: Any) -> int:
         try:
             return super().write(data) or 0
-        except BrokenPipeError:
+        except OSError as error:
+            if not isinstance(error, BrokenPipeError):
+                print(f"the output is not written: {error.strerror}", file=sys.stderr)
             with open(os.devnull, "wb") as nowhere:
                 os.dup2(nowhere.fileno(), self.fileno())
             return memoryview(data).nbytes
