@@ -7,7 +7,7 @@ torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -84,13 +84,33 @@ class Command(NamedTuple):
         return np.broadcast_to(pack(*self.lost), self.torques.shape)
 
 
+class ForceLaw(Protocol):
+    """A control law in the place of the constraints: force and moment, whatever it is made of.
+
+    A frozen dataclass of parameters, without a memory: it is asked twice for each answer, first
+    for a guess of the motion. What is around the constraints stays around it: the prediction to
+    where the torques act, the observer, whose disturbance is taken off what it asks for, the
+    wheels' limits, time scaling, and the guard, which allows the speeds that the `constraints` may
+    ask for. A way to the reference (`Approach`) is left to them, too.
+    """
+
+    def wrench(self, climber: Climber, target: ReferencePoint, motion: Motion) -> Wrench:
+        """Drive [N] and turn [N m] wanted of the wheels of a climber in `motion`.
+
+        They include what carries the climber's weight and overcomes its friction. `target` is the
+        reference at the time of `motion`, both in the wall's frame. What is not finite, or raises
+        `ValueError` or `ArithmeticError`, gives the safe output.
+        """
+
+
 @dataclass(frozen=True)
 class ControlLaw:
-    """The control law: a model of the climber and a constraint set."""
+    """The control law: a model of the climber and a constraint set, or another law."""
 
     climber: Climber
     constraints: ConstraintSet
     options: ControlOptions
+    other: ForceLaw | None = None  # in the constraints' place
 
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
@@ -105,9 +125,13 @@ class ControlLaw:
         drive, turn = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
             aim = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
-            wanted, turned, lateral = self.force(
-                self.constraints.desired_acceleration(prepared, aim), aim
-            )
+            if self.other is None:
+                wanted, turned, lateral = self.force(
+                    self.constraints.desired_acceleration(prepared, aim), aim
+                )
+            else:
+                wanted, turned = self.other.wrench(climber, target, aim)
+                lateral = self.lateral(aim)
             wanted, turned = wanted - r_drive, turned - r_turn
             drive, turn, one, other = climber.saturate(wanted, turned, right, left)
         wheels, demanded = Torques(one, other), Wrench(wanted, turned)
@@ -121,6 +145,11 @@ class ControlLaw:
         mass, inertia, friction, weight = self.climber.inertial
         drive = mass * v_1 + friction * tanh(speed / self.options.friction_speed) + weight * sine
         return drive, inertia * turning, mass * v * omega + weight * cosine
+
+    def lateral(self, motion: Motion) -> Any:
+        """Reaction of the wheels to the left, which the no-slip row asks for [N]."""
+        mass, _, _, weight = self.climber.inertial
+        return mass * motion.speed * motion.yaw_rate + weight * motion.cosine
 
     def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

@@ -1,14 +1,17 @@
 """All that is between a climber and its wall: its hold, the seal's friction, and what it runs on.
 
-A new kind of locomotion is one class and one entry. Everything broadcasts.
+A new kind of locomotion is one class, a `Locomotion`, and one entry in `LOCOMOTION`, or an entry
+point `climber_uk.locomotion` of another package. Everything broadcasts.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.friction import Coulomb, Friction
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 
 class Locomotion(Protocol):
@@ -42,7 +45,9 @@ class Tracked:
         return self.scrub_friction_coefficient * load * self.length / 4
 
 
-LOCOMOTION: dict[str, type[Locomotion]] = {"wheeled": Wheeled, "tracked": Tracked}
+LOCOMOTION: Mapping[str, type[Locomotion]] = Variants(
+    {"wheeled": Wheeled, "tracked": Tracked}, "locomotion"
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,16 +4,19 @@
     cylinder   the same with inclination(y) = inclination + y/R, and ẏ²/R more into the wall
 
 x and y are lengths on the wall: a cylinder unrolls without stretching, so that nothing else in the
-equations of motion changes. A new wall is one class and one entry.
+equations of motion changes. A new wall is one class, a `Wall`, and one entry in `WALLS`, or an
+entry point `climber_uk.walls` of another package.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY
 from climber_uk.mechanics.elementary import cos, sin
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 
 class Wall(Protocol):
@@ -74,4 +77,4 @@ class Cylinder:
         return GRAVITY * cos(steep) + y_speed * y_speed / self.radius
 
 
-WALLS: dict[str, type[Wall]] = {"plane": Plane, "cylinder": Cylinder}
+WALLS: Mapping[str, type[Wall]] = Variants({"plane": Plane, "cylinder": Cylinder}, "walls")

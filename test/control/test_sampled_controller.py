@@ -20,6 +20,7 @@ from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.simulation.sensors import Sensors
 
 pytestmark = pytest.mark.slow
 
@@ -106,7 +107,11 @@ def test_mass_and_inertia_may_be_off_by_a_fifth():
 
 
 def test_odometry_may_be_noisy():
-    noise = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
+    noise = Link(
+        sensors=Sensors(
+            position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2, yaw_rate_noise=1e-2
+        )
+    )
     assert lap(controller(), link=noise).rms() < 1e-3
 
 
@@ -129,7 +134,7 @@ def test_odometry_may_come_at_other_rates(period):
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_odometry_may_lack_the_twist(noise):
-    link = Link(with_twist=False, position_noise=noise, heading_noise=noise)
+    link = Link(with_twist=False, sensors=Sensors(position_noise=noise, heading_noise=noise))
     ours = controller(observer=Observer(velocity_source="pose"))
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
     run = simulate(RAMPED, start, 10.0, ours, CLIMBER, link)
