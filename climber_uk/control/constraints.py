@@ -5,16 +5,12 @@ A new constraint set is one class, a `ConstraintSet`, and one entry here, or an 
 `climber_uk.controllers`, see `ForceLaw`.
 """
 
-from collections.abc import Mapping
-
 from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.control_law import ForceLaw
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
 from climber_uk.parameters.registry import Variants
 
-CONSTRAINTS: Mapping[str, type[ConstraintSet]] = Variants(
-    {"guidance": Guidance, "exact": Exact}, "constraints"
-)
+CONSTRAINTS = Variants[type[ConstraintSet]]({"guidance": Guidance, "exact": Exact}, "constraints")
 UDWADIA_KALABA = "udwadia_kalaba"  # the control law that follows one of them
-FORCE_LAWS: Mapping[str, type[ForceLaw]] = Variants({}, "controllers")
+FORCE_LAWS = Variants[type[ForceLaw]]({}, "controllers")

@@ -7,7 +7,6 @@ new kind of adhesion is one class, an `Adhesion`, and one entry in `ADHESION`, o
 `climber_uk.adhesion` of another package. Everything broadcasts.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol
 
@@ -108,7 +107,7 @@ class NoAdhesion(Adhesion):
         return 0.0
 
 
-ADHESION: Mapping[str, type[Adhesion]] = Variants(
+ADHESION = Variants[type[Adhesion]](
     {"suction": Suction, "magnetic": Magnetic, "none": NoAdhesion}, "adhesion"
 )
 

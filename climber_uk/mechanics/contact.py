@@ -4,7 +4,6 @@ A new kind of locomotion is one class, a `Locomotion`, and one entry in `LOCOMOT
 point `climber_uk.locomotion` of another package. Everything broadcasts.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -22,7 +21,7 @@ class Locomotion(Protocol):
 
 
 @dataclass(frozen=True)
-class Wheeled:
+class Wheeled(Locomotion):
     """Wheels on one axle: they turn about the vertical without resistance."""
 
     def turning_resistance(self, load: Any) -> Any:
@@ -31,7 +30,7 @@ class Wheeled:
 
 
 @dataclass(frozen=True)
-class Tracked:
+class Tracked(Locomotion):
     """Tracks that scrub sideways when they turn: μ_t N L / 4, the load spread evenly over L."""
 
     scrub_friction_coefficient: float = parameter(0.5, "", "μ_t, sideways", at_least=0)
@@ -45,9 +44,7 @@ class Tracked:
         return self.scrub_friction_coefficient * load * self.length / 4
 
 
-LOCOMOTION: Mapping[str, type[Locomotion]] = Variants(
-    {"wheeled": Wheeled, "tracked": Tracked}, "locomotion"
-)
+LOCOMOTION = Variants[type[Locomotion]]({"wheeled": Wheeled, "tracked": Tracked}, "locomotion")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,6 @@ that it stays sound as the suction, and f with it, goes to zero. A new law is on
 `Friction`, and one entry in `FRICTION`, or an entry point `climber_uk.friction` of another package.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -161,6 +160,6 @@ class LuGre(Bristles, Stribeck):
         return f / self.deflection
 
 
-FRICTION: Mapping[str, type[Friction]] = Variants(
+FRICTION = Variants[type[Friction]](
     {"coulomb": Coulomb, "viscous": Viscous, "stribeck": Stribeck, "lugre": LuGre}, "friction"
 )

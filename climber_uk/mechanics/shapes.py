@@ -5,7 +5,6 @@ A new shape is one class, a `Shape` with `length`, `closed` and `derivatives`, a
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -159,7 +158,7 @@ class SineWave(Shape):
         )
 
 
-SHAPES: Mapping[str, type[Shape]] = Variants(
+SHAPES = Variants[type[Shape]](
     {
         "ellipse": Ellipse,
         "circle": Circle,

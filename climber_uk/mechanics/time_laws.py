@@ -5,7 +5,6 @@ entry point `climber_uk.time_laws` of another package.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
@@ -165,7 +164,7 @@ class Stopping(TimeLaw):
         return compose(law, (1 - slower, -t_2, -t_3))
 
 
-TIME_LAWS: Mapping[str, type[TimeLaw]] = Variants(
+TIME_LAWS = Variants[type[TimeLaw]](
     {"constant_rate": ConstantRate, "rest_to_rest": RestToRest}, "time_laws"
 )
 

@@ -9,7 +9,6 @@ entry point `climber_uk.walls` of another package.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -32,7 +31,7 @@ class Wall(Protocol):
 
 
 @dataclass(frozen=True)
-class Plane:
+class Plane(Wall):
     """A flat wall; y points uphill unless it is tilted."""
 
     tilt: float = parameter(
@@ -55,7 +54,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(Wall):
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
     radius: float = parameter(2.0, "m", "of the cylinder R: > 0 inside it, < 0 outside")
@@ -77,4 +76,4 @@ class Cylinder:
         return GRAVITY * cos(steep) + y_speed * y_speed / self.radius
 
 
-WALLS: Mapping[str, type[Wall]] = Variants({"plane": Plane, "cylinder": Cylinder}, "walls")
+WALLS = Variants[type[Wall]]({"plane": Plane, "cylinder": Cylinder}, "walls")

@@ -10,22 +10,23 @@ import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, TypeVar
 
+T = TypeVar("T")  # the type of a class
 PREFIX = "climber_uk."
 
 
-class Variants(Mapping[str, Any]):
+class Variants(Mapping[str, T]):
     """Dataclasses of parameters: `own` by name, and then the entry points `climber_uk.<group>`.
 
     Those are loaded when they are first asked for, as they import what they derive from. One that
     cannot be had is left out, and the log has a line with its name and what is wrong.
     """
 
-    def __init__(self, own: Mapping[str, type], group: str) -> None:
+    def __init__(self, own: Mapping[str, T], group: str) -> None:
         self._own, self._group = own, group
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> T:
         return self._all[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -35,11 +36,14 @@ class Variants(Mapping[str, Any]):
         return len(self._all)
 
     @cached_property
-    def _all(self) -> dict[str, type]:
+    def _all(self) -> dict[str, T]:
         found = dict(self._own)
         for entry in _others(PREFIX + self._group):
             try:
-                _check_name(entry.name, found)
+                if not entry.name.isidentifier() or entry.name in found:
+                    raise ValueError(
+                        "its name must be letters, digits and _, and another one than theirs"
+                    )
                 found[entry.name] = _checked(entry.load())
             except Exception as error:  # whatever the code of others raises
                 said = f"{type(error).__name__}: {error}".split("\n")[0]
@@ -48,14 +52,7 @@ class Variants(Mapping[str, Any]):
         return found
 
 
-def _check_name(name: str, others: Mapping[str, type]) -> None:
-    if not name.isidentifier():
-        raise ValueError("its name must be letters, digits and _")
-    if name in others:
-        raise ValueError("there is one of that name")
-
-
-def _checked(kind: Any) -> type:
+def _checked(kind: Any) -> Any:
     if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
         raise TypeError("it must be a dataclass")
     if bare := [field.name for field in dataclasses.fields(kind) if not field.metadata]:

@@ -6,8 +6,8 @@ point `climber_uk.odometry_sources` of another package.
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable
+from dataclasses import Field, dataclass, fields
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -35,7 +35,7 @@ class OdometrySource(Protocol):
 
 
 @dataclass(frozen=True)
-class Truth:
+class Truth(OdometrySource):
     """The climber as it is."""
 
     def start(self, sensors: "Sensors", climber: Climber, period: float, state: State) -> Measure:
@@ -44,7 +44,7 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Wheels:
+class Wheels(OdometrySource):
     """The climber as it would be had its wheels never slipped."""
 
     def start(self, sensors: "Sensors", climber: Climber, period: float, state: State) -> Measure:
@@ -52,9 +52,7 @@ class Wheels:
         return DeadReckoning(sensors.encoder_resolution, climber, period, state.pose).measure
 
 
-SOURCES: Mapping[str, type[OdometrySource]] = Variants(
-    {"truth": Truth, "wheels": Wheels}, "odometry_sources"
-)
+SOURCES = Variants[type[OdometrySource]]({"truth": Truth, "wheels": Wheels}, "odometry_sources")
 # Parameters of what is measured, and when; all others are errors that are added to that
 MEASURING = "odometry_source", "odometry_delay", "encoder_resolution", "seed"
 
@@ -109,8 +107,12 @@ class Sensors:
     @cached_property
     def is_ideal(self) -> bool:
         """Whether they tell what is measured as it is: nothing that `told` adds is set."""
-        added = [field for field in fields(self) if field.name not in MEASURING]
-        return not any(np.any(getattr(self, field.name) != field.default) for field in added)
+        return not any(np.any(getattr(self, field.name)) for field in self.errors())
+
+    @classmethod
+    def errors(cls) -> "list[Field[Any]]":
+        """Fields of what `told` adds."""
+        return [field for field in fields(cls) if field.name not in MEASURING]
 
     @property
     def ideal(self) -> "Sensors":
