@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.parameters.declaration import parameter
 from climber_uk.simulation.sensors import Sensors
 
 pytestmark = pytest.mark.slow
@@ -286,6 +287,22 @@ def test_changed_gains_act_in_full_half_a_second_later():
     assert sampled_controller._constraints().along_track_gain == pytest.approx(5.5)
     sampled_controller.stamp += SECOND // 4
     assert sampled_controller._constraints() is changed.constraints
+
+
+@dataclass(frozen=True)
+class Named(Guidance):
+    """As a constraint set of another package, with more than gains."""
+
+    kind: str = parameter("slow", "", "what it is", runtime=True)
+
+
+def test_what_is_no_gain_changes_at_once():
+    ours = controller(constraints=Named()).sampled_controller
+    ours.see(SECOND, START.motion)
+    changed = replace(ours.law, constraints=Named(along_track_gain=6.0, kind="fast"))
+    ours.retune(changed, ours.observer, ours.timing, ours.pacing)
+    ours.stamp += SECOND // 4
+    assert ours._constraints() == Named(along_track_gain=5.5, kind="fast")
 
 
 def test_a_torque_limit_does_not_wind_the_observer_up():

@@ -72,3 +72,11 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
     seen, true = places("/climber_1/odom"), places("/climber_1/ground_truth")
     assert np.abs(seen - 1e-3 * np.round(seen / 1e-3)).max() < 1e-12  # whole pixels
     assert np.abs(true - 1e-3 * np.round(true / 1e-3)).max() > 1e-4
+
+
+def test_a_name_that_two_parts_have_is_refused_in_one_line(world, tmp_path):
+    install(tmp_path, {"climber_uk.walls": {"fading": "my_climber:Fading"}})
+    world.environment["PYTHONPATH"] = str(tmp_path)
+    assert world.start_node("plant_simulator").wait(60) != 0
+    (line,) = world.log("plant_simulator").splitlines()
+    assert "fading.surplus is a parameter of two parts" in line
