@@ -25,8 +25,11 @@ from climber_uk.mechanics.shapes import Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.sensors import Sensors
 
-NOISE = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
+NOISE = Link(
+    sensors=Sensors(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2, yaw_rate_noise=1e-2)
+)
 EXACT = Link()
 OFF = ("mass", "yaw_inertia", "seal_friction_coefficient")
 

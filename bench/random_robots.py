@@ -27,6 +27,7 @@ from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import writing
 from climber_uk.simulation.plant import Plant
+from climber_uk.simulation.sensors import Sensors
 
 STEP = 0.0025  # [s] of the plant: of all times
 DURATION = 12.0  # [s], of which the second half counts
@@ -63,7 +64,10 @@ def robot(seed: int) -> Robot:
         period=STEP * float(random.choice([2, 4, 6, 8])),
         torque_lag=random.uniform(0.0, 0.02),
         delay=STEP * float(random.integers(0, 4)),
-        encoder_counts=int(random.choice([2048, 4096, 8192])),
+        sensors=Sensors(
+            odometry_source="wheels",
+            encoder_resolution=2 * np.pi / int(random.choice([2048, 4096, 8192])),
+        ),
     )
     climber = replace(
         BUILT,

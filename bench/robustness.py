@@ -31,6 +31,7 @@ from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.simulation.sensors import Sensors
 
 PAPER_RUN, BUILT_RUN = SCENARIOS["paper.yaml"], SCENARIOS["climber.yaml"]
 PAPER, BUILT = PAPER_RUN.believed, BUILT_RUN.believed
@@ -39,7 +40,9 @@ IN_MOTION, AT_REST = PAPER_RUN.start, BUILT_RUN.start
 RAMPED = Trajectory(Ellipse(), RestToRest(rate=1.0, ramp_time=3.0, laps=9))
 GUIDANCE, OBSERVER, IDEAL = PAPER_RUN.guidance, Observer(), Link()
 SLOW_GUIDANCE = BUILT_RUN.guidance
-NOISE = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
+NOISE = Link(
+    sensors=Sensors(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2, yaw_rate_noise=1e-2)
+)
 
 
 # Found by `--tune kanayama`.
@@ -234,7 +237,8 @@ def untold(make: Make, link: Link, gains: Guidance = SLOW_GUIDANCE) -> tuple[flo
 
 def links() -> dict[str, Link]:
     """Delays and lags as robots have them."""
-    encoders = Link(encoder_counts=4096, delay=0.005, torque_lag=0.005)
+    wheels = Sensors(odometry_source="wheels", encoder_resolution=2 * np.pi / 4096)
+    encoders = Link(sensors=wheels, delay=0.005, torque_lag=0.005)
     return {
         "a delay of 20 ms": Link(delay=0.02),
         "a lag of 35 ms": Link(torque_lag=0.035),

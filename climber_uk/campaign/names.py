@@ -7,7 +7,7 @@ import dataclasses
 from typing import Any
 
 from climber_uk.control.build import KINDS as CONTROLLER_KINDS
-from climber_uk.control.constraints import CONSTRAINTS
+from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import KINDS as PLAN_KINDS
@@ -53,20 +53,21 @@ NODES_ONLY = {
 }
 # What each run may have its own of
 VARIED = {
-    *_names(PLANT, (Climber, ""), (Sensors, "")),
+    *_names(PLANT, (Climber, "")),
+    *(f"{PLANT}.{error.name}" for error in Sensors.errors()),
     *(f"{PLANT}.{n}" for n in ("wheel_friction_coefficient", "centre_height", "wheelbase")),
     *(f"{PLANT}.initial_{n}" for n in ("x", "y", "heading", "speed", "yaw_rate")),
     *(LOSS_TIME, f"{PLANT}.pressure_loss_level"),
     *_names(CONTROLLER, (Climber, ""), *((kind, f"{n}.") for n, kind in CONSTRAINTS.items())),
     *(f"{CONTROLLER}.{n}" for n in ("friction_speed", "observer.bandwidth")),
 }
-VARIED -= {SEED, MEASURED}
-VARIED -= {f"{PLANT}.{n}" for n in ("odometry_source", "odometry_delay", "encoder_resolution")}
+VARIED -= {MEASURED}
 # What closed loops by the thousand have one kind of only
 REQUIRED = {
     f"{CONTROLLER}.pacing.catch_up": 0.0,
     f"{CONTROLLER}.least_pressure": 0.0,
     f"{CONTROLLER}.adhesion": "suction",
+    f"{CONTROLLER}.controller": UDWADIA_KALABA,
     f"{CONTROLLER}.observer.velocity_source": "odometry",
     f"{PLANT}.friction": "coulomb",
     f"{PLANT}.adhesion": "suction",

@@ -6,7 +6,7 @@ that is random comes from one seed.
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -34,20 +34,13 @@ class Link:
     delay: float = 0.0  # [s] of a torque on its way to the wheels: no clock shows it
     jitter: float = 0.0  # [s] most that an odometry is late; none overtakes another
     loss: float = 0.0  # share of odometry messages that never arrive
-    position_noise: float = 0.0  # [m], standard deviation
-    heading_noise: float = 0.0  # [rad]
-    speed_noise: float = 0.0  # [m/s] forward, and of each wheel in turning
+    sensors: Sensors = field(default_factory=Sensors)  # their noise is of the run's seed
     with_twist: bool = True
     torque_lag: float = 0.0  # [s] of the motors, of first order
-    encoder_counts: int = 0  # a turn, of the wheels that odometry is counted from; 0: it is exact
 
     def parts(self, plant: Plant) -> Parts:
-        """The plant with such motors and sensors."""
-        sensors = Sensors()
-        if self.encoder_counts > 0:
-            resolution = 2 * np.pi / self.encoder_counts
-            sensors = Sensors(odometry_source="wheels", encoder_resolution=resolution)
-        return Parts(plant, Motors(torque_lag=self.torque_lag), sensors, Physics())
+        """The plant with such motors, and sensors without the errors that `measured` adds."""
+        return Parts(plant, Motors(torque_lag=self.torque_lag), self.sensors.ideal, Physics())
 
 
 class Controlling(Protocol):
@@ -153,12 +146,7 @@ def sampled(trajectory: Trajectory, duration: float) -> Preview:
 
 
 def measured(state: State, link: Link, random: np.random.Generator) -> State:
-    """State as odometry tells it, with its noise."""
-    x, y, heading, faster, turning = random.normal(size=5)
-    offset = np.array([x, y, 0.0]) * link.position_noise
-    offset[2] = heading * link.heading_noise
-    pose = state.pose + offset
-    if not link.with_twist:
-        return State(pose, np.zeros(3))
-    speed = state.forward_speed + faster * link.speed_noise
-    return State.rolling(pose, speed, state.yaw_rate + turning * link.speed_noise)
+    """State as odometry tells it, with its errors."""
+    x, y, heading, _, _, speed, yaw_rate = link.sensors.told(state.motion, random.normal(size=5))
+    pose = np.array([x, y, heading])
+    return State.rolling(pose, speed, yaw_rate) if link.with_twist else State(pose, np.zeros(3))

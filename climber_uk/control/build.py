@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
 from climber_uk.control.approach import Approach
-from climber_uk.control.constraints import CONSTRAINTS
+from climber_uk.control.constraints import CONSTRAINTS, FORCE_LAWS, UDWADIA_KALABA
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
 from climber_uk.control.guard import GuardOptions
@@ -31,8 +31,14 @@ class ParameterSource(Protocol):
 class ConstraintChoice:
     """Which constraints are followed, and what kind of climber follows them."""
 
-    constraints: str = parameter("guidance", "", "constraint set", choices=tuple(CONSTRAINTS))
-    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
+    constraints: str = parameter("guidance", "", "constraint set", choices=CONSTRAINTS)
+    controller: str = parameter(
+        UDWADIA_KALABA,
+        "",
+        "control law: that of the constraints, or of another package in their place",
+        choices=(UDWADIA_KALABA, *FORCE_LAWS),
+    )
+    adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
 
     def __post_init__(self) -> None:
         check(self)
@@ -40,7 +46,7 @@ class ConstraintChoice:
 
 KINDS: list[tuple[type, str]] = [
     *((kind, "") for kind in (ConstraintChoice, Climber, ControlOptions, Timing, Safety, Approach)),
-    *((kind, f"{name}.") for name, kind in CONSTRAINTS.items()),
+    *((kind, f"{name}.") for name, kind in [*CONSTRAINTS.items(), *FORCE_LAWS.items()]),
     (Observer, "observer."),
     (Pacing, "pacing."),
     (GuardOptions, "guard."),
@@ -60,7 +66,9 @@ def settings(
     constraints, options = read(CONSTRAINTS[name], f"{name}."), read(ControlOptions)
     if options.solver == "closed_form" and hasattr(constraints, "rows"):
         raise ValueError(f"solver=closed_form must be generic for {name}, which gives rows")
-    law = ControlLaw(climber, constraints, options)
+    other = choice.controller
+    force_law = read(FORCE_LAWS[other], f"{other}.") if other != UDWADIA_KALABA else None
+    law = ControlLaw(climber, constraints, options, force_law)
     return law, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
 
 

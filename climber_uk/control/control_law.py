@@ -5,9 +5,10 @@ constraints (8) is M Aᵀ b - Q. It splits uniquely into the wheels' lateral rea
 torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from climber_uk.mechanics.udwadia_kalaba import constraint_force
 from climber_uk.parameters.declaration import check, parameter
 
 NOTHING = Wrench(0.0, 0.0)
+Solve = Callable[[Any, Motion], tuple[Any, Any, Any]]  # force, moment and lateral reaction
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,9 +96,28 @@ class Command(NamedTuple):
         return np.broadcast_to(pack(*self.lost), self.torques.shape)
 
 
+class ForceLaw(Protocol):
+    """A control law in the place of the constraints: force and moment, whatever it is made of.
+
+    A frozen dataclass of parameters, without a memory: it is asked twice for each answer, first
+    for a guess of the motion. What is around the constraints stays around it: the prediction to
+    where the torques act, the observer, whose disturbance is taken off what it asks for, the
+    wheels' limits, time scaling, and the guard, which allows the speeds that the `constraints` may
+    ask for. A way to the reference (`Approach`) is left to them, too.
+    """
+
+    def wrench(self, climber: Climber, target: ReferencePoint, motion: Motion) -> Wrench:
+        """Drive [N] and turn [N m] wanted of the wheels of a climber in `motion`.
+
+        They include what carries the climber's weight and overcomes its friction. `target` is the
+        reference at the time of `motion`, both in the wall's frame. What is not finite, or raises
+        `ValueError` or `ArithmeticError`, gives the safe output.
+        """
+
+
 @dataclass(frozen=True)
 class ControlLaw:
-    """The control law: a model of the climber and a constraint set. It has no memory.
+    """The control law: a model of the climber and a constraint set, or another law. No memory.
 
     What it has to know of before comes in a `ControlInput`, from the `SampledController` that owns
     it.
@@ -105,6 +126,7 @@ class ControlLaw:
     climber: Climber
     constraints: ConstraintSet
     options: ControlOptions
+    other: ForceLaw | None = None  # in the constraints' place
 
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
@@ -114,9 +136,10 @@ class ControlLaw:
         """
         climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
         ahead = self.options.lookahead(period)
-        prepared = self.constraints.prepare(target)
+        prepared = self.constraints.prepare(target) if self.other is None else target
         right, left = self._fixed_bounds or self._bounds(situation)
-        solve = self.generic if self.options.solver == "generic" else self.closed_form
+        solve: Solve = self.generic if self.options.solver == "generic" else self.closed_form
+        solve = solve if self.other is None else self.of_forces
         drive, turn = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
             predicted = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
@@ -135,8 +158,7 @@ class ControlLaw:
         mass, inertia, friction, weight = self.climber.inertial
         rubbing = friction * tanh(speed / self.options.friction_speed)
         force = mass * v_1 + rubbing + weight * motion.sine
-        lateral = mass * motion.speed * motion.yaw_rate + weight * motion.cosine
-        return force, inertia * yaw_acceleration, lateral
+        return force, inertia * yaw_acceleration, self.lateral(motion)
 
     def generic(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
         """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
@@ -152,6 +174,16 @@ class ControlLaw:
         Q = self.climber.applied_force(heading, tanh(speed / self.options.friction_speed))
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
         return along(heading, Qc), unpack(Qc)[2], across(heading, Qc)
+
+    def lateral(self, motion: Motion) -> Any:
+        """Reaction of the wheels to the left, which the no-slip row asks for [N]."""
+        mass, _, _, weight = self.climber.inertial
+        return mass * motion.speed * motion.yaw_rate + weight * motion.cosine
+
+    def of_forces(self, target: ReferencePoint, motion: Motion) -> tuple[Any, Any, Any]:
+        """Those of another law, and the reaction of wheels that do not slip."""
+        assert self.other is not None
+        return *self.other.wrench(self.climber, target, motion), self.lateral(motion)
 
     def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

@@ -8,6 +8,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.control_law import Command, ControlInput, ControlLaw
 from climber_uk.control.latency import Latency, Sample
@@ -162,7 +164,7 @@ class SampledController:
         begins, situation = self._situation(age)
         law = self.law
         if constraints is not None:
-            law = replace(law, constraints=constraints)
+            law = replace(law, constraints=constraints, other=None)
         elif self._retuned is not None:
             law = replace(law, constraints=self._constraints())
         aim = begins + round(law.options.lookahead(self.period) * SECOND)
@@ -267,8 +269,9 @@ class SampledController:
             field.name: (1 - share) * getattr(before, field.name)
             + share * getattr(after, field.name)
             for field in dataclasses.fields(after)  # type: ignore[arg-type]
+            if isinstance(field.default, float)
         }
-        return type(after)(**gains)
+        return replace(after, **gains)  # type: ignore[type-var]
 
     def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
@@ -292,5 +295,6 @@ class SampledController:
 def _check(torques: Torques) -> None:
     """Raise `ValueError` if a climber's torques are not finite; of many, each has its own."""
     right, left = torques
-    if isinstance(right, float) and not math.isfinite(right + left):
+    is_one = isinstance(right, float) or np.ndim(right) == 0
+    if is_one and not math.isfinite(right + left):
         raise ValueError(f"torques {torques} are not finite")

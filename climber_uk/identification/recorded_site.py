@@ -13,6 +13,7 @@ from typing import Any
 from climber_uk.bags.bag import read_messages
 from climber_uk.bags.topics import PARAMETERS, TYPES
 from climber_uk.identification.integral_equations import Site
+from climber_uk.mechanics.adhesion import ADHESION
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.wall import WALLS
 from climber_uk.messages import reading
@@ -60,7 +61,9 @@ def site_of(controller: Parameters, plant: Parameters) -> Site:
     if wall not in WALLS:
         raise ValueError(f"wall={wall!r} must be one of {', '.join(WALLS)}")
     adhesion = controller.get("adhesion", plant.get("adhesion", "suction"))
-    return Site(Values(plant).read(WALLS[wall], f"{wall}."), adhesion == "suction")
+    if adhesion not in ADHESION:
+        raise ValueError(f"adhesion={adhesion!r} must be one of {', '.join(ADHESION)}")
+    return Site(Values(plant).read(WALLS[wall], f"{wall}."), ADHESION[adhesion].has_seal)
 
 
 def differences(file: Parameters, recorded: Parameters, site: Site) -> Iterator[str]:

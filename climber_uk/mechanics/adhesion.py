@@ -3,15 +3,17 @@
     slip margin = μ_w N_w / |traction demanded|     tip margin = (F_a + m g_n) l/2 / (m g_t h)
 
 F_a is the adhesion, N_w the load on the wheels, g_n and g_t gravity into the wall and along it. A
-new kind of adhesion is one class and one entry. Everything broadcasts.
+new kind of adhesion is one class, an `Adhesion`, and one entry in `ADHESION`, or an entry point
+`climber_uk.adhesion` of another package. Everything broadcasts.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sqrt, with_sign_of
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 MAX_MARGIN = 100.0  # margins are told within ± that: without a demand there would be no end
 
@@ -22,12 +24,26 @@ class Adhesion(Protocol):
     def force(self, climber: Climber) -> float:
         """F_a [N]."""
 
+    # What most need not say:
+
+    has_seal: ClassVar[bool] = False
+    """Whether a seal carries the share 1 - k of F_a and rubs, as the climber's parameters say."""
+
     def seal_friction(self, climber: Climber) -> float:
         """Coulomb's friction f of what slides on the wall [N]."""
+        return climber.seal_friction if self.has_seal else 0.0
+
+    def final_pressure(self, pump: Any) -> Any:
+        """Pressure (...) [Pa] that a pump good for `pump` (...) [Pa] reaches in the end."""
+        return pump
+
+    def pressure(self, before: Any, pump: Any, time: Any) -> Any:
+        """Pressure (...) [Pa] after `time` (...) [s]."""
+        return before
 
 
 @dataclass(frozen=True)
-class Suction:
+class Suction(Adhesion):
     """P S, of which a seal carries (1 - k), and rubs; the pump fills a volume that leaks.
 
     Ṗ = (P_pump - P) / T_pump - P / T_leak, so that P ends at P_pump T_leak / (T_leak + T_pump).
@@ -36,6 +52,8 @@ class Suction:
     pump_time: float = parameter(0.0, "s", "T_pump; 0: at once", at_least=0)
     leak_time: float = parameter(0.0, "s", "T_leak; 0: it does not leak", at_least=0)
 
+    has_seal: ClassVar[bool] = True
+
     def __post_init__(self) -> None:
         check(self)
 
@@ -43,17 +61,13 @@ class Suction:
         """See `Adhesion`."""
         return climber.suction_pressure * climber.suction_area
 
-    def seal_friction(self, climber: Climber) -> float:
-        """See `Adhesion`."""
-        return climber.seal_friction
-
     def final_pressure(self, pump: Any) -> Any:
-        """Pressure (...) [Pa] that a pump good for `pump` (...) [Pa] reaches against the leak."""
+        """P_pump against the leak: see `Adhesion`."""
         tight = self.leak_time == 0
         return pump if tight else pump * self.leak_time / (self.leak_time + self.pump_time)
 
     def pressure(self, before: Any, pump: Any, time: Any) -> Any:
-        """Pressure (...) [Pa] after `time` (...) [s]."""
+        """See `Adhesion`."""
         if self.pump_time == 0:
             return pump
         rate = 1 / self.pump_time + (1 / self.leak_time if self.leak_time > 0 else 0.0)
@@ -62,7 +76,7 @@ class Suction:
 
 
 @dataclass(frozen=True)
-class Magnetic:
+class Magnetic(Adhesion):
     """F₀ / (1 + gap/g₀)², as of a magnet whose flux crosses the gap twice; nothing slides."""
 
     force_at_contact: float = parameter(
@@ -83,37 +97,28 @@ class Magnetic:
         wider = 1 + self.gap / self.gap_of_a_quarter
         return self.force_at_contact / (wider * wider)
 
-    def seal_friction(self, climber: Climber) -> float:
-        """See `Adhesion`."""
-        return 0.0
-
 
 @dataclass(frozen=True)
-class NoAdhesion:
+class NoAdhesion(Adhesion):
     """Weight alone, as on a floor."""
 
     def force(self, climber: Climber) -> float:
         """See `Adhesion`."""
         return 0.0
 
-    def seal_friction(self, climber: Climber) -> float:
-        """See `Adhesion`."""
-        return 0.0
 
-
-ADHESION: dict[str, type[Adhesion]] = {
-    "suction": Suction,
-    "magnetic": Magnetic,
-    "none": NoAdhesion,
-}
+ADHESION = Variants[type[Adhesion]](
+    {"suction": Suction, "magnetic": Magnetic, "none": NoAdhesion}, "adhesion"
+)
 
 
 def with_its_seal(climber: Climber, adhesion: str) -> Climber:
-    """The climber with the friction that its kind of `ADHESION` has: without suction, no seal rubs.
+    """The climber with the friction that its kind of `ADHESION` has: none without a seal.
 
     For models that know no more of what holds a climber than its own parameters.
     """
-    return climber if adhesion == "suction" else replace(climber, seal_friction_coefficient=0.0)
+    has_seal = ADHESION[adhesion].has_seal
+    return climber if has_seal else replace(climber, seal_friction_coefficient=0.0)
 
 
 @dataclass(frozen=True)
@@ -169,7 +174,7 @@ class Attachment:
     def wheel_load(self, climber: Climber, into_wall: Any) -> Any:
         """N_w (...) [N]: what the seal does not carry. f is that of the suction alone (§2.2)."""
         held_by_seal = 0.0
-        if isinstance(self.adhesion, Suction):
+        if self.adhesion.has_seal:
             held_by_seal = (1 - climber.wheel_load_share) * self.adhesion.force(climber)
         return clipped(self.hold(climber, into_wall) - held_by_seal, 0.0, float("inf"))
 

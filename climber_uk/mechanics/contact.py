@@ -1,6 +1,7 @@
 """All that is between a climber and its wall: its hold, the seal's friction, and what it runs on.
 
-A new kind of locomotion is one class and one entry. Everything broadcasts.
+A new kind of locomotion is one class, a `Locomotion`, and one entry in `LOCOMOTION`, or an entry
+point `climber_uk.locomotion` of another package. Everything broadcasts.
 """
 
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ from typing import Any, Protocol
 from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.friction import Coulomb, Friction
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 
 class Locomotion(Protocol):
@@ -19,7 +21,7 @@ class Locomotion(Protocol):
 
 
 @dataclass(frozen=True)
-class Wheeled:
+class Wheeled(Locomotion):
     """Wheels on one axle: they turn about the vertical without resistance."""
 
     def turning_resistance(self, load: Any) -> Any:
@@ -28,7 +30,7 @@ class Wheeled:
 
 
 @dataclass(frozen=True)
-class Tracked:
+class Tracked(Locomotion):
     """Tracks that scrub sideways when they turn: μ_t N L / 4, the load spread evenly over L."""
 
     scrub_friction_coefficient: float = parameter(0.5, "", "μ_t, sideways", at_least=0)
@@ -42,7 +44,7 @@ class Tracked:
         return self.scrub_friction_coefficient * load * self.length / 4
 
 
-LOCOMOTION: dict[str, type[Locomotion]] = {"wheeled": Wheeled, "tracked": Tracked}
+LOCOMOTION = Variants[type[Locomotion]]({"wheeled": Wheeled, "tracked": Tracked}, "locomotion")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,21 +7,20 @@
 
 with γ(v) = 1 + (ratio - 1) exp(-(v/v_s)²) and g = f γ. The LuGre law is that of Canudas de Wit,
 Olsson, Åström & Lischinsky, IEEE Trans. Automatic Control 40(3), 1995; σ₀ = f / deflection, so
-that it stays sound as the suction, and f with it, goes to zero. A new law is one class and one
-entry in `FRICTION`.
+that it stays sound as the suction, and f with it, goes to zero. A new law is one class, a
+`Friction`, and one entry in `FRICTION`, or an entry point `climber_uk.friction` of another package.
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 from climber_uk.mechanics.elementary import exp
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 
 class Friction(Protocol):
     """A law; f (...) is Coulomb's friction [N], `speed` (...) that of sliding, >= 0 [m/s]."""
-
-    bristles: ClassVar[bool]  # whether it has a state: the bristles' deflection
 
     def stiction(self, f: Any) -> Any:
         """What it holds at rest, at most (...) [N]; 0 if it holds nothing."""
@@ -32,12 +31,48 @@ class Friction(Protocol):
     def steepness(self, f: Any) -> Any:
         """Most by which the force of sliding changes with its speed (...) [N s/m]."""
 
+    # What most laws need not say:
+
+    def drag(self, f: Any) -> Any:
+        """Part, in proportion to the speed, of a force with stiction or bristles (...) [N s/m]."""
+        return 0.0
+
+    @property
+    def bristles(self) -> "Bristles | None":
+        """What gives way before it slides, of a law without stiction; None: nothing."""
+        return None
+
+
+class Bristles(Friction, Protocol):
+    """A law with a memory: the deflection z [m], ż = v - `relaxation` z, in every direction."""
+
+    damping_time: float  # of the bristles: σ₁ / σ₀ [s]
+
+    def stiction(self, f: Any) -> Any:
+        """It gives way to any force: see `Friction`."""
+        return 0.0 * f
+
+    def relaxation(self, speed: Any) -> Any:
+        """Rate (...) [1/s] at which the bristles tend to where they end up."""
+
+    def stiffness(self, f: Any) -> Any:
+        """σ₀ (...) [N/m]."""
+
+    @property
+    def bristles(self) -> "Bristles":
+        """See `Friction`."""
+        return self
+
+    def force(self, f: Any, velocity: Any, deflection: Any, bending: Any) -> Any:
+        """F (...) [N] against `velocity`, of the deflection z [m] and its rate ż [m/s]."""
+        return (
+            self.stiffness(f) * (deflection + self.damping_time * bending) + self.drag(f) * velocity
+        )
+
 
 @dataclass(frozen=True)
-class Coulomb:
+class Coulomb(Friction):
     """The same force at every speed."""
-
-    bristles: ClassVar[bool] = False
 
     def stiction(self, f: Any) -> Any:
         """See `Friction`."""
@@ -53,12 +88,10 @@ class Coulomb:
 
 
 @dataclass(frozen=True)
-class Viscous:
+class Viscous(Friction):
     """In proportion to the speed, as of a lubricated seal: it holds nothing."""
 
     speed: float = parameter(0.1, "m/s", "at which it rubs as much as Coulomb's law", above=0)
-
-    bristles: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check(self)
@@ -77,14 +110,12 @@ class Viscous:
 
 
 @dataclass(frozen=True)
-class Stribeck:
+class Stribeck(Friction):
     """More at rest than in motion, and more again the faster it goes."""
 
     ratio: float = parameter(1.5, "", "of the hold at rest to Coulomb's friction", at_least=1)
     speed: float = parameter(0.02, "m/s", "v_s at which most of the surplus is gone", above=0)
     viscous: float = parameter(0.0, "s/m", "κ: f more per speed", at_least=0)
-
-    bristles: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check(self)
@@ -106,9 +137,13 @@ class Stribeck:
         """See `Friction`: √(2/e) at v_s/√2 is that of the Gaussian."""
         return f * (0.858 * (self.ratio - 1) / self.speed + self.viscous)
 
+    def drag(self, f: Any) -> Any:
+        """See `Friction`."""
+        return f * self.viscous
+
 
 @dataclass(frozen=True)
-class LuGre(Stribeck):
+class LuGre(Bristles, Stribeck):
     """Bristles that bend before they slide: hysteresis, pre-sliding, and no edge at rest."""
 
     deflection: float = parameter(
@@ -116,31 +151,15 @@ class LuGre(Stribeck):
     )
     damping_time: float = parameter(5e-3, "s", "of the bristles: σ₁ / σ₀", at_least=0)
 
-    bristles: ClassVar[bool] = True
-
-    def stiction(self, f: Any) -> Any:
-        """It gives way to any force: see `Friction`."""
-        return 0.0 * f
-
     def relaxation(self, speed: Any) -> Any:
-        """Rate σ₀ |v| / g(v) (...) [1/s] at which the bristles tend to where they end up."""
+        """σ₀ |v| / g(v): see `Bristles`."""
         return speed / (self.deflection * self.gamma(speed))
 
     def stiffness(self, f: Any) -> Any:
-        """σ₀ (...) [N/m]."""
+        """See `Bristles`."""
         return f / self.deflection
 
-    def force(self, f: Any, velocity: Any, deflection: Any, bending: Any) -> Any:
-        """F (...) [N] against `velocity`, of the deflection z [m] and its rate ż [m/s]."""
-        return (
-            self.stiffness(f) * (deflection + self.damping_time * bending)
-            + f * self.viscous * velocity
-        )
 
-
-FRICTION: dict[str, type[Friction]] = {
-    "coulomb": Coulomb,
-    "viscous": Viscous,
-    "stribeck": Stribeck,
-    "lugre": LuGre,
-}
+FRICTION = Variants[type[Friction]](
+    {"coulomb": Coulomb, "viscous": Viscous, "stribeck": Stribeck, "lugre": LuGre}, "friction"
+)

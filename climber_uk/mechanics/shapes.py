@@ -1,7 +1,7 @@
 """Shapes: curves p(s) in the wall's frame with three derivatives by their path parameter s.
 
 A new shape is one class, a `Shape` with `length`, `closed` and `derivatives`, and one entry in
-`SHAPES`.
+`SHAPES`, or an entry point `climber_uk.shapes` of another package.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.waypoints import Waypoints
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 
 class Shape(Protocol):
@@ -157,14 +158,17 @@ class SineWave(Shape):
         )
 
 
-SHAPES = {
-    "ellipse": Ellipse,
-    "circle": Circle,
-    "lemniscate": Lemniscate,
-    "line": Line,
-    "sine_wave": SineWave,
-    "waypoints": Waypoints,
-}
+SHAPES = Variants[type[Shape]](
+    {
+        "ellipse": Ellipse,
+        "circle": Circle,
+        "lemniscate": Lemniscate,
+        "line": Line,
+        "sine_wave": SineWave,
+        "waypoints": Waypoints,
+    },
+    "shapes",
+)
 
 
 def _points(x: Array | float, y: Array | float) -> Array:

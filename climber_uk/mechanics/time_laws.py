@@ -1,11 +1,12 @@
 """Time laws: how far along its shape the climber is at a time, s(t) with three derivatives.
 
-A new law is one class with `duration` and `progress`, and one entry in `TIME_LAWS`.
+A new law is one class, a `TimeLaw` with `rate` as a field, and one entry in `TIME_LAWS`, or an
+entry point `climber_uk.time_laws` of another package.
 """
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 
 class TimeLaw(Protocol):
@@ -31,6 +33,9 @@ class TimeLaw(Protocol):
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """s, ṡ, s̈, s⃛ at `time` (...) [s], in the units of the shape's path parameter."""
 
+    stops: ClassVar[bool] = True
+    """Whether it rests where an open shape ends, and where a shape turns back."""
+
 
 def _rate() -> float:
     rate: float = parameter(
@@ -40,10 +45,11 @@ def _rate() -> float:
 
 
 @dataclass(frozen=True)
-class ConstantRate:
+class ConstantRate(TimeLaw):
     """s = rate · t: already moving at the start, and for ever."""
 
     rate: float = _rate()
+    stops: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check(self)
@@ -63,7 +69,7 @@ class ConstantRate:
 
 
 @dataclass(frozen=True)
-class RestToRest:
+class RestToRest(TimeLaw):
     """From rest up to `rate`, along, and back to rest, smooth to the jerk; once or repeatedly.
 
     A run goes `laps` times around a closed shape or once along an open one, from rest to rest
@@ -130,7 +136,7 @@ class RestToRest:
 
 
 @dataclass(frozen=True)
-class Stopping:
+class Stopping(TimeLaw):
     """Another law until `start`, from where its clock runs slower until all is at rest."""
 
     law: TimeLaw
@@ -158,7 +164,9 @@ class Stopping:
         return compose(law, (1 - slower, -t_2, -t_3))
 
 
-TIME_LAWS = {"constant_rate": ConstantRate, "rest_to_rest": RestToRest}
+TIME_LAWS = Variants[type[TimeLaw]](
+    {"constant_rate": ConstantRate, "rest_to_rest": RestToRest}, "time_laws"
+)
 
 
 def smooth_start(time: Array, ramp_time: float) -> Derivatives:

@@ -12,7 +12,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Shape
-from climber_uk.mechanics.time_laws import ConstantRate, TimeLaw
+from climber_uk.mechanics.time_laws import TimeLaw
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,14 @@ class Trajectory:
     origin: tuple[float, float] = (0.0, 0.0)  # [m] of the shape, in the wall's frame
 
     def __post_init__(self) -> None:
-        if not self.shape.closed and isinstance(self.law, ConstantRate):
-            raise ValueError("time_law='constant_rate' runs off an open shape: use 'rest_to_rest'")
-        if isinstance(self.law, ConstantRate) and len(self.course.reversals):
+        if self.law.stops:
+            return
+        if not self.shape.closed:
+            raise ValueError(f"time_law {self.law} runs off an open shape: use 'rest_to_rest'")
+        if len(self.course.reversals):
             x, y = self.course.derivatives(self.course.reversals[0])[0] + self.origin
             raise ValueError(
-                "time_law='constant_rate' does not stop where the path turns back, "
+                f"time_law {self.law} does not stop where the path turns back, "
                 f"at ({x:.4g}, {y:.4g}) m: use 'rest_to_rest'"
             )
 

@@ -14,8 +14,8 @@ from climber_uk.parameters.declaration import check, parameter
 class TrajectoryParameters:
     """What to follow."""
 
-    shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
-    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=tuple(TIME_LAWS))
+    shape: str = parameter("ellipse", "", "shape of the path", choices=SHAPES)
+    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=TIME_LAWS)
     reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
     origin_x: float = parameter(0.0, "m", "x of the shape's origin")
     origin_y: float = parameter(0.0, "m", "y of the shape's origin")

@@ -4,7 +4,8 @@
     cylinder   the same with inclination(y) = inclination + y/R, and ẏ²/R more into the wall
 
 x and y are lengths on the wall: a cylinder unrolls without stretching, so that nothing else in the
-equations of motion changes. A new wall is one class and one entry.
+equations of motion changes. A new wall is one class, a `Wall`, and one entry in `WALLS`, or an
+entry point `climber_uk.walls` of another package.
 """
 
 import math
@@ -14,6 +15,7 @@ from typing import Any, ClassVar, Protocol
 from climber_uk.mechanics.climber import DEGREE, GRAVITY
 from climber_uk.mechanics.elementary import cos, sin
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
 
 
 class Wall(Protocol):
@@ -29,7 +31,7 @@ class Wall(Protocol):
 
 
 @dataclass(frozen=True)
-class Plane:
+class Plane(Wall):
     """A flat wall; y points uphill unless it is tilted."""
 
     tilt: float = parameter(
@@ -52,7 +54,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(Wall):
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
     radius: float = parameter(2.0, "m", "of the cylinder R: > 0 inside it, < 0 outside")
@@ -74,4 +76,4 @@ class Cylinder:
         return GRAVITY * cos(steep) + y_speed * y_speed / self.radius
 
 
-WALLS: dict[str, type[Wall]] = {"plane": Plane, "cylinder": Cylinder}
+WALLS = Variants[type[Wall]]({"plane": Plane, "cylinder": Cylinder}, "walls")

@@ -16,6 +16,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.control.build import KINDS, ConstraintChoice, build_controller, settings
+from climber_uk.control.constraints import UDWADIA_KALABA
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
 from climber_uk.control.safety import Mode
@@ -90,11 +91,12 @@ class UkTorqueController(ManagedNode):
     def summary(self) -> str:
         """What is driven, how, and within which limits."""
         climber, choice = self.parameters.read(Climber), self.parameters.read(ConstraintChoice)
-        law, adhesion = choice.constraints, choice.adhesion
+        law, adhesion = f"constraints {choice.constraints}", choice.adhesion
+        law = law if choice.controller == UDWADIA_KALABA else f"controller {choice.controller}"
         pull = self.hold.adhesion.force(climber)
         return (
             f"{climber.mass:g} kg, at most {climber.max_wheel_torque:g} N m a wheel, "
-            f"{adhesion} of {pull:.4g} N, constraints {law}, "
+            f"{adhesion} of {pull:.4g} N, {law}, "
             f"safe output {self.controller.safety.safe_output}"
         )
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from numbers import Real
 from typing import Any
 
@@ -17,7 +17,7 @@ def parameter(
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
-    choices: Sequence[str] | None = None,
+    choices: Collection[str] | None = None,
     plausible: tuple[float, float] | None = None,
     formerly: str = "",
     runtime: bool = False,

@@ -65,6 +65,10 @@ class NodeParameters:
         """
         for field in dataclasses.fields(kind):  # type: ignore[arg-type]
             name = prefix + field.name
+            if name in self._fields:
+                raise ValueError(
+                    f"{name} is a parameter of two parts: one must be called otherwise"
+                )
             try:
                 if (given := self._given(name, prefix, field)) is not None:
                     check_value(field, given)

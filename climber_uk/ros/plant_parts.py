@@ -25,12 +25,12 @@ def declare(parameters: NodeParameters) -> None:
 def parts(parameters: NodeParameters) -> Parts:
     """What the parameters say now; raises as `NodeParameters.read` does."""
     read = parameters.read
-    physics, step = read(Physics), read(SimulationOptions).integration_step
+    physics, sensors, step = read(Physics), read(Sensors), read(SimulationOptions).integration_step
     chosen: dict[str, Any] = {}
     for group, variants in VARIANTS.items():
-        name = getattr(physics, group)
+        name = getattr(sensors if group == "odometry_source" else physics, group)
         chosen[group] = read(variants[name], f"{name}.")
-    wall = chosen.pop("wall")
+    wall, source = chosen.pop("wall"), chosen.pop("odometry_source")
     contact = Contact(**chosen, grip=read(Grip))
     plant = Plant(read(Climber), step, contact, wall, physics.slip)
-    return Parts(plant, read(Motors), read(Sensors), physics)
+    return Parts(plant, read(Motors), sensors, physics, source)

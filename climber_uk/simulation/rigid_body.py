@@ -15,7 +15,7 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.friction import LuGre
+from climber_uk.mechanics.friction import Bristles
 from climber_uk.mechanics.wall import Wall
 from climber_uk.simulation.inputs import Inputs
 
@@ -41,6 +41,11 @@ class RigidBody:
     def stiction(self) -> float:
         """What the seal holds at rest [N]."""
         return float(self.contact.friction.stiction(self.friction))
+
+    @cached_property
+    def bristles(self) -> Bristles | None:
+        """See `Friction`."""
+        return self.contact.friction.bristles
 
     @cached_property
     def _weight_on_plane(self) -> tuple[float, float]:
@@ -135,20 +140,20 @@ class RigidBody:
         radius, law, f = self.contact.grip.seal_radius, self.contact.friction, self.friction
         around = radius * omega
         speed = math.hypot(v, around)
-        if isinstance(law, LuGre) and not self.has_settled(speed):
-            relaxation = law.relaxation(speed)
+        if (bristles := self.bristles) is not None and not self.has_settled(speed):
+            relaxation = bristles.relaxation(speed)
             ahead, aside, turned = deflection
             ahead_1, turned_1 = v - relaxation * ahead, around - relaxation * turned
-            moment = radius * law.force(f, around, turned, turned_1)
+            moment = radius * bristles.force(f, around, turned, turned_1)
             rates = [ahead_1, -relaxation * aside, turned_1]
-            return law.force(f, v, ahead, ahead_1), moment, rates
+            return bristles.force(f, v, ahead, ahead_1), moment, rates
         share = law.level(f, speed) / speed if speed > 0 else 0.0
         return share * v, share * around * radius, [0.0] * len(deflection)
 
     def has_settled(self, speed: float) -> bool:
         """Whether bristles are, within a step, where they end up at a sliding `speed` [m/s]."""
-        law = self.contact.friction
-        return isinstance(law, LuGre) and law.relaxation(speed) * self.step >= SETTLED
+        bristles = self.bristles
+        return bristles is not None and bool(bristles.relaxation(speed) * self.step >= SETTLED)
 
 
 def forward_speed(y: Array) -> float:

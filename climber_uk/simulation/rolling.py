@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.friction import LuGre
 from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import SETTLED, RigidBody, forward_speed
 
@@ -139,21 +138,21 @@ class NoSlipStepper:
 
     def _in_parts(self, y: Array, given: Inputs) -> Array | None:
         """y after a step, in as many parts as friction is stiff; None if it is too stiff."""
-        body, law = self.body, self.body.contact.friction
-        rate = law.steepness(body.friction) / self._lightest
-        if isinstance(law, LuGre):
-            stiffness = law.stiffness(body.friction) / self._lightest
-            rate += math.sqrt(stiffness) + law.damping_time * stiffness
-            rate += min(law.relaxation(self._sliding_speed(y)), SETTLED / body.step)
+        body, bristles = self.body, self.body.bristles
+        rate = body.contact.friction.steepness(body.friction) / self._lightest
+        if bristles is not None:
+            stiffness = bristles.stiffness(body.friction) / self._lightest
+            rate += math.sqrt(stiffness) + bristles.damping_time * stiffness
+            rate += min(bristles.relaxation(self._sliding_speed(y)), SETTLED / body.step)
         parts = max(1, math.ceil(min(body.step * rate / STIFF, 1e9)))
         if parts > MAX_PARTS:
             return None
         for _ in range(parts):
             y = body.runge_kutta(y, given, None, body.step / parts)
         speed = self._sliding_speed(y)
-        if isinstance(law, LuGre) and body.has_settled(speed):
+        if bristles is not None and body.has_settled(speed):
             around = body.contact.grip.seal_radius * float(y[5])
-            y[6:] = np.array([forward_speed(y), 0.0, around]) / law.relaxation(speed)
+            y[6:] = np.array([forward_speed(y), 0.0, around]) / bristles.relaxation(speed)
         return y
 
 

@@ -1,11 +1,15 @@
-"""Odometry as a robot's sensors tell it: late, noisy, biased, or counted by its wheels."""
+"""Odometry as a robot's sensors tell it: late, noisy, biased, or counted by its wheels.
+
+A new kind of odometry is one class, an `OdometrySource`, and one entry in `SOURCES`, or an entry
+point `climber_uk.odometry_sources` of another package.
+"""
 
 import math
 from collections import deque
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import Field, dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,15 +18,50 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import rotated
 from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.registry import Variants
+
+Measure = Callable[[State, State, Array], State]
+"""What is measured of a state, of that as the wheels tell it, and of their angles (2,) [rad].
+
+It is called once each period; angles are those of the right and the left wheel.
+"""
+
+
+class OdometrySource(Protocol):
+    """What odometry measures, before bias and noise are added: a frozen dataclass of parameters."""
+
+    def start(self, sensors: "Sensors", climber: Climber, period: float, state: State) -> Measure:
+        """A new measurement, from a start at `state`, every `period` [s]."""
+
+
+@dataclass(frozen=True)
+class Truth(OdometrySource):
+    """The climber as it is."""
+
+    def start(self, sensors: "Sensors", climber: Climber, period: float, state: State) -> Measure:
+        """See `OdometrySource`."""
+        return lambda state, wheels, angles: state
+
+
+@dataclass(frozen=True)
+class Wheels(OdometrySource):
+    """The climber as it would be had its wheels never slipped."""
+
+    def start(self, sensors: "Sensors", climber: Climber, period: float, state: State) -> Measure:
+        """See `OdometrySource`."""
+        return DeadReckoning(sensors.encoder_resolution, climber, period, state.pose).measure
+
+
+SOURCES = Variants[type[OdometrySource]]({"truth": Truth, "wheels": Wheels}, "odometry_sources")
+# Parameters of what is measured, and when; all others are errors that are added to that
+MEASURING = "odometry_source", "odometry_delay", "encoder_resolution", "seed"
 
 
 @dataclass(frozen=True)
 class Sensors:
     """What is between the truth and the odometry; all of it off."""
 
-    odometry_source: str = parameter(
-        "truth", "", "what odometry measures", choices=("truth", "wheels")
-    )
+    odometry_source: str = parameter("truth", "", "what odometry measures", choices=SOURCES)
     odometry_delay: float = parameter(
         0.0,
         "s",
@@ -67,11 +106,18 @@ class Sensors:
 
     @cached_property
     def is_ideal(self) -> bool:
-        """Whether they tell the truth."""
-        noise = self.position_noise, self.heading_noise, self.speed_noise, self.yaw_rate_noise
-        place_bias = self.x_bias, self.y_bias, self.heading_bias
-        errors = (*noise, *place_bias, self.speed_bias, self.yaw_rate_bias)
-        return not any(np.any(error) for error in errors)
+        """Whether they tell what is measured as it is: nothing that `told` adds is set."""
+        return not any(np.any(getattr(self, field.name)) for field in self.errors())
+
+    @classmethod
+    def errors(cls) -> "list[Field[Any]]":
+        """Fields of what `told` adds."""
+        return [field for field in fields(cls) if field.name not in MEASURING]
+
+    @property
+    def ideal(self) -> "Sensors":
+        """The same without what `told` adds."""
+        return Sensors(**{name: getattr(self, name) for name in MEASURING})
 
     def told(self, motion: Motion, noise: Iterable[Any]) -> Motion:
         """Motion with bias and noise, of five numbers of unit variance: x, y, θ, v, ω."""
@@ -89,11 +135,18 @@ class Sensors:
 class Odometer:
     """The sensors at work, from a start at `state`; the same seed, the same noise."""
 
-    def __init__(self, sensors: Sensors, climber: Climber, period: float, state: State) -> None:
-        self.sensors, self.climber, self.period = sensors, climber, period
+    def __init__(
+        self,
+        sensors: Sensors,
+        climber: Climber,
+        period: float,
+        state: State,
+        source: OdometrySource | None = None,
+    ) -> None:
+        self.sensors = sensors
         self._random = np.random.default_rng(sensors.seed)
-        self._counted: Array = np.zeros(2)  # [rad] right, left
-        self._pose: Array = state.pose
+        source = source or SOURCES[sensors.odometry_source]()
+        self._measure = source.start(sensors, climber, period, state)
         late = sensors.delay_in(period)
         first = self._measured(state)
         # before the start the climber was where it is
@@ -105,28 +158,10 @@ class Odometer:
 
     def measure(self, state: State, wheels: State, angles: Array) -> None:
         """Take a new measurement; `wheels` is the state as they tell it, and their `angles`."""
-        if self.sensors.odometry_source == "wheels":
-            state = self._reckoned(wheels, angles)
         number, _ = self._on_its_way[-1]
-        self._on_its_way.append((number + 1, self._measured(state)))
+        measured = self._measure(state, wheels, angles)
+        self._on_its_way.append((number + 1, self._measured(measured)))
         self._on_its_way.popleft()
-
-    def _reckoned(self, wheels: State, angles: Array) -> State:
-        """State that wheels at `angles` (2,) have rolled to since the last measurement."""
-        resolution, climber = self.sensors.encoder_resolution, self.climber
-        if resolution > 0:
-            angles = resolution * np.floor(angles / resolution)
-        right, left = (climber.wheel_radius * (angles - self._counted)).tolist()
-        self._counted = angles
-        way, turn = (right + left) / 2, (right - left) / (2 * climber.half_track)
-        x, y, heading = self._pose.tolist()
-        middle = heading + turn / 2
-        self._pose = np.array(
-            [x + way * math.cos(middle), y + way * math.sin(middle), heading + turn]
-        )
-        if resolution > 0:
-            return State.rolling(self._pose, way / self.period, turn / self.period)
-        return State.rolling(self._pose, float(wheels.forward_speed), float(wheels.yaw_rate))
 
     def _measured(self, state: State) -> State:
         if self.sensors.is_ideal:
@@ -139,3 +174,29 @@ class Odometer:
             told.yaw_rate,
         ]
         return State(np.array([told.x, told.y, told.heading]), np.array(velocity))
+
+
+class DeadReckoning:
+    """Where wheels have rolled to since the start, counted in steps of their encoders."""
+
+    def __init__(self, resolution: float, climber: Climber, period: float, pose: Array) -> None:
+        self.resolution, self.climber, self.period = resolution, climber, period
+        self.counted: Array = np.zeros(2)  # [rad] right, left
+        self.pose = pose
+
+    def measure(self, _: State, wheels: State, angles: Array) -> State:
+        """State that wheels at `angles` (2,) have rolled to since the last measurement."""
+        resolution, climber = self.resolution, self.climber
+        if resolution > 0:
+            angles = resolution * np.floor(angles / resolution)
+        right, left = (climber.wheel_radius * (angles - self.counted)).tolist()
+        self.counted = angles
+        way, turn = (right + left) / 2, (right - left) / (2 * climber.half_track)
+        x, y, heading = self.pose.tolist()
+        middle = heading + turn / 2
+        self.pose = np.array(
+            [x + way * math.cos(middle), y + way * math.sin(middle), heading + turn]
+        )
+        if resolution > 0:
+            return State.rolling(self.pose, way / self.period, turn / self.period)
+        return State.rolling(self.pose, float(wheels.forward_speed), float(wheels.yaw_rate))

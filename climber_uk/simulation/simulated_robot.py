@@ -1,12 +1,13 @@
 """A climber with its pump, motors and sensors, from one odometry to the next."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.adhesion import ADHESION, Suction
+from climber_uk.mechanics.adhesion import ADHESION
 from climber_uk.mechanics.contact import LOCOMOTION
 from climber_uk.mechanics.friction import FRICTION
 from climber_uk.mechanics.quantities import State
@@ -15,13 +16,14 @@ from climber_uk.parameters.declaration import check, parameter
 from climber_uk.simulation.inputs import NO_PUSH
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
-from climber_uk.simulation.sensors import Odometer, Sensors
+from climber_uk.simulation.sensors import SOURCES, Odometer, OdometrySource, Sensors
 
-VARIANTS: dict[str, dict[str, Any]] = {
+VARIANTS: dict[str, Mapping[str, Any]] = {
     "friction": FRICTION,
     "adhesion": ADHESION,
     "locomotion": LOCOMOTION,
     "wall": WALLS,
+    "odometry_source": SOURCES,
 }
 
 
@@ -29,10 +31,10 @@ VARIANTS: dict[str, dict[str, Any]] = {
 class Physics:
     """Which of everything the plant is made of, and what happens to it."""
 
-    friction: str = parameter("coulomb", "", "law of the seal", choices=tuple(FRICTION))
-    adhesion: str = parameter("suction", "", "what holds the climber", choices=tuple(ADHESION))
-    locomotion: str = parameter("wheeled", "", "what it runs on", choices=tuple(LOCOMOTION))
-    wall: str = parameter("plane", "", "what it runs along", choices=tuple(WALLS))
+    friction: str = parameter("coulomb", "", "law of the seal", choices=FRICTION)
+    adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
+    locomotion: str = parameter("wheeled", "", "what it runs on", choices=LOCOMOTION)
+    wall: str = parameter("plane", "", "what it runs along", choices=WALLS)
     slip: bool = parameter(False, "", "whether wheels slip where their load does not suffice")
     pressure_loss_time: float = parameter(
         0.0, "s", "since the start, at which the pump's pressure drops; 0: never", at_least=0
@@ -68,6 +70,7 @@ class Parts(NamedTuple):
     motors: Motors
     sensors: Sensors
     physics: Physics
+    source: OdometrySource | None = None  # None: that of the sensors, with its defaults
 
 
 class SimulatedRobot:
@@ -81,7 +84,8 @@ class SimulatedRobot:
         self.push = NONE
         self.plant = self._at_pressure(parts.plant, self._final_pressure())
         self.rates = self.plant.wheel_rates(start)  # [rad/s] of the wheels: right, left
-        self.odometer = Odometer(parts.sensors, parts.plant.climber, period, start)
+        climber = parts.plant.climber
+        self.odometer = Odometer(parts.sensors, climber, period, start, parts.source)
 
     @property
     def pressure(self) -> float:
@@ -125,16 +129,12 @@ class SimulatedRobot:
         return physics.pressure_loss_level if lost else self.parts.plant.climber.suction_pressure
 
     def _final_pressure(self) -> float:
-        adhesion, pump = self.parts.plant.contact.adhesion, self.parts.plant.climber
-        if isinstance(adhesion, Suction):
-            return float(adhesion.final_pressure(pump.suction_pressure))
-        return pump.suction_pressure
+        plant = self.parts.plant
+        return float(plant.contact.adhesion.final_pressure(plant.climber.suction_pressure))
 
     def _next_pressure(self, step: float) -> float:
         adhesion = self.parts.plant.contact.adhesion
-        if isinstance(adhesion, Suction):
-            return float(adhesion.pressure(self.pressure, self._pump(), step))
-        return self.pressure
+        return float(adhesion.pressure(self.pressure, self._pump(), step))
 
     @staticmethod
     def _at_pressure(plant: Plant, pressure: float) -> Plant:

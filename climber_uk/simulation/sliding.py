@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.friction import LuGre, Stribeck
 from climber_uk.simulation.cones import Cone, solve_friction_impulses
 from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import RigidBody, forward_speed
@@ -130,8 +129,7 @@ class ContactStepper:
     @property
     def _drag(self) -> float:
         """Part of friction with an edge that goes with the speed [N s/m]."""
-        law = self.body.contact.friction
-        return law.viscous * self.body.friction if isinstance(law, Stribeck) else 0.0
+        return float(self.body.contact.friction.drag(self.body.friction))
 
     def _cones(self, load: float, sliding: float, h: float) -> list[Cone]:
         """The wheels first, if they may slip; then the seal, and what resists turning."""
@@ -168,13 +166,14 @@ class ContactStepper:
 
     def _smooth_friction(self, sliding: Array, deflection: Array, h: float) -> tuple[Array, Array]:
         """Force (3,) that is there already [N, N, N m], and drag (3,) [N s/m, N s/m, N m s]."""
-        law, f = self.body.contact.friction, self.body.friction
+        law, bristles, f = self.body.contact.friction, self.body.bristles, self.body.friction
         lever = np.array([1.0, 1.0, self._radius])
         speed = float(np.linalg.norm(sliding))
-        if isinstance(law, LuGre):
-            q, stiffness, T = 1 + h * law.relaxation(speed), law.stiffness(f), law.damping_time
+        if bristles is not None:
+            q, T = 1 + h * bristles.relaxation(speed), bristles.damping_time
+            stiffness = bristles.stiffness(f)
             there = stiffness * (deflection / q + T * (deflection / q - deflection) / h)
-            drag = stiffness * (h + T) / q + f * law.viscous
+            drag = stiffness * (h + T) / q + bristles.drag(f)
             return lever * there, lever**2 * drag
         if law.stiction(1.0) > 0:
             return np.zeros(3), lever**2 * self._drag
@@ -183,10 +182,12 @@ class ContactStepper:
 
     def _bent(self, before: Array, after: Array, deflection: Array, h: float) -> Array:
         """Bristles after `h`, in which they slid at `before` (3,), and at last `after` (3,)."""
-        law = self.body.contact.friction
-        if not isinstance(law, LuGre):
+        bristles = self.body.bristles
+        if bristles is None:
             return deflection
-        return (deflection + h * after) / (1 + h * law.relaxation(float(np.linalg.norm(before))))
+        return (deflection + h * after) / (
+            1 + h * bristles.relaxation(float(np.linalg.norm(before)))
+        )
 
     def _rolling_on(self, y: Array, slip: Array) -> tuple[Array, Array]:
         """(y, no slip) with the momentum of rims and climber together: they roll on as one."""

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from climber_uk.control import model
 from climber_uk.control.constraint_set import demanded, rows
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
 from climber_uk.control.exact import Exact
@@ -16,6 +17,7 @@ from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.udwadia_kalaba import constraint_force
+from climber_uk.parameters.declaration import parameter
 from climber_uk.simulation.plant import Plant
 
 PAPER = Trajectory(Ellipse(), ConstantRate())
@@ -130,6 +132,39 @@ def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
             if rate > 0:  # where the motor can hold what it held
                 nearest = np.clip(before, low, high)
                 assert np.all(np.abs(torque - nearest) <= rate * PERIOD * (1 + 1e-12) + 1e-14)
+
+
+@dataclass(frozen=True)
+class Pushing:
+    """As a control law of another package: a force and a moment of where the climber is."""
+
+    stiffness: float = parameter(30.0, "N/m", "of place")
+
+    def wrench(self, climber, target, motion):
+        pull = self.stiffness * (target.x - motion.x)
+        return Wrench(pull + climber.weight_along_wall * motion.sine, target.yaw_rate)
+
+
+@pytest.mark.parametrize("predict", [False, True])
+def test_a_control_law_of_forces_has_prediction_disturbance_and_limits_around_it(predict):
+    climber, target = Climber(max_wheel_torque=0.3), PAPER.at(0.1).target
+    options, other = ControlOptions(predict=predict), Pushing()
+    law = ControlLaw(climber, Guidance(), options, other)
+    now = situation(START, held=(0.3, 0.2), disturbance=(4.0, -0.5))
+    command = law.command(now, target)
+    at, acting = now.motion, climber.wrench(*now.held)
+    for _ in range(2 if predict else 1):  # with the torques held, and then with the first answer
+        if predict:
+            moved = np.add(acting, now.disturbance)
+            at = model.predict(climber, now.motion, *moved, options.lookahead(PERIOD))
+        wanted = np.subtract(other.wrench(climber, target, at), now.disturbance)
+        acting = climber.saturate(*wanted, *climber.torque_bounds(START))[:2]
+    assert command.demanded == pytest.approx(tuple(wanted), abs=1e-12)
+    assert command.lateral == pytest.approx(
+        climber.mass * at.speed * at.yaw_rate + climber.weight_along_wall * at.cosine
+    )
+    assert np.abs(command.torques).max() <= 0.3
+    assert np.abs(command.missing).max() > 0.1
 
 
 def test_what_the_limits_take_away_is_told():

@@ -17,9 +17,11 @@ from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
+from climber_uk.simulation.sensors import Sensors
 
 BUILT = SCENARIOS["climber.yaml"]
-ENCODERS = Link(encoder_counts=4096, delay=0.005, torque_lag=0.005)
+WHEELS = Sensors(odometry_source="wheels", encoder_resolution=2 * np.pi / 4096)
+ENCODERS = Link(sensors=WHEELS, delay=0.005, torque_lag=0.005)
 
 
 def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, **timing):

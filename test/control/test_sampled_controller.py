@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -20,6 +20,8 @@ from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.parameters.declaration import parameter
+from climber_uk.simulation.sensors import Sensors
 
 pytestmark = pytest.mark.slow
 
@@ -106,7 +108,11 @@ def test_mass_and_inertia_may_be_off_by_a_fifth():
 
 
 def test_odometry_may_be_noisy():
-    noise = Link(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
+    noise = Link(
+        sensors=Sensors(
+            position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2, yaw_rate_noise=1e-2
+        )
+    )
     assert lap(controller(), link=noise).rms() < 1e-3
 
 
@@ -129,7 +135,7 @@ def test_odometry_may_come_at_other_rates(period):
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_odometry_may_lack_the_twist(noise):
-    link = Link(with_twist=False, position_noise=noise, heading_noise=noise)
+    link = Link(with_twist=False, sensors=Sensors(position_noise=noise, heading_noise=noise))
     ours = controller(observer=Observer(velocity_source="pose"))
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
     run = simulate(RAMPED, start, 10.0, ours, CLIMBER, link)
@@ -281,6 +287,22 @@ def test_changed_gains_act_in_full_half_a_second_later():
     assert sampled_controller._constraints().along_track_gain == pytest.approx(5.5)
     sampled_controller.stamp += SECOND // 4
     assert sampled_controller._constraints() is changed.constraints
+
+
+@dataclass(frozen=True)
+class Named(Guidance):
+    """As a constraint set of another package, with more than gains."""
+
+    kind: str = parameter("slow", "", "what it is", runtime=True)
+
+
+def test_what_is_no_gain_changes_at_once():
+    ours = controller(constraints=Named()).sampled_controller
+    ours.see(SECOND, START.motion)
+    changed = replace(ours.law, constraints=Named(along_track_gain=6.0, kind="fast"))
+    ours.retune(changed, ours.observer, ours.timing, ours.pacing)
+    ours.stamp += SECOND // 4
+    assert ours._constraints() == Named(along_track_gain=5.5, kind="fast")
 
 
 def test_a_torque_limit_does_not_wind_the_observer_up():

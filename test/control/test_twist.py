@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from identification_experiments import SCENARIOS
+from identification_experiments import NOISE, SCENARIOS
 
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.control_law import ControlLaw, ControlOptions
@@ -13,8 +13,14 @@ from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.twist import mean_twist
 from climber_uk.mechanics.quantities import State
+from climber_uk.simulation.sensors import Sensors
 
 BUILT = SCENARIOS["climber.yaml"]
+
+
+def encoders(counts):
+    """Sensors of wheels whose encoders count that many steps in a turn."""
+    return Sensors(odometry_source="wheels", encoder_resolution=2 * np.pi / counts)
 
 
 def driven(link, twist="auto", duration=4.0):
@@ -38,23 +44,23 @@ def test_a_mean_twist_leads_from_one_pose_to_the_other():
 
 @pytest.mark.parametrize("period", [0.005, 0.05])
 @pytest.mark.parametrize(
-    ("link", "is_mean"),
+    ("sensors", "is_mean"),
     [
-        ({}, False),
-        ({"position_noise": 1e-3, "heading_noise": 1e-3, "speed_noise": 1e-2}, False),
-        ({"speed_noise": 1e-3}, False),
-        ({"encoder_counts": 512}, True),
-        ({"encoder_counts": 65536}, True),
+        (Sensors(), False),
+        (NOISE.sensors, False),
+        (Sensors(speed_noise=1e-3, yaw_rate_noise=1e-3), False),
+        (encoders(512), True),
+        (encoders(65536), True),
     ],
     ids=["truth", "noise", "noise of the twist", "few counts", "many counts"],
 )
-def test_it_is_told_which_twist_odometry_has(period, link, is_mean):
-    _, sampled_controller = driven(Link(period=period, **link))
+def test_it_is_told_which_twist_odometry_has(period, sensors, is_mean):
+    _, sampled_controller = driven(Link(period=period, sensors=sensors))
     assert sampled_controller.twist.is_mean is is_mean
 
 
 def test_a_mean_twist_taken_for_one_of_its_stamp_costs_the_margin_of_slow_odometry():
-    slow = Link(period=0.05, encoder_counts=4096, delay=0.005, torque_lag=0.005)
+    slow = Link(period=0.05, sensors=encoders(4096), delay=0.005, torque_lag=0.005)
     for twist, stands in (("auto", True), ("mean", True), ("instantaneous", False)):
         run, _ = driven(slow, twist, duration=12.0)
         assert (run.chatter(6.0) < 0.05) is stands, twist

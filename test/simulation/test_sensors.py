@@ -1,3 +1,4 @@
+import dataclasses
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
-from climber_uk.simulation.sensors import Odometer, Sensors
+from climber_uk.simulation.sensors import MEASURING, Odometer, Sensors
 from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 CLIMBER = Climber()
@@ -106,6 +107,18 @@ def test_wheels_that_roll_count_the_way_and_those_that_slip_drift():
     truth, told = reckoned(Plant(FLOOR, 0.0025, ON_WEIGHT, slip=True), harsh)
     assert np.hypot(*told.pose[:2]) > np.hypot(*truth.pose[:2]) + 10
     assert told.forward_speed > truth.forward_speed + 10
+
+
+def test_sensors_are_ideal_only_if_no_error_of_any_kind_is_added():
+    motion, noise = State.rolling(np.zeros(3), 0.2, 0.1).motion, [1.0] * 5
+    assert Sensors().is_ideal
+    assert Sensors().told(motion, noise) == motion
+    for field in dataclasses.fields(Sensors):
+        if field.name not in MEASURING:
+            sensors = Sensors(**{field.name: 0.25})
+            assert not sensors.is_ideal
+            assert sensors.told(motion, noise) != motion  # it is not read by nobody
+            assert sensors.ideal == Sensors()
 
 
 def test_an_encoder_counts_whole_steps():
