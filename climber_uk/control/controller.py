@@ -238,7 +238,9 @@ class Controller:
                     sampled_controller.mean_torques(stamp),
                     sampled_controller.disturbance,
                 )
-                observed = Observed(last, motion, time, acted, disturbance)
+                observed = Observed(
+                    last, motion, time, acted, disturbance, sampled_controller.reaction
+                )
                 self._fault, self._rested = trouble or self._find_fault(observed), 0.0
                 if self._fault is not None:
                     guard.fault(stamp)

@@ -187,4 +187,5 @@ class Guidance:
         s = psi_1 + turn_rate * part  # s: 0 when it turns back as fast as it should
         theta_2 = omega_d1 - psi_2 - omega_n * (inside * psi_1 + s)
         theta_2 = theta_2 - turn_rate_1 * (part - u * inside)
-        return DesiredAcceleration(v_1, theta_2, wanted)
+        # ahead of a reference that comes it waits, and overcomes no friction to go back
+        return DesiredAcceleration(v_1, theta_2, select(wanted * v_d < 0.0, 0.0, wanted))

@@ -117,6 +117,11 @@ class SampledController:
     def disturbance(self, disturbance: Wrench) -> None:
         self.learnt = DisturbanceEstimate(*disturbance)
 
+    @property
+    def reaction(self) -> float:
+        """From an odometry to the middle of the period in which a torque answers it [s]."""
+        return self._delay + self.period / 2
+
     def retune(self, law: ControlLaw, observer: Observer, timing: Timing, pacing: Pacing) -> None:
         """Go over to other settings: the constraints' gains gradually, so that no torque jumps."""
         if law.constraints != self.law.constraints:

@@ -8,7 +8,7 @@ from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import State, across
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, State, across
 from climber_uk.mechanics.reference import tracking_error
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
@@ -48,6 +48,18 @@ def differences(function, state, demand, time):
     """Value, first and second time derivative of function(state, time) along the motion."""
     before, here, after = (function(predict(state, demand, h), time + h) for h in (-H, 0.0, H))
     return here, (after - before) / (2 * H), (after - 2 * here + before) / H**2
+
+
+@pytest.mark.parametrize(
+    ("speed", "ahead", "sign"),
+    [(0.05, 0.5, 0), (0.05, -0.5, 1), (-0.05, -0.5, 0), (-0.05, 0.5, -1), (0.0, 0.5, -1)],
+)
+def test_ahead_of_a_reference_that_comes_it_overcomes_no_friction_to_go_back(speed, ahead, sign):
+    target = ReferencePoint(0.0, 0.0, 0.0, speed, *(7 * [0.0]))
+    motion, gains = Motion(ahead, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), Guidance()
+    slower, _, wanted = gains.desired_acceleration(gains.prepare(target), motion)
+    assert np.sign(wanted) == sign
+    assert np.sign(slower) == -np.sign(ahead)
 
 
 @settings(deadline=None)
