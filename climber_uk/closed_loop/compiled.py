@@ -66,7 +66,7 @@ def advanced(
     body: UnicycleModel, motion: Motion, wrench: Wrench, time: float, steps: int
 ) -> Motion:
     """Motions (N,) after `steps` steps of `time` [s]."""
-    fastest = abs(motion.yaw_rate) + steps * time * abs(wrench.turn / body.yaw_inertia)
+    fastest = abs(motion.yaw_rate) + steps * time * abs(wrench.moment / body.yaw_inertia)
     if not np.max(fastest, initial=0.0) * time <= SMALL:
         return plain.advanced_often(body, motion, wrench, time, steps)
     rows = np.empty((11, len(motion.x)))

@@ -61,7 +61,7 @@ class Tally:
         np.maximum(self.worst, square, out=self.worst, where=on)
         np.copyto(self.last, square, where=on)
         np.copyto(self.late, time, where=(square > NEAR * NEAR) & on)
-        cut = (np.abs(command.lost.drive) > CUT) | (np.abs(command.lost.turn) > CUT)
+        cut = (np.abs(command.lost.force) > CUT) | (np.abs(command.lost.moment) > CUT)
         np.add(self.cuts, cut, out=self.cuts, where=on)
         for torque in wheels:
             np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)

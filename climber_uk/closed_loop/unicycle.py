@@ -44,15 +44,15 @@ class UnicycleModel(NamedTuple):
         """It, with what a wrench does to it."""
         mass, yaw_inertia, friction, gravity = self
         return Accelerations(
-            wrench.drive / mass, wrench.turn / yaw_inertia, friction / mass, gravity
+            wrench.force / mass, wrench.moment / yaw_inertia, friction / mass, gravity
         )
 
 
 class Accelerations(NamedTuple):
     """What accelerates a climber."""
 
-    drive: Any  # F/m [m/s²]
-    turning: Any  # ω̇ = N/J [rad/s²]
+    forward: Any  # F/m [m/s²]
+    yaw: Any  # ω̇ = N/J [rad/s²]
     friction: Any  # f/m [m/s²]
     gravity: Any  # g_t [m/s²]
 
@@ -86,13 +86,13 @@ def stepped(pushed: Accelerations, motion: Motion, time: float) -> Motion:
 def slid(pushed: Accelerations, motion: Motion, rubbing: Any, time: Any) -> Motion:
     """Motion `time` [s] later of a climber whose seal slides: friction decelerates by `rubbing`."""
     x, y, heading, c_0, s_0, v_0, omega = motion
-    faster = 0.5 * time * pushed.turning  # in half of the time
+    faster = 0.5 * time * pushed.yaw  # in half of the time
     omega_1 = omega + faster
     halfway, angle = 0.5 * time * (omega + 0.5 * faster), time * omega_1
     c_1, s_1, heading, c_2, s_2 = swept(heading, c_0, s_0, halfway, angle)
     part = time / 6
     fall = part * pushed.gravity
-    v_2 = v_0 + (time * (pushed.drive - rubbing) - fall * (s_0 + 4 * s_1 + s_2))
+    v_2 = v_0 + (time * (pushed.forward - rubbing) - fall * (s_0 + 4 * s_1 + s_2))
     v_14 = 2 * (v_0 + v_2) - 3 * fall * (s_0 - s_2)  # four times the speed halfway
     return Motion(
         x + part * (v_0 * c_0 + v_14 * c_1 + v_2 * c_2),
@@ -108,14 +108,14 @@ def slid(pushed: Accelerations, motion: Motion, rubbing: Any, time: Any) -> Moti
 def _held(pushed: Accelerations, motion: Motion, time: Any) -> Motion:
     """Motion `time` [s] later of a climber that friction holds: it may turn on the spot."""
     x, y, heading, cosine, sine, v, omega = motion
-    angle = time * (omega + time / 2 * pushed.turning)
+    angle = time * (omega + time / 2 * pushed.yaw)
     heading, cosine, sine = rotated(heading, cosine, sine, angle)
-    return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * pushed.turning)
+    return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * pushed.yaw)
 
 
 def _push(pushed: Accelerations, motion: Motion) -> Any:
     """What friction at rest is up against [m/s²]."""
-    return pushed.drive - pushed.gravity * motion.sine
+    return pushed.forward - pushed.gravity * motion.sine
 
 
 def _from_rest(pushed: Accelerations, motion: Motion, time: Any) -> Motion:

@@ -76,7 +76,7 @@ class Command(NamedTuple):
     @property
     def constraint_force(self) -> Array:
         """Drive [N], lateral [N], about z [N m], (..., 3)."""
-        return pack(self.demanded.drive, self.lateral, self.demanded.turn)
+        return pack(self.demanded.force, self.lateral, self.demanded.moment)
 
     @property
     def missing(self) -> Array:

@@ -35,8 +35,8 @@ WIRINGS = {  # torque at the wheels (right, left) of the torques commanded
 
 def expected_gain(climber: Climber) -> Array:
     """Accelerations per torque of each wheel of a pair (2,): [m/s² / N m], [rad/s² / N m]."""
-    drive, _ = climber.drive_and_turn(PAIR[0])
-    _, turn = climber.drive_and_turn(PAIR[1])
+    drive, _ = climber.force_and_moment(PAIR[0])
+    _, turn = climber.force_and_moment(PAIR[1])
     return np.array([drive / climber.mass, turn / climber.yaw_inertia])
 
 

@@ -116,19 +116,19 @@ class Climber:
 
     def wheel_force(self, heading: Array, torques: Array) -> Array:
         """E(θ) τ: what the wheel torques (right, left) do to the climber, (..., 3) [N, N m]."""
-        drive, turn = self.drive_and_turn(torques)
-        return pack(drive * cos(heading), drive * sin(heading), turn)
+        force, moment = self.force_and_moment(torques)
+        return pack(force * cos(heading), force * sin(heading), moment)
 
     def wrench(self, right: Any, left: Any) -> tuple[Any, Any]:
         """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
         radius = self.wheel_radius
         return (right + left) / radius, self.half_track * (right - left) / radius
 
-    def torques(self, drive: Any, turn: Any) -> Torques:
+    def torques(self, force: Any, moment: Any) -> Torques:
         """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N."""
         half = self.wheel_radius / 2
-        half_drive, half_turn = half * drive, half * turn / self.half_track
-        return Torques(half_drive + half_turn, half_drive - half_turn)
+        from_force, from_moment = half * force, half * moment / self.half_track
+        return Torques(from_force + from_moment, from_force - from_moment)
 
     def rim_rates(self, motion: Motion) -> tuple[Any, Any]:
         """Turning rates (v ± d ω) / r of the wheels, right and left [rad/s]."""
@@ -149,20 +149,20 @@ class Climber:
         return _bounds(limit, right / no_load), _bounds(limit, left / no_load)
 
     def saturate(
-        self, drive: Any, turn: Any, right: Bounds, left: Bounds
+        self, force: Any, moment: Any, right: Bounds, left: Bounds
     ) -> tuple[Any, Any, Any, Any]:
-        """What wheels within their bounds can do of drive and turn, the turn served first.
+        """What wheels within their bounds can do of force and moment, the moment served first.
 
-        Returns drive and turn, the very same ones if they fit, and the torques of the right wheel
+        Returns force and moment, the very same ones if they fit, and the torques of the right wheel
         and of the left one that do it.
         """
         (right_low, right_high), (left_low, left_high) = right, left
         to_mean, to_twist = self.leverage
-        mean, twist = to_mean * drive, to_twist * turn  # τR,L = mean ± twist
+        mean, twist = to_mean * force, to_twist * moment  # τR,L = mean ± twist
         one, other = mean + twist, mean - twist
         fits = (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
         if fits is True or everywhere(fits):
-            return drive, turn, one, other
+            return force, moment, one, other
         twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
         lowest, highest = right_low - twist, right_high - twist
         lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
@@ -170,19 +170,19 @@ class Climber:
         mean = clipped(mean, lowest, highest)
         # once more, as sums are rounded: no torque is beyond its bound by as little as that
         return (
-            select(fits, drive, mean / to_mean),
-            select(fits, turn, twist / to_twist),
+            select(fits, force, mean / to_mean),
+            select(fits, moment, twist / to_twist),
             select(fits, one, clipped(mean + twist, right_low, right_high)),
             select(fits, other, clipped(mean - twist, left_low, left_high)),
         )
 
-    def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:
+    def force_and_moment(self, torques: Array) -> tuple[Array, Array]:
         """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
         return self.wrench(*unpack(torques))
 
-    def wheel_torques(self, drive: Array, turn: Array) -> Array:
+    def wheel_torques(self, force: Array, moment: Array) -> Array:
         """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N, (..., 2) [N m]."""
-        return pack(*self.torques(drive, turn))
+        return pack(*self.torques(force, moment))
 
     def wheel_rates(self, state: State) -> Array:
         """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
@@ -199,14 +199,14 @@ class Climber:
         so that the wheels' reaction takes just the lateral part away. Left are (11) and (15).
         """
         heading, v, omega = state.heading, state.forward_speed, state.yaw_rate
-        drive, turn = self.drive_and_turn(torques)
+        force, moment = self.force_and_moment(torques)
         cosine, sine = cos(heading), sin(heading)
-        force = drive - self.seal_friction * direction - self.weight_along_wall * sine
+        force = force - self.seal_friction * direction - self.weight_along_wall * sine
         v_1 = force / self.mass
         return pack(
             v_1 * cosine - v * omega * sine,
             v_1 * sine + v * omega * cosine,
-            turn / self.yaw_inertia,
+            moment / self.yaw_inertia,
         )
 
 

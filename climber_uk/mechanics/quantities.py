@@ -52,10 +52,10 @@ class ReferencePoint(NamedTuple):
 
 
 class Wrench(NamedTuple):
-    """What pushes a climber forward, and what turns it."""
+    """Force and moment on a climber, in its own frame."""
 
-    drive: Any  # [N]
-    turn: Any  # [N m]
+    force: Any  # along the climber [N]
+    moment: Any  # about its vertical [N m]
 
 
 class Torques(NamedTuple):

@@ -247,7 +247,7 @@ class UkTorqueController(ManagedNode):
     def take_margins(self, answer: Answer, state: State) -> None:
         """Tell how near the torques bring the climber to slipping, and how near it is to tip."""
         climber, hold = self.controller.sampled_controller.law.climber, self.hold
-        drive, _ = climber.drive_and_turn(answer.torques)
+        drive, _ = climber.force_and_moment(answer.torques)
         if answer.command is not None:
             lateral = float(answer.command.constraint_force[1])
         else:

@@ -27,21 +27,21 @@ class NotFinite(ArithmeticError):  # noqa: N818
 class Inputs(NamedTuple):
     """What acts on a climber whatever it does [N, N m]."""
 
-    drive: float  # of the motors, along the climber
-    turn: float  # of the motors, about it
+    force: float  # of the motors, along the climber
+    moment: float  # of the motors, about it
     push_x: float  # in the wall's frame
     push_y: float
-    push_turn: float
+    push_moment: float
 
     @classmethod
     def of(cls, climber: Climber, torques: Array, push: Array) -> "Inputs":
         """Of wheel torques (2,) right, left, and a push (3,) in the wall's frame."""
-        drive: Any
-        turn: Any
-        drive, turn = climber.drive_and_turn(torques)
+        force: Any
+        moment: Any
+        force, moment = climber.force_and_moment(torques)
         if push is NO_PUSH:
-            return cls(drive, turn, 0.0, 0.0, 0.0)
-        return cls(drive, turn, *unpack(push))
+            return cls(force, moment, 0.0, 0.0, 0.0)
+        return cls(force, moment, *unpack(push))
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ class Plant:
         lateral = self._body.lateral(y, given, climber.mass)
         s_x, s_y = self.wall.along(climber.inclination, float(y[1]))
         return (
-            float(self.contact.slip_margin(climber, into, given.drive, lateral)),
+            float(self.contact.slip_margin(climber, into, given.force, lateral)),
             float(self.contact.tip_margin(climber, into, GRAVITY * math.hypot(s_x, s_y))),
         )
 
@@ -138,14 +138,14 @@ class Plant:
 
     def _regular_step(self, y: Array, given: Inputs) -> Array | None:
         """End of a step without change between sticking and slipping; None if there is one."""
-        load, turn = self._load(y), given.turn + given.push_turn
+        load, turn = self._load(y), given.moment + given.push_moment
         resistance = float(self.contact.locomotion.turning_resistance(load))
         turning = float(np.sign(y[5]))
         if turning == 0 and resistance > 0:
             if abs(turn) > resistance:
                 return None
             turning = turn / resistance
-        resisted = given._replace(push_turn=given.push_turn - resistance * turning)
+        resisted = given._replace(push_moment=given.push_moment - resistance * turning)
         if not self._wheels_hold(y, given, resisted):
             return None
         end = self._rolling.step(y, resisted)

@@ -60,7 +60,7 @@ class RigidBody:
         """Force along the climber that friction is up against [N]."""
         _, height, heading, *_ = y.tolist()
         f_x, f_y = self.outside(height, given)
-        return float(given.drive + f_x * math.cos(heading) + f_y * math.sin(heading))
+        return float(given.force + f_x * math.cos(heading) + f_y * math.sin(heading))
 
     def lateral(self, y: Array, given: Inputs, mass: float) -> float:
         """What the wheels have to take to the left, for `mass` to follow the heading [N]."""
@@ -96,7 +96,7 @@ class RigidBody:
         climber = self.climber
         _, height, heading, v_x, v_y, yaw_rate, *deflection = y.tolist()
         cosine, sine = math.cos(heading), math.sin(heading)
-        force, turn = given.drive, given.turn + given.push_turn
+        force, turn = given.force, given.moment + given.push_moment
         bending = [0.0] * len(deflection)
         if direction == 0:
             held = [0.0, 0.0, yaw_rate, 0.0, 0.0, turn / climber.yaw_inertia]

@@ -120,7 +120,7 @@ class NoSlipStepper:
     # A ring, or friction without an edge
 
     def _ring_holds(self, y: Array, given: Inputs) -> bool:
-        around = (given.turn + given.push_turn) / self.body.contact.grip.seal_radius
+        around = (given.moment + given.push_moment) / self.body.contact.grip.seal_radius
         return math.hypot(self.body.push(y, given), around) <= self.body.stiction
 
     def _sliding_speed(self, y: Array) -> float:

@@ -60,8 +60,8 @@ class ContactStepper:
         """Whether wheels that share `load` [N] do what rolling on asks of them."""
         d, (v_1, omega_1) = self.body.climber.half_track, accelerations
         most = self.body.contact.grip.wheel_friction_coefficient * load / 2
-        right = (given.drive + given.turn / d) / 2 - self.rim * (v_1 + d * omega_1)
-        left = (given.drive - given.turn / d) / 2 - self.rim * (v_1 - d * omega_1)
+        right = (given.force + given.moment / d) / 2 - self.rim * (v_1 + d * omega_1)
+        left = (given.force - given.moment / d) / 2 - self.rim * (v_1 - d * omega_1)
         if max(abs(right), abs(left)) > most:
             return False
         sideways = math.sqrt(most**2 - right**2) + math.sqrt(most**2 - left**2)
@@ -90,18 +90,18 @@ class ContactStepper:
         sliding = np.array([v, u, self.body.contact.grip.seal_radius * omega])
 
         f_x, f_y = self.body.outside(height, given)
-        pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, given.push_turn])
+        pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, given.push_moment])
         against, drag = self._smooth_friction(sliding, np.array(deflection), h)
         masses = np.array([self.mass, self.mass, self.yaw_inertia])
         free = masses * [v, u, omega] + h * (pull - against)
         if self.slip:
-            right, left = (given.drive + given.turn / d) / 2, (given.drive - given.turn / d) / 2
+            right, left = (given.force + given.moment / d) / 2, (given.force - given.moment / d) / 2
             rims = slip + np.array([rolls + d * omega, rolls - d * omega])
             free = np.concatenate([free, self.rim * rims + h * np.array([right, left])])
             masses = np.concatenate([masses + h * drag, [self.rim, self.rim]])
             lightness = 1 / masses
         else:
-            free += h * np.array([given.drive, 0.0, given.turn])
+            free += h * np.array([given.force, 0.0, given.moment])
             lightness = 1 / (masses + h * drag)
             free[1] = lightness[1] = 0.0
         cones = self._cones(load, float(np.linalg.norm(sliding)), h)

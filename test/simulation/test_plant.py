@@ -316,7 +316,7 @@ def test_over_a_minute_of_random_driving_not_a_millionth_of_the_energy_is_lost(n
             demand = random.uniform(0.2, 1.0) * random.choice([-1, 1]), random.uniform(-1, 1)
             push = random.normal(size=3) * [3.0, 3.0, 0.3]
         torques = driven(state, random, climber, demand)
-        drive, turn = climber.drive_and_turn(torques)
+        drive, turn = climber.force_and_moment(torques)
 
         def powers(state, drive=drive, turn=turn, push=push):
             motors = drive * state.forward_speed + turn * state.yaw_rate
