@@ -10,22 +10,9 @@ import numpy as np
 import yaml
 
 from climber_uk.campaign import names
-from climber_uk.campaign.distributions import (
-    Distribution,
-    Uniform,
-    distribution,
-    drawn,
-    extremes,
-)
+from climber_uk.campaign.distributions import Distribution, Uniform, distribution, drawn, extremes
 from climber_uk.campaign.limits import Limit
-from climber_uk.campaign.names import (
-    CONSTRAINT_SET,
-    LOSS_TIME,
-    NODES,
-    PARAMETERS,
-    PLANT,
-    SEED,
-)
+from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, NODES, PARAMETERS, PLANT, SEED
 from climber_uk.campaign.scenario import Node, Scenario
 from climber_uk.mechanics import Array
 from climber_uk.parameters.declaration import check, parameter

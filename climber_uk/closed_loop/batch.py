@@ -29,12 +29,7 @@ from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, keep_what_is_freed, part
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import (
-    Motion,
-    ReferencePoint,
-    Torques,
-    Wrench,
-)
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques, Wrench
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.sensors import Sensors
 

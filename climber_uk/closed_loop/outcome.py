@@ -74,7 +74,7 @@ class Tally:
         """Tell who falls off, now that the climbers are these."""
         self._climber = climber
         self._into = climber.gravity_into_wall
-        hold = self.contact.hold(climber, self._into)
+        hold = self.contact.normal_force(climber, self._into)
         along = climber.weight_along_wall / climber.mass
         tip = self.contact.tip_margin(climber, self._into, along)
         falls = (hold < 1e-9 * climber.mass * GRAVITY) | (tip < 1)

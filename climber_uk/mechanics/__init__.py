@@ -1,4 +1,4 @@
-"""The mechanics of the climber and its paths: pure numerics, no ROS."""
+"""The mechanics of the climber, its wall and its paths: numbers only, no ROS."""
 
 from typing import Any
 

@@ -1,7 +1,8 @@
 """The wheeled suction climber as M q̈ = Q + E(θ) τ under the no-slip row (11), (15), (17).
 
 q = (x, y, θ): the centre of mass in a frame fixed to the wall, x horizontal, y up, θ anticlockwise
-from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (right, left).
+from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (right, left). What
+takes a `Motion` or single torques works on components: floats, or arrays (N,) of many climbers.
 """
 
 import math
@@ -27,29 +28,42 @@ class Climber:
     Raises `ValueError` naming field, value and bound.
     """
 
-    mass: float = parameter(5.0, "kg", "mass m", above=0, plausible=(0.1, 300))
+    mass: float = parameter(
+        5.0, "kg", "mass m; too low: torques are too small", above=0, plausible=(0.1, 300)
+    )
     yaw_inertia: float = parameter(
         0.33, "kg m²", "inertia J about the centre of mass", above=0, plausible=(1e-4, 100)
     )
-    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0, plausible=(0.005, 0.5))
+    wheel_radius: float = parameter(
+        0.027, "m", "wheel radius r; too large: so are the torques", above=0, plausible=(0.005, 0.5)
+    )
     half_track: float = parameter(
         0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
     )
     seal_friction_coefficient: float = parameter(
         0.8,
         "",
-        "friction coefficient μ of the seal ring on the wall",
+        "friction coefficient μ of the seal on the wall; too high: it starts with a jerk",
         at_least=0,
         plausible=(0.01, 3),
     )
     wheel_load_share: float = parameter(
-        0.53, "", "share k of the suction force that the wheels carry", at_least=0, at_most=1
+        0.53,
+        "",
+        "share k of the suction force on the wheels; the seal carries the rest",
+        at_least=0,
+        at_most=1,
     )
     suction_pressure: float = parameter(
-        2500.0, "Pa", "pressure difference P", at_least=0, runtime=True, plausible=(1000, 1e5)
+        2500.0,
+        "Pa",
+        "pressure difference P; too high: the climber may fall off unwarned",
+        at_least=0,
+        runtime=True,
+        plausible=(1000, 1e5),
     )
     suction_area: float = parameter(
-        0.06, "m²", "effective suction area S", at_least=0, plausible=(1e-4, 1)
+        0.06, "m²", "area S the pressure difference acts on", at_least=0, plausible=(1e-4, 1)
     )
     inclination: float = parameter(
         90.0,
@@ -60,12 +74,16 @@ class Climber:
         plausible=(3.2, 180),
     )
     max_wheel_torque: float = parameter(
-        20.0, "N m", "limit of each wheel's torque", above=0, plausible=(0.02, 300)
+        20.0,
+        "N m",
+        "limit of each wheel's torque; too high: the motors limit it, and the heading suffers",
+        above=0,
+        plausible=(0.02, 300),
     )
     no_load_wheel_rate: float = parameter(
         0.0,
         "rad/s",
-        "wheel rate at which a motor has no torque left; 0: none falls",
+        "wheel rate at which a motor has no torque left; 0: torque does not fall with the rate",
         at_least=0,
         plausible=(1, 1000),
     )
@@ -98,12 +116,12 @@ class Climber:
 
     @cached_property
     def inertial(self) -> tuple[float, float, float, float]:
-        """m [kg], J [kg m²], f [N] and m g_t [N]: all that a motion asks for, in one."""
+        """m [kg], J [kg m²], f [N] and m g_t [N]: the numbers of (11) and (15)."""
         return self.mass, self.yaw_inertia, self.seal_friction, self.weight_along_wall
 
     @cached_property
     def leverage(self) -> tuple[float, float]:
-        """Mean of the wheels' torques by drive r/2 [m], and half their difference by turn r/2d."""
+        """r/2 [m] and r/2d: mean torque per drive force, half the difference per yaw moment."""
         return self.wheel_radius / 2, self.wheel_radius / 2 / self.half_track
 
     def applied_force(self, heading: Array, direction: Array | float) -> Array:
@@ -115,28 +133,28 @@ class Climber:
         return pack(friction * cos(heading), friction * sin(heading) - weight, 0 * heading)
 
     def wheel_force(self, heading: Array, torques: Array) -> Array:
-        """E(θ) τ: what the wheel torques (right, left) do to the climber, (..., 3) [N, N m]."""
+        """E(θ) τ of wheel torques (..., 2), in the wall's frame, (..., 3) [N, N, N m]."""
         force, moment = self.force_and_moment(torques)
         return pack(force * cos(heading), force * sin(heading), moment)
 
     def wrench(self, right: Any, left: Any) -> tuple[Any, Any]:
-        """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
+        """Drive force (τR + τL)/r [N] and yaw moment d (τR - τL)/r [N m] of two torques [N m]."""
         radius = self.wheel_radius
         return (right + left) / radius, self.half_track * (right - left) / radius
 
     def torques(self, force: Any, moment: Any) -> Torques:
-        """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N."""
+        """τR, τL = r (F ± N/d) / 2 [N m] of drive force F [N] and yaw moment N [N m]."""
         half = self.wheel_radius / 2
         from_force, from_moment = half * force, half * moment / self.half_track
         return Torques(from_force + from_moment, from_force - from_moment)
 
     def rim_rates(self, motion: Motion) -> tuple[Any, Any]:
         """Turning rates (v ± d ω) / r of the wheels, right and left [rad/s]."""
-        v, turning = motion.speed, self.half_track * motion.yaw_rate
-        return (v + turning) / self.wheel_radius, (v - turning) / self.wheel_radius
+        v, differential = motion.speed, self.half_track * motion.yaw_rate
+        return (v + differential) / self.wheel_radius, (v - differential) / self.wheel_radius
 
     def bounds(self, motion: Motion) -> tuple[Bounds, Bounds]:
-        """Lowest and highest torque of the right wheel, and of the left one.
+        """Lowest and highest torque [N m] of the right wheel, and of the left one.
 
         That of a DC motor falls in a straight line with the rate at which it drives its wheel, and
         not with the rate at which it brakes it.
@@ -146,23 +164,28 @@ class Climber:
             return (-limit, limit), (-limit, limit)
         no_load = select(no_load == 0, float("inf"), no_load)
         right, left = self.rim_rates(motion)
-        return _bounds(limit, right / no_load), _bounds(limit, left / no_load)
+        return _dc_motor_bounds(limit, right / no_load), _dc_motor_bounds(limit, left / no_load)
 
     def saturate(
         self, force: Any, moment: Any, right: Bounds, left: Bounds
     ) -> tuple[Any, Any, Any, Any]:
-        """What wheels within their bounds can do of force and moment, the moment served first.
+        """Saturate the wheel torques within the bounds of each, yaw moment first.
 
-        Returns force and moment, the very same ones if they fit, and the torques of the right wheel
-        and of the left one that do it.
+        Returns force [N], moment [N m], right and left torque [N m]; where no bound acts anywhere,
+        force and moment are the objects that came in.
         """
         (right_low, right_high), (left_low, left_high) = right, left
         to_mean, to_twist = self.leverage
         mean, twist = to_mean * force, to_twist * moment  # τR,L = mean ± twist
-        one, other = mean + twist, mean - twist
-        fits = (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
+        tau_r, tau_l = mean + twist, mean - twist
+        fits = (
+            (right_low <= tau_r)
+            & (tau_r <= right_high)
+            & (left_low <= tau_l)
+            & (tau_l <= left_high)
+        )
         if fits is True or everywhere(fits):
-            return force, moment, one, other
+            return force, moment, tau_r, tau_l
         twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
         lowest, highest = right_low - twist, right_high - twist
         lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
@@ -172,16 +195,16 @@ class Climber:
         return (
             select(fits, force, mean / to_mean),
             select(fits, moment, twist / to_twist),
-            select(fits, one, clipped(mean + twist, right_low, right_high)),
-            select(fits, other, clipped(mean - twist, left_low, left_high)),
+            select(fits, tau_r, clipped(mean + twist, right_low, right_high)),
+            select(fits, tau_l, clipped(mean - twist, left_low, left_high)),
         )
 
     def force_and_moment(self, torques: Array) -> tuple[Array, Array]:
-        """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
+        """Drive force (...) [N] and yaw moment (...) [N m] of torques (..., 2): see `wrench`."""
         return self.wrench(*unpack(torques))
 
     def wheel_torques(self, force: Array, moment: Array) -> Array:
-        """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N, (..., 2) [N m]."""
+        """Torques (right, left) (..., 2) [N m] of force and moment (...): see `torques`."""
         return pack(*self.torques(force, moment))
 
     def wheel_rates(self, state: State) -> Array:
@@ -217,5 +240,6 @@ def no_slip(state: State) -> tuple[Array, Array]:
     return row, -state.yaw_rate * state.forward_speed
 
 
-def _bounds(limit: Any, part: Any) -> Bounds:
-    return -limit * clipped(1 + part, 0.0, 1.0), limit * clipped(1 - part, 0.0, 1.0)
+def _dc_motor_bounds(limit: Any, rate: Any) -> Bounds:
+    """Torques [N m] between which a motor can act; `rate` is its own by the no-load rate."""
+    return -limit * clipped(1 + rate, 0.0, 1.0), limit * clipped(1 - rate, 0.0, 1.0)

@@ -1,6 +1,6 @@
-"""All that is between a climber and its wall: its hold, the seal's friction, and what it runs on.
+"""The contact of climber and wall: adhesion and grip, friction of the seal, wheels or tracks.
 
-A new kind of locomotion is one class and one entry. Everything broadcasts.
+A new locomotion is one class and one entry in `LOCOMOTION`. Everything broadcasts.
 """
 
 from dataclasses import dataclass, field
@@ -15,12 +15,12 @@ class Locomotion(Protocol):
     """What the climber runs on."""
 
     def turning_resistance(self, load: Any) -> Any:
-        """Moment (...) [N m] against turning under `load` (...) [N]; at rest, up to that."""
+        """Moment (...) [N m] against yawing under `load` (...) [N]; at rest, at most that."""
 
 
 @dataclass(frozen=True)
 class Wheeled:
-    """Wheels on one axle: they turn about the vertical without resistance."""
+    """Wheels on one axle: yawing meets no resistance."""
 
     def turning_resistance(self, load: Any) -> Any:
         """See `Locomotion`."""
@@ -29,10 +29,12 @@ class Wheeled:
 
 @dataclass(frozen=True)
 class Tracked:
-    """Tracks that scrub sideways when they turn: μ_t N L / 4, the load spread evenly over L."""
+    """Tracks, which scrub sideways as the climber yaws: μ_t N L / 4, the load spread evenly."""
 
-    scrub_friction_coefficient: float = parameter(0.5, "", "μ_t, sideways", at_least=0)
-    length: float = parameter(0.3, "m", "L of the tracks on the wall", above=0)
+    scrub_friction_coefficient: float = parameter(
+        0.5, "", "friction coefficient μ_t of the tracks, sideways", at_least=0
+    )
+    length: float = parameter(0.3, "m", "length L of the tracks that is on the wall", above=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -47,7 +49,7 @@ LOCOMOTION: dict[str, type[Locomotion]] = {"wheeled": Wheeled, "tracked": Tracke
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Attachment):
-    """How a climber is held, and what resists its motion."""
+    """Adhesion and grip, and with them what resists the motion: seal friction, scrubbing tracks."""
 
     friction: Friction = field(default_factory=Coulomb)
     locomotion: Locomotion = field(default_factory=Wheeled)

@@ -19,23 +19,23 @@ from climber_uk.parameters.declaration import check, parameter
 
 
 class Friction(Protocol):
-    """A law; f (...) is Coulomb's friction [N], `speed` (...) that of sliding, >= 0 [m/s]."""
+    """A friction law; f (...) is Coulomb's [N], `speed` (...) that of sliding, >= 0 [m/s]."""
 
     bristles: ClassVar[bool]  # whether it has a state: the bristles' deflection
 
     def stiction(self, f: Any) -> Any:
-        """What it holds at rest, at most (...) [N]; 0 if it holds nothing."""
+        """Most that friction holds at rest (...) [N]; 0 if it holds nothing."""
 
     def level(self, f: Any, speed: Any) -> Any:
         """Force (...) against steady sliding [N]."""
 
     def steepness(self, f: Any) -> Any:
-        """Most by which the force of sliding changes with its speed (...) [N s/m]."""
+        """Steepest slope of the force over the sliding speed (...) [N s/m]."""
 
 
 @dataclass(frozen=True)
 class Coulomb:
-    """The same force at every speed."""
+    """Coulomb friction: the same force at every speed."""
 
     bristles: ClassVar[bool] = False
 
@@ -54,9 +54,11 @@ class Coulomb:
 
 @dataclass(frozen=True)
 class Viscous:
-    """In proportion to the speed, as of a lubricated seal: it holds nothing."""
+    """Viscous friction, in proportion to the speed, as of a lubricated seal: no stiction."""
 
-    speed: float = parameter(0.1, "m/s", "at which it rubs as much as Coulomb's law", above=0)
+    speed: float = parameter(
+        0.1, "m/s", "sliding speed at which it equals Coulomb's friction", above=0
+    )
 
     bristles: ClassVar[bool] = False
 
@@ -78,11 +80,15 @@ class Viscous:
 
 @dataclass(frozen=True)
 class Stribeck:
-    """More at rest than in motion, and more again the faster it goes."""
+    """Stribeck friction: highest at rest, lower in motion, and growing again with speed."""
 
-    ratio: float = parameter(1.5, "", "of the hold at rest to Coulomb's friction", at_least=1)
-    speed: float = parameter(0.02, "m/s", "v_s at which most of the surplus is gone", above=0)
-    viscous: float = parameter(0.0, "s/m", "κ: f more per speed", at_least=0)
+    ratio: float = parameter(1.5, "", "of stiction to Coulomb's friction", at_least=1)
+    speed: float = parameter(
+        0.02, "m/s", "Stribeck speed v_s, at which most of the surplus at rest is gone", above=0
+    )
+    viscous: float = parameter(
+        0.0, "s/m", "κ, viscous friction per speed, as a share of f", at_least=0
+    )
 
     bristles: ClassVar[bool] = False
 
@@ -98,7 +104,7 @@ class Stribeck:
         return f * (self.gamma(speed) + self.viscous * speed)
 
     def gamma(self, speed: Any) -> Any:
-        """γ(v) (...)."""
+        """γ(v) (...), the level without its viscous part, by f."""
         part = speed / self.speed
         return 1 + (self.ratio - 1) * exp(-part * part)
 
@@ -109,29 +115,29 @@ class Stribeck:
 
 @dataclass(frozen=True)
 class LuGre(Stribeck):
-    """Bristles that bend before they slide: hysteresis, pre-sliding, and no edge at rest."""
+    """LuGre friction: bristles bend before they slide, so it is smooth at rest, with hysteresis."""
 
     deflection: float = parameter(
-        1e-3, "m", "of the bristles under Coulomb's friction: f / σ₀", above=0
+        1e-3, "m", "of the bristles under Coulomb's friction, f / σ₀; smaller is stiffer", above=0
     )
-    damping_time: float = parameter(5e-3, "s", "of the bristles: σ₁ / σ₀", at_least=0)
+    damping_time: float = parameter(5e-3, "s", "of the bristles, σ₁ / σ₀", at_least=0)
 
     bristles: ClassVar[bool] = True
 
     def stiction(self, f: Any) -> Any:
-        """It gives way to any force: see `Friction`."""
+        """0: bristles give way to any force, if slowly. See `Friction`."""
         return 0.0 * f
 
     def relaxation(self, speed: Any) -> Any:
-        """Rate σ₀ |v| / g(v) (...) [1/s] at which the bristles tend to where they end up."""
+        """Rate σ₀ |v| / g(v) (...) [1/s] at which the deflection approaches its steady state."""
         return speed / (self.deflection * self.gamma(speed))
 
     def stiffness(self, f: Any) -> Any:
-        """σ₀ (...) [N/m]."""
+        """Bristle stiffness σ₀ (...) [N/m]."""
         return f / self.deflection
 
     def force(self, f: Any, velocity: Any, deflection: Any, bending: Any) -> Any:
-        """F (...) [N] against `velocity`, of the deflection z [m] and its rate ż [m/s]."""
+        """F (...) [N] against `velocity` [m/s], from the deflection z [m] and its rate ż [m/s]."""
         return (
             self.stiffness(f) * (deflection + self.damping_time * bending)
             + f * self.viscous * velocity

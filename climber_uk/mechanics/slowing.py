@@ -1,4 +1,4 @@
-"""Slowing down in the bends of a path: its parameter s by one, u, that goes on at a steady rate.
+"""Slowing down in bends: the path parameter s as a function of u, which grows at a steady rate.
 
 du/ds = ρ(s) >= 1 is a spline, so s(u) has four derivatives. A spline's values lie between its
 coefficients nearby, and each of these is at least as high as the path needs it wherever its basis
@@ -13,25 +13,25 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives
 
-DEGREE = 4
-# cells of s are halved until none turns by more, and ρ is not much higher than in the next
-TURN, CONTRAST, HALVINGS = 0.15, 1.25, 24  # [rad], ratio
-WITHIN = np.linspace(1e-6, 1 - 1e-6, 9)  # where a cell is looked at: beside ends that turn back
-MARGIN = 1.01  # for what peaks in between
+QUARTIC = 4
+# cells of s are halved until none bends by more, and ρ is not much higher than in the next
+MAX_BEND, CONTRAST, HALVINGS = 0.15, 1.25, 24  # [rad], ratio
+WITHIN = np.linspace(1e-6, 1 - 1e-6, 9)  # shares of a cell at which it is sampled, not at its ends
+MARGIN = 1.01  # for peaks between the samples
 
 
 @dataclass(frozen=True)
 class SpeedLimits:
-    """What a climber must not exceed on its path."""
+    """Limits of a climber on its path: of speed on straights, yaw rate and acceleration."""
 
-    rate: float  # [m/s] of u
+    rate: float  # of u [m/s]
     yaw_rate: float  # [rad/s]
     acceleration: float  # [m/s²]
 
 
 @dataclass(frozen=True)
 class Slowed:
-    """s(u), both from 0."""
+    """The path parameter s(u), both from 0, with du/ds = ρ."""
 
     slowness: Any  # scipy's BSpline: s (...) to ρ (...)
     parameter: Any  # its integral: s (...) to u (...)
@@ -40,7 +40,7 @@ class Slowed:
 
     @property
     def length(self) -> float:
-        """Extent of u."""
+        """Extent of u [m]."""
         return float(self.parameters[-1])
 
     def progress(self, u: Array) -> Derivatives:
@@ -62,9 +62,10 @@ class Slowed:
 
 
 def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: SpeedLimits) -> Slowed:
-    """s(u) along `curve`, a BSpline of s from 0 to `length`, so slow that the limits hold.
+    """s(u) along `curve`, a BSpline of s from 0 to `length` [m], so slow that the limits hold.
 
-    At no rate it would have to be slower than that within less than `spacing` [m].
+    σ² = 1/ρ² changes by no more than 4 within `spacing` [m], whatever the limits. Raises
+    `ValueError` where the path turns on the spot.
     """
     from scipy.interpolate import BSpline  # slow to import: for waypoints only
 
@@ -72,63 +73,63 @@ def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: Spee
     most = min(2**0.5 * limits.acceleration / max(limits.rate, 1e-9) ** 2, 4.0 / spacing)
     size, needed = _cells(curve, length if closed else None, length, most, limits, spacing / 64)
     mode: Any = "wrap" if closed else "edge"
-    steps = np.pad(size, DEGREE, mode)
-    knots = np.concatenate([[0.0], np.cumsum(steps)]) - steps[:DEGREE].sum()
-    knots[DEGREE], knots[-DEGREE - 1] = 0.0, length
-    reach = np.lib.stride_tricks.sliding_window_view(np.pad(needed, DEGREE, mode), DEGREE + 1)
-    slowness = BSpline(knots, reach.max(axis=1), DEGREE)
+    steps = np.pad(size, QUARTIC, mode)
+    knots = np.concatenate([[0.0], np.cumsum(steps)]) - steps[:QUARTIC].sum()
+    knots[QUARTIC], knots[-QUARTIC - 1] = 0.0, length
+    reach = np.lib.stride_tricks.sliding_window_view(np.pad(needed, QUARTIC, mode), QUARTIC + 1)
+    slowness = BSpline(knots, reach.max(axis=1), QUARTIC)
     parameter = slowness.antiderivative()
     parameter.c = parameter.c - parameter(0.0)
-    cells = knots[DEGREE:-DEGREE]
+    cells = knots[QUARTIC:-QUARTIC]
     return Slowed(slowness, parameter, cells, parameter(cells))
 
 
 def _cells(
     curve: Any, period: float | None, length: float, most: float, limits: SpeedLimits, least: float
 ) -> tuple[Array, Array]:
-    """Sizes (n,) of cells small enough to tell where it is how slow, and the ρ (n,) in each."""
+    """Sizes (n,) [m] of cells, fine enough for the bends, and the least ρ (n,) of each."""
     edges = np.unique(np.clip(curve.t, 0.0, length))
     start, size = edges[:-1], np.diff(edges)
-    turning, needed = _look(curve, start, size, limits)
+    curvature, needed = _sample(curve, start, size, limits)
     mode: Any = "edge" if period is None else "wrap"
     for _ in range(HALVINGS):
-        foreseen = _foreseen(start + size / 2, needed, period, most)
+        foreseen = _slowness_ahead(start + size / 2, needed, period, most)
         beside = np.pad(foreseen, 1, mode)
         contrast = np.maximum(beside[:-2], beside[2:]) / foreseen
-        turns = turning * size > TURN
+        bends = curvature * size > MAX_BEND
         next_to = np.pad(size, 1, mode)
-        wide = turns | ((contrast > CONTRAST) & (size > least))
+        wide = bends | ((contrast > CONTRAST) & (size > least))
         wide |= size > 2.1 * np.minimum(next_to[:-2], next_to[2:])
         if not wide.any():
             return size, foreseen
         parts = 1 + wide
-        start, size, turns = (np.repeat(x, parts) for x in (start, size / parts, turns))
-        turning, needed = np.repeat(turning, parts), np.repeat(needed, parts)
+        start, size, bends = (np.repeat(x, parts) for x in (start, size / parts, bends))
+        curvature, needed = np.repeat(curvature, parts), np.repeat(needed, parts)
         second = np.flatnonzero(np.repeat(wide, parts))[1::2]
         start[second] += size[second]
-        turning[turns], needed[turns] = _look(curve, start[turns], size[turns], limits)
-    x, y = curve(start[np.argmax(turning)])
+        curvature[bends], needed[bends] = _sample(curve, start[bends], size[bends], limits)
+    x, y = curve(start[np.argmax(curvature)])
     raise ValueError(f"the path turns on the spot at ({x:.4g}, {y:.4g}) m: leave points out there")
 
 
-def _look(curve: Any, start: Array, size: Array, limits: SpeedLimits) -> tuple[Array, Array]:
-    """Most |dθ/ds| [rad/m], and the ρ needed, of cells (n,)."""
+def _sample(curve: Any, start: Array, size: Array, limits: SpeedLimits) -> tuple[Array, Array]:
+    """Largest curvature |dθ/ds| (n,) [rad/m], and least ρ (n,), of cells, by samples."""
     s = start[:, None] + size[:, None] * WITHIN
     p_1, p_2 = np.moveaxis(curve(s, 1), -1, 0), np.moveaxis(curve(s, 2), -1, 0)
     square = p_1[0] ** 2 + p_1[1] ** 2
-    turning = (np.abs(p_1[0] * p_2[1] - p_1[1] * p_2[0]) / square).max(axis=1)
+    curvature = (np.abs(p_1[0] * p_2[1] - p_1[1] * p_2[0]) / square).max(axis=1)
     bend = np.hypot(*p_2).max(axis=1)
     needed = np.maximum(
-        turning * (MARGIN * limits.rate / limits.yaw_rate),
+        curvature * (MARGIN * limits.rate / limits.yaw_rate),
         np.sqrt(bend * (2**0.5 * limits.rate**2 / limits.acceleration)),
     )
     # beside a reversal |p'| is a little above 1, and more so between the places looked at
     excess = np.maximum(np.sqrt(square.max(axis=1)) - 1.0, 0.0)
-    return turning, np.maximum(needed, 1.0 + 1.25 * excess)
+    return curvature, np.maximum(needed, 1.0 + 1.25 * excess)
 
 
-def _foreseen(middle: Array, needed: Array, period: float | None, most: float) -> Array:
-    """ρ (n,) at least as `needed`, with which 1/ρ² changes by no more than `most` a metre."""
+def _slowness_ahead(middle: Array, needed: Array, period: float | None, most: float) -> Array:
+    """Least ρ (n,) that is >= `needed` and whose 1/ρ² changes by at most `most` [1/m]."""
     number, square = len(middle), needed**-2.0
     if period is not None:
         middle = np.concatenate([middle - period, middle, middle + period])

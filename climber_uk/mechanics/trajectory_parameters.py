@@ -1,4 +1,4 @@
-"""The trajectory as parameters say, whoever reads them: a node, or a campaign."""
+"""The trajectory that parameters describe, for nodes and campaigns."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,27 +12,31 @@ from climber_uk.parameters.declaration import check, parameter
 
 @dataclass(frozen=True)
 class TrajectoryParameters:
-    """What to follow."""
+    """The trajectory: a shape, a time law, and where they begin."""
 
     shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
-    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=tuple(TIME_LAWS))
-    reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
-    origin_x: float = parameter(0.0, "m", "x of the shape's origin")
-    origin_y: float = parameter(0.0, "m", "y of the shape's origin")
+    time_law: str = parameter(
+        "rest_to_rest", "", "time law by which the shape is travelled", choices=tuple(TIME_LAWS)
+    )
+    reverse_gear: bool = parameter(
+        False, "", "whether the climber drives the path backwards, tail first"
+    )
+    origin_x: float = parameter(0.0, "m", "x of the shape's origin in the wall's frame")
+    origin_y: float = parameter(0.0, "m", "y of the shape's origin in the wall's frame")
 
     def __post_init__(self) -> None:
         check(self)
 
 
-KINDS: list[tuple[type, str]] = [
+GROUPS: list[tuple[type, str]] = [
     (TrajectoryParameters, ""),
     *((kind, f"{name}.") for name, kind in {**SHAPES, **TIME_LAWS}.items()),
 ]
-"""All that is read, with the prefix of its parameters."""
+"""Classes of parameters that `build_trajectory` reads, each with the prefix of its names."""
 
 
 def build_trajectory(read: Callable[..., Any]) -> Trajectory:
-    """Trajectory of what `read` gives for a class and a prefix; `ValueError` if there is none."""
+    """Trajectory whose parameters `read(class, prefix)` gives; `ValueError` if they make none."""
     plan = read(TrajectoryParameters)
     return Trajectory(
         shape=read(SHAPES[plan.shape], f"{plan.shape}."),

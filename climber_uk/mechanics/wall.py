@@ -4,7 +4,7 @@
     cylinder   the same with inclination(y) = inclination + y/R, and ẏ²/R more into the wall
 
 x and y are lengths on the wall: a cylinder unrolls without stretching, so that nothing else in the
-equations of motion changes. A new wall is one class and one entry.
+equations of motion changes. A new wall is one class and one entry in `WALLS`.
 """
 
 import math
@@ -17,15 +17,15 @@ from climber_uk.parameters.declaration import check, parameter
 
 
 class Wall(Protocol):
-    """A wall; `inclination` [deg] is that at the origin: 0 floor, 90 vertical, 180 ceiling."""
+    """A wall's shape; `inclination` [deg] at the origin: 0 floor, 90 vertical, 180 ceiling."""
 
     flat: ClassVar[bool]
 
     def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
-        """Parts (s_x, s_y) of gravity along the wall at height `y` (...) [m], each (...)."""
+        """Components (s_x, s_y) of gravity along the wall, by g, at y (...) [m]; each (...)."""
 
     def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
-        """g_n (...) [m/s²] into the wall, with what the way's curvature adds at ẏ = `y_speed`."""
+        """g_n (...) [m/s²] into the wall, with the centripetal part at ẏ = `y_speed` [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Plane:
     """A flat wall; y points uphill unless it is tilted."""
 
     tilt: float = parameter(
-        0.0, "deg", "by which downhill is turned from -y, anticlockwise", at_least=-180, at_most=180
+        0.0, "deg", "angle from -y to downhill, anticlockwise", at_least=-180, at_most=180
     )
 
     flat: ClassVar[bool] = True
@@ -55,7 +55,9 @@ class Plane:
 class Cylinder:
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
-    radius: float = parameter(2.0, "m", "of the cylinder R: > 0 inside it, < 0 outside")
+    radius: float = parameter(
+        2.0, "m", "radius R of the cylinder: > 0 inside it, < 0 on its outside"
+    )
 
     flat: ClassVar[bool] = False
 

@@ -173,7 +173,7 @@ class Plant:
 
     def _check_hold_at(self, y: Array) -> None:
         """Raise `FellOff` where the climber is pulled off its wall, or tipped off it."""
-        hold = float(self.contact.hold(self.climber, self._body.into_wall(y)))
+        hold = float(self.contact.normal_force(self.climber, self._body.into_wall(y)))
         if hold < 1e-9 * self.climber.mass * GRAVITY:  # cos(90°) is 6e-17
             raise FellOff("force onto the wall", hold, 0.0, "N")
         _, tip = self.margins(State(y[:3], y[3:6]), np.zeros(2))
