@@ -1,7 +1,7 @@
-"""Controller and plant in one process, with what lies between them: lock-step without messages.
+"""One closed loop in one process: controller, plant, and the link between them, in lock-step.
 
 The same `Controller` and `SimulatedRobot` that the nodes run, on a grid of the plant's step. All
-that is random comes from one seed.
+noise comes from one seed.
 """
 
 from collections import deque
@@ -26,7 +26,7 @@ from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 @dataclass(frozen=True)
 class Link:
-    """What lies between a climber and its controller; times are multiples of `step`."""
+    """Delays, losses and noise between climber and controller; times are multiples of `step`."""
 
     step: float = 0.0025  # [s] of the plant
 
@@ -36,13 +36,13 @@ class Link:
     loss: float = 0.0  # share of odometry messages that never arrive
     position_noise: float = 0.0  # [m], standard deviation
     heading_noise: float = 0.0  # [rad]
-    speed_noise: float = 0.0  # [m/s] forward, and of each wheel in turning
+    speed_noise: float = 0.0  # [m/s], and [rad/s] of the yaw rate
     with_twist: bool = True
     torque_lag: float = 0.0  # [s] of the motors, of first order
     encoder_counts: int = 0  # a turn, of the wheels that odometry is counted from; 0: it is exact
 
     def parts(self, plant: Plant) -> Parts:
-        """The plant with such motors and sensors."""
+        """`plant` with the motors and sensors of this link."""
         sensors = Sensors()
         if self.encoder_counts > 0:
             resolution = 2 * np.pi / self.encoder_counts
@@ -51,27 +51,27 @@ class Link:
 
 
 class Controlling(Protocol):
-    """Whatever answers odometry with torques: a `Controller`, or a rival."""
+    """What answers odometry with torques: a `Controller`, or another one to compare with."""
 
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
-        """Keep a reference."""
+        """Take a reference, at `now` [ns]."""
 
     def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
-        """Answer an odometry."""
+        """Answer an odometry, at `now` [ns]; `stamp` [ns] is when `state` was measured."""
 
 
 def as_commanded(state: State, command: Array) -> Array:
-    """Torques of motors that do as they are told."""
+    """Torques of ideal motors: those commanded."""
     return command
 
 
 @dataclass(frozen=True)
 class Run:
-    """What happened at n times at which odometry was due."""
+    """History of a closed loop, at the n times at which odometry was due."""
 
     time: Array  # (n,) [s]
-    pose: Array  # (n, 3) the true one
-    velocity: Array  # (n, 3)
+    pose: Array  # (n, 3) true, [m], [rad]
+    velocity: Array  # (n, 3) true, in the wall's frame
     error: Array  # (n, 3) along-track [m], cross-track [m], heading [rad]
     torques: Array  # (n, 2) that acted, right, left [N m]
 
@@ -81,11 +81,11 @@ class Run:
         return np.hypot(self.error[:, 0], self.error[:, 1])
 
     def rms(self, after: float = 0.0) -> float:
-        """Root mean square of the distance from the reference, `after` [s] [m]."""
+        """Root mean square [m] of the distance from the reference, from `after` [s] on."""
         return float(np.sqrt(np.mean(self.distance[self.time >= after] ** 2)))
 
     def chatter(self, after: float = 0.0) -> float:
-        """Root mean square of the torques' changes from one odometry to the next [N m]."""
+        """Root mean square [N m] of the torques' change in a period, from `after` [s] on."""
         return float(np.sqrt(np.mean(np.diff(self.torques[self.time >= after], axis=0) ** 2)))
 
 
@@ -102,9 +102,9 @@ def simulate(
 ) -> Run:
     """Run of `duration` [s] from `start`; `climber` may change with time.
 
-    `plant_of` makes the plant of a climber and a step. `motors` turn the state and what was
-    answered last into torques, at every step. A climber that starts in motion starts with the first
-    answer.
+    `plant_of` makes a plant from a climber and a step [s]. `motors` makes torques (2,) [N m] from
+    the state and the command in force, at every step. No torque acts before the first command,
+    unless the climber starts in motion: then that one does.
     """
     random = np.random.default_rng(seed)
     climber_at = climber if callable(climber) else lambda _: climber
@@ -112,8 +112,8 @@ def simulate(
     arriving: deque[tuple[int, int, State]] = deque()  # step of arrival, stamp, odometry
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
-    rows, now_it_is = [], climber_at(0.0)
-    robot = SimulatedRobot(link.parts(plant_of(now_it_is, link.step)), start, link.period)
+    rows, current = [], climber_at(0.0)
+    robot = SimulatedRobot(link.parts(plant_of(current, link.step)), start, link.period)
     every, late = round(link.period / link.step), round(link.delay / link.step)
     for step in range(round(duration / link.step) + 1):
         now = SECOND + round(step * link.step * SECOND)
@@ -136,9 +136,9 @@ def simulate(
                 commanded.append((step + late, answer.torques))
         while commanded and commanded[0][0] <= step:
             _, acting = commanded.popleft()
-        before, now_it_is = now_it_is, climber_at(step * link.step)
-        if now_it_is is not before:
-            robot.take(link.parts(plant_of(now_it_is, link.step)))
+        before, current = current, climber_at(step * link.step)
+        if current is not before:
+            robot.take(link.parts(plant_of(current, link.step)))
         robot.advance(np.zeros(2) if acting is None else motors(robot.state, acting))
     table = np.array(rows)
     return Run(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10:12])
@@ -153,12 +153,12 @@ def sampled(trajectory: Trajectory, duration: float) -> Preview:
 
 
 def measured(state: State, link: Link, random: np.random.Generator) -> State:
-    """State as odometry tells it, with its noise."""
-    x, y, heading, faster, turning = random.normal(size=5)
-    offset = np.array([x, y, 0.0]) * link.position_noise
-    offset[2] = heading * link.heading_noise
+    """`state` with the link's noise; without its velocity unless `with_twist`."""
+    n_x, n_y, n_heading, n_speed, n_yaw_rate = random.normal(size=5)
+    offset = np.array([n_x, n_y, 0.0]) * link.position_noise
+    offset[2] = n_heading * link.heading_noise
     pose = state.pose + offset
     if not link.with_twist:
         return State(pose, np.zeros(3))
-    speed = state.forward_speed + faster * link.speed_noise
-    return State.rolling(pose, speed, state.yaw_rate + turning * link.speed_noise)
+    speed = state.forward_speed + n_speed * link.speed_noise
+    return State.rolling(pose, speed, state.yaw_rate + n_yaw_rate * link.speed_noise)

@@ -1,1 +1,1 @@
-"""Between the topics of the contract and the data of the mathematics."""
+"""ROS messages to data and back: names, reading, writing, drawing, the layout of CDR."""

@@ -1,1 +1,1 @@
-"""What the nodes share: how they start, talk, take parameters and end."""
+"""The ROS side that nodes share: start and end, topics, parameters, diagnostics, managed life."""

@@ -1,4 +1,4 @@
-"""Odometry as a robot's sensors tell it: late, noisy, biased, or counted by its wheels."""
+"""Simulated odometry: delayed, noisy, biased, or counted from the wheels' rotation."""
 
 import math
 from collections import deque
@@ -18,15 +18,15 @@ from climber_uk.parameters.declaration import check, parameter
 
 @dataclass(frozen=True)
 class Sensors:
-    """What is between the truth and the odometry; all of it off."""
+    """Errors of the odometry; without any it is the true state."""
 
     odometry_source: str = parameter(
-        "truth", "", "what odometry measures", choices=("truth", "wheels")
+        "truth", "", "measured: the true pose, or the wheels", choices=("truth", "wheels")
     )
     odometry_delay: float = parameter(
         0.0,
         "s",
-        "from measuring, which is the stamp, to publishing",
+        "from measuring, which its stamp tells, to publishing",
         at_least=0,
         plausible=(0.0, 1),
     )
@@ -34,9 +34,9 @@ class Sensors:
         0.0, "m", "standard deviation of x and y", at_least=0, plausible=(0.0, 1)
     )
     heading_noise: float = parameter(
-        0.0, "rad", "standard deviation", at_least=0, plausible=(0.0, 1)
+        0.0, "rad", "standard deviation of the heading", at_least=0, plausible=(0.0, 1)
     )
-    speed_noise: float = parameter(0.0, "m/s", "standard deviation", at_least=0)
+    speed_noise: float = parameter(0.0, "m/s", "standard deviation of the speed", at_least=0)
     yaw_rate_noise: float = parameter(0.0, "rad/s", "standard deviation", at_least=0)
     x_bias: float = parameter(0.0, "m", "added to x")
     y_bias: float = parameter(0.0, "m", "added to y")
@@ -46,11 +46,11 @@ class Sensors:
     encoder_resolution: float = parameter(
         0.0,
         "rad",
-        "of the wheels' encoders, for odometry from wheels; 0: exact",
+        "of the wheels' encoders, for odometry_source wheels; 0: exact",
         at_least=0,
         plausible=(0.0, 1),
     )
-    seed: int = parameter(0, "", "of all noise", at_least=0)
+    seed: int = parameter(0, "", "of the noise: the same seed gives the same noise", at_least=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -67,27 +67,30 @@ class Sensors:
 
     @cached_property
     def is_ideal(self) -> bool:
-        """Whether they tell the truth."""
+        """Whether noise and bias are all 0."""
         noise = self.position_noise, self.heading_noise, self.speed_noise, self.yaw_rate_noise
         place_bias = self.x_bias, self.y_bias, self.heading_bias
         errors = (*noise, *place_bias, self.speed_bias, self.yaw_rate_bias)
         return not any(np.any(error) for error in errors)
 
-    def told(self, motion: Motion, noise: Iterable[Any]) -> Motion:
-        """Motion with bias and noise, of five numbers of unit variance: x, y, θ, v, ω."""
-        x, y, heading, cosine, sine, speed, yaw_rate = motion
-        right, up, turned, faster, turning = noise
+    def corrupted(self, motion: Motion, noise: Iterable[Any]) -> Motion:
+        """`motion` with bias and noise; `noise` has unit variance, in the order x, y, θ, v, ω."""
+        n_x, n_y, n_heading, n_speed, n_yaw_rate = noise
+        angle = self.heading_bias + self.heading_noise * n_heading
         return Motion(
-            x + self.x_bias + self.position_noise * right,
-            y + self.y_bias + self.position_noise * up,
-            *rotated(heading, cosine, sine, self.heading_bias + self.heading_noise * turned),
-            speed + self.speed_bias + self.speed_noise * faster,
-            yaw_rate + self.yaw_rate_bias + self.yaw_rate_noise * turning,
+            motion.x + self.x_bias + self.position_noise * n_x,
+            motion.y + self.y_bias + self.position_noise * n_y,
+            *rotated(motion.heading, motion.cosine, motion.sine, angle),
+            motion.speed + self.speed_bias + self.speed_noise * n_speed,
+            motion.yaw_rate + self.yaw_rate_bias + self.yaw_rate_noise * n_yaw_rate,
         )
 
 
 class Odometer:
-    """The sensors at work, from a start at `state`; the same seed, the same noise."""
+    """Odometry of one climber: keeps what was measured until its delay is over.
+
+    Raises `ValueError` unless the delay is a multiple of `period` [s].
+    """
 
     def __init__(self, sensors: Sensors, climber: Climber, period: float, state: State) -> None:
         self.sensors, self.climber, self.period = sensors, climber, period
@@ -96,15 +99,15 @@ class Odometer:
         self._pose: Array = state.pose
         late = sensors.delay_in(period)
         first = self._measured(state)
-        # before the start the climber was where it is
+        # before the start the climber was where it starts
         self._on_its_way = deque([(-number, first) for number in range(late, -1, -1)])
 
     def latest(self) -> tuple[int, State]:
-        """Period, counted from the start, in which the odometry due now was measured, and it."""
+        """The odometry that is due now: the period in which it was measured, and the state."""
         return self._on_its_way[0]
 
     def measure(self, state: State, wheels: State, angles: Array) -> None:
-        """Take a new measurement; `wheels` is the state as they tell it, and their `angles`."""
+        """Measure the true `state` or, by `odometry_source`, `wheels` and their `angles` (2,)."""
         if self.sensors.odometry_source == "wheels":
             state = self._reckoned(wheels, angles)
         number, _ = self._on_its_way[-1]
@@ -112,30 +115,30 @@ class Odometer:
         self._on_its_way.popleft()
 
     def _reckoned(self, wheels: State, angles: Array) -> State:
-        """State that wheels at `angles` (2,) have rolled to since the last measurement."""
+        """State by dead reckoning to the wheel `angles` (2,) (right, left) [rad]."""
         resolution, climber = self.sensors.encoder_resolution, self.climber
         if resolution > 0:
             angles = resolution * np.floor(angles / resolution)
         right, left = (climber.wheel_radius * (angles - self._counted)).tolist()
         self._counted = angles
-        way, turn = (right + left) / 2, (right - left) / (2 * climber.half_track)
+        way, angle = (right + left) / 2, (right - left) / (2 * climber.half_track)
         x, y, heading = self._pose.tolist()
-        middle = heading + turn / 2
+        middle = heading + angle / 2
         self._pose = np.array(
-            [x + way * math.cos(middle), y + way * math.sin(middle), heading + turn]
+            [x + way * math.cos(middle), y + way * math.sin(middle), heading + angle]
         )
         if resolution > 0:
-            return State.rolling(self._pose, way / self.period, turn / self.period)
+            return State.rolling(self._pose, way / self.period, angle / self.period)
         return State.rolling(self._pose, float(wheels.forward_speed), float(wheels.yaw_rate))
 
     def _measured(self, state: State) -> State:
         if self.sensors.is_ideal:
             return state
         noise = self._random.normal(size=5).tolist()
-        told, aside = self.sensors.told(state.motion, noise), float(state.side_slip)
+        noisy, aside = self.sensors.corrupted(state.motion, noise), float(state.side_slip)
         velocity = [
-            told.speed * told.cosine - aside * told.sine,
-            told.speed * told.sine + aside * told.cosine,
-            told.yaw_rate,
+            noisy.speed * noisy.cosine - aside * noisy.sine,
+            noisy.speed * noisy.sine + aside * noisy.cosine,
+            noisy.yaw_rate,
         ]
-        return State(np.array([told.x, told.y, told.heading]), np.array(velocity))
+        return State(np.array([noisy.x, noisy.y, noisy.heading]), np.array(velocity))
