@@ -1,4 +1,4 @@
-"""Parameters of the nodes as closed loops by the thousand have them, or do not.
+"""Parameters of the nodes in a campaign: which can be drawn, which are fixed, which do not matter.
 
 A name is that of a node and of its parameter, as in `plant_simulator.mass`.
 """
@@ -45,13 +45,13 @@ PARAMETERS = {
     **_names(PLANT, *((k, f"{name}.") for group in VARIANTS.values() for name, k in group.items())),
     **_names(PLANT, *ON_WALL),
 }
-# Parameters of the nodes that nothing in lock-step depends on: who is told what, and how often
+# Parameters of the nodes that have no effect in lock-step: names, topics, rates of publishing
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
     *("stop_time", "effort_commands", "effort_order", "odom_frame", "base_frame"),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames", "qos_overrides"),
 }
-# What each run may have its own of
+# Parameters that may differ from run to run
 VARIED = {
     *_names(PLANT, (Climber, ""), (Sensors, "")),
     *(f"{PLANT}.{n}" for n in ("wheel_friction_coefficient", "centre_height", "wheelbase")),
@@ -62,7 +62,7 @@ VARIED = {
 }
 VARIED -= {SEED, MEASURED}
 VARIED -= {f"{PLANT}.{n}" for n in ("odometry_source", "odometry_delay", "encoder_resolution")}
-# What closed loops by the thousand have one kind of only
+# Values that the closed loops of a campaign must have
 REQUIRED = {
     f"{CONTROLLER}.pacing.catch_up": 0.0,
     f"{CONTROLLER}.least_pressure": 0.0,
@@ -81,7 +81,7 @@ REQUIRED = {
     f"{PLANT}.odometry_source": "truth",
     f"{PLANT}.odometry_delay": 0.0,
 }
-# What they do without: each controller would have a timing of its own
+# Values that they have instead of the defaults: each controller would have a timing of its own
 WITHOUT = {
     f"{CONTROLLER}.learn_delay": False,
     f"{CONTROLLER}.observer.twist": "instantaneous",
@@ -89,7 +89,7 @@ WITHOUT = {
 
 
 def check_drawn(name: str, constraints: str) -> None:
-    """Raise `ValueError` unless each run may have its own value of a parameter."""
+    """Raise `ValueError` unless a parameter may differ from run to run."""
     _check_known(name)
     if name not in VARIED:
         raise ValueError(f"{name} cannot be drawn: all runs share one value")
@@ -99,13 +99,13 @@ def check_drawn(name: str, constraints: str) -> None:
 
 
 def fixed(name: str, value: Any) -> Any:
-    """Value of a parameter that all runs share; `ValueError` if it cannot be that."""
+    """Value of a parameter that all runs share; `ValueError` if it is unknown or unfit."""
     _check_known(name)
     return typed(name, value, PARAMETERS[name].default)
 
 
 def typed(name: str, value: Any, default: Any) -> Any:
-    """Value of the type of `default`, integers for floats as well; `ValueError` if it is not."""
+    """`value` in the type of `default`, an integer as a float; `ValueError` if it is another."""
     if isinstance(default, float) and type(value) is int:
         return float(value)
     if type(value) is not type(default):

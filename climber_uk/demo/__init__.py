@@ -1,1 +1,1 @@
-"""`run_demo`: all nodes and a recorder, once."""
+"""`run_demo`: starts recorder and nodes, runs a trajectory for its duration, and ends them."""

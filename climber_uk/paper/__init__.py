@@ -1,1 +1,1 @@
-"""Xu & Liu (2017) recomputed: as printed, made consistent, and compared."""
+"""`reproduce_paper`: Xu & Liu (2017) as `printed`, made `consistent`, and compared (`study`)."""

@@ -1,1 +1,1 @@
-"""Parameters: declared where they are used, read from files and nodes; no ROS."""
+"""Parameters: their declaration, their files, and doubts about their values; no ROS."""

@@ -1,1 +1,1 @@
-"""`record_bag`: topics into a rosbag2 directory."""
+"""`record_bag`: subscribes topics and writes what arrives into a rosbag2 directory."""

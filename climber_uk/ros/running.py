@@ -138,7 +138,7 @@ class ClimberNode(Node):
         return self._overridden(create)
 
     def _overridden(self, create: partial[Any]) -> Any:
-        """Publisher or subscription from `create`; `ValueError` if a parameter has its QoS wrong."""
+        """What `create` makes; `ValueError` if parameters have its QoS wrong."""
         try:
             return create(qos_overriding_options=QoSOverridingOptions.with_default_policies())
         except (ParameterException, RuntimeError) as error:

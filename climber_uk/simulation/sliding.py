@@ -182,7 +182,7 @@ class ContactStepper:
         return np.zeros(3), lever**2 * share
 
     def _deflected(self, before: Array, after: Array, deflection: Array, h: float) -> Array:
-        """Deflection (3,) [m] after `h` [s], sliding at `before` (3,) first and `after` (3,) last."""
+        """Deflection (3,) [m] after `h` [s], from speeds `before` (3,) to `after` (3,)."""
         law = self.body.contact.friction
         if not isinstance(law, LuGre):
             return deflection

@@ -1,1 +1,1 @@
-"""What a program needs of its system: a command line, signals, and processes that end with it."""
+"""Command lines, signals, and child processes that end with their parent."""
