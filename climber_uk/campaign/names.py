@@ -6,11 +6,11 @@ A name is that of a node and of its parameter, as in `plant_simulator.mass`.
 import dataclasses
 from typing import Any
 
-from climber_uk.control.build import KINDS as CONTROLLER_KINDS
+from climber_uk.control.build import KINDS as CONTROLLER_TYPES
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.trajectory_parameters import GROUPS as TRAJECTORY_GROUPS
+from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
@@ -37,8 +37,8 @@ def _names(node: str, *kinds: tuple[type, str]) -> dict[str, "dataclasses.Field[
 
 ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHESION.items())]
 PARAMETERS = {
-    **_names(PLANNER, *TRAJECTORY_GROUPS),
-    **_names(CONTROLLER, *CONTROLLER_KINDS, *ON_WALL),
+    **_names(PLANNER, *TRAJECTORY_TYPES),
+    **_names(CONTROLLER, *CONTROLLER_TYPES, *ON_WALL),
     **_names(
         PLANT, *((kind, "") for kind in (SimulationOptions, Climber, Physics, Motors, Sensors))
     ),

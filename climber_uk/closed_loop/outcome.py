@@ -12,7 +12,7 @@ from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
 
-SETTLED_DISTANCE = 0.01  # [m] from the reference, within which a loop has settled
+SETTLED = 0.01  # [m] from the reference, within which a loop has settled
 
 
 class Outcome(NamedTuple):
@@ -21,7 +21,7 @@ class Outcome(NamedTuple):
     rms: Array  # of the distance from the reference [m]
     worst: Array  # highest distance [m]
     last: Array  # distance at the end [m]
-    settled: Array  # last time further away than `SETTLED_DISTANCE` [s]
+    settled: Array  # last time further away than `SETTLED` [s]
     peak_torque: Array  # of a wheel [N m]
     saturated: Array  # share of the commands that limits cut
     slip_margin: Array  # lowest
@@ -35,11 +35,7 @@ class Tally:
     def __init__(self, number: int, contact: Contact) -> None:
         self.contact, self.times = contact, np.zeros(number)
         self.squares, self.saturated = np.zeros(number), np.zeros(number)
-        self.worst, self.last, self.settled_at = (
-            np.zeros(number),
-            np.zeros(number),
-            np.zeros(number),
-        )
+        self.worst, self.last, self.settled_at = np.zeros((3, number))
         self.peak = np.zeros(number)
         self.slip, self.tip = np.full(number, MAX_MARGIN), np.full(number, MAX_MARGIN)
         self.fell = np.full(number, np.inf)
@@ -64,7 +60,7 @@ class Tally:
         np.add(self.squares, square, out=self.squares, where=on)
         np.maximum(self.worst, square, out=self.worst, where=on)
         np.copyto(self.last, square, where=on)
-        np.copyto(self.settled_at, time, where=(square > SETTLED_DISTANCE * SETTLED_DISTANCE) & on)
+        np.copyto(self.settled_at, time, where=(square > SETTLED * SETTLED) & on)
         is_saturated = (np.abs(command.lost.force) > CUT) | (np.abs(command.lost.moment) > CUT)
         np.add(self.saturated, is_saturated, out=self.saturated, where=on)
         for torque in wheels:

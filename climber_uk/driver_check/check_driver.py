@@ -127,12 +127,12 @@ def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None
     if not node.count_publishers("odom"):
         return
     spin.until(lambda: node.hears, DISCOVERY_TIMEOUT / 2)
-    node.arrivals.clear()  # their times of arrival tell nothing
+    node.arrivals.clear()  # their times of arrival are of no use
     if options.move and node.has_clock():
         spin.until(
             lambda: node.simulated_for > 0 or len(node.arrivals) > COPIES, DISCOVERY_TIMEOUT / 2
         )
-        if node.simulated_for == 0:  # in lock-step, and nobody answers
+        if node.simulated_for == 0:  # in lock-step, and no torque comes
             node.start_commanding()
     duration = options.duration
     longest = max(duration, DISCOVERY_TIMEOUT / 2) if node.has_clock() else duration

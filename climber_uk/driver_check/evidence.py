@@ -91,7 +91,7 @@ class MotionSeen:
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
     @cached_property
-    def tells_means(self) -> bool:
+    def has_mean_twist(self) -> bool:
         """Whether twists are means of the period before, as of encoders; see `TwistKind`."""
         kind, motions = TwistKind(), self._motions()
         for before, now, time in zip(motions, motions[1:], np.diff(self.time), strict=False):
@@ -130,14 +130,14 @@ class TrialRecord:
 
     pulses: Sequence[PulseTimes]
     commands: Sequence[Command]
-    highest: float  # [N m] torque a wheel may have been given
-    silence: tuple[int, int] | None = None  # in which it was told nothing
+    highest: float  # [N m] limit of a wheel's torque in the trial
+    silence: tuple[int, int] | None = None  # begin and end [ns] without commands
     trouble: str = ""  # why it was stopped before the end
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """All that was seen."""
+    """All that was seen of a driver, for the checks."""
 
     climber: Climber
     expected: ExpectedDriver
@@ -149,14 +149,14 @@ class Evidence:
 
     @cached_property
     def stamps(self) -> Times:
-        """Stamps of all that arrived."""
+        """Stamps (n,) [ns] of all odometry, as it arrived."""
         return np.array(
             [reading.nanoseconds(a.message.header.stamp) for a in self.arrivals], np.int64
         )
 
     @cached_property
     def errors(self) -> list[str]:
-        """What is wrong with the numbers of messages."""
+        """Messages of what is unfit in odometry, one for each that is."""
         errors = []
         for arrival in self.arrivals:
             try:
@@ -167,7 +167,7 @@ class Evidence:
 
     @cached_property
     def covariances(self) -> Array:
-        """Planar ones (n, 6): of x, y, θ, and of their rates."""
+        """Covariances (n, 6), on the diagonal: of x, y, θ, and of their rates."""
         return np.array(
             [
                 [
@@ -181,7 +181,7 @@ class Evidence:
 
     @cached_property
     def motion(self) -> MotionSeen:
-        """Poses and twists, of messages that are good."""
+        """Odometry as arrays; raises `ValueError` if one is unfit."""
         return motion_of(self.arrivals)
 
 

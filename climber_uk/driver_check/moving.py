@@ -73,11 +73,11 @@ def ratio(measured: Array, expected: Array) -> float:
     return float(np.sum(measured * expected) / np.sum(expected**2))
 
 
-def size(ways: Array, tells: Any) -> float:
-    """Norm of displacements over the blocks `tells`, less the noise that the others show."""
-    others = ways[~tells]
-    noise = np.mean(others**2) * ways[tells].size if len(others) >= thresholds.FEWEST else 0.0
-    return math.sqrt(max(0.0, float(np.sum(ways[tells] ** 2) - noise)))
+def size(ways: Array, clear: Any) -> float:
+    """Norm of displacements over the blocks `clear`, less the noise that the others show."""
+    others = ways[~clear]
+    noise = np.mean(others**2) * ways[clear].size if len(others) >= thresholds.FEWEST else 0.0
+    return math.sqrt(max(0.0, float(np.sum(ways[clear] ** 2) - noise)))
 
 
 def heading(seen: Evidence) -> Finding:
@@ -85,8 +85,8 @@ def heading(seen: Evidence) -> Finding:
     gone = displacements(seen.motion)
     if max(span(gone.yaw), span(gone.yaw_by_twist)) < thresholds.TURNED:
         return skipped("it did not turn: drive it, or use --move")
-    tells = above_noise(gone.yaw, gone.yaw_by_twist)
-    yaw, by_twist = gone.yaw[tells], gone.yaw_by_twist[tells]
+    clear = above_noise(gone.yaw, gone.yaw_by_twist)
+    yaw, by_twist = gone.yaw[clear], gone.yaw_by_twist[clear]
     if np.abs(by_twist).sum() < thresholds.NO_TWIST * np.abs(yaw).sum():
         return failed(
             "the heading turns while twist.angular.z is zero",
@@ -110,15 +110,15 @@ def twist(seen: Evidence) -> Finding:
     gone = displacements(seen.motion)
     if not gone.drives:
         return skipped("it did not drive: drive it, or use --move")
-    tells = above_noise(gone.on_wall, gone.by_twist)
-    if np.abs(gone.by_twist[tells]).sum() < thresholds.NO_TWIST * np.abs(gone.on_wall[tells]).sum():
+    clear = above_noise(gone.on_wall, gone.by_twist)
+    if np.abs(gone.by_twist[clear]).sum() < thresholds.NO_TWIST * np.abs(gone.on_wall[clear]).sum():
         return failed(
             "the pose moves while twist.linear is zero",
             "fill twist.linear.x, or set the controller's velocity_source to pose",
         )
-    way = float(np.linalg.norm(gone.by_twist[tells]))
-    in_body, on_wall = (size(w - gone.by_twist, tells) / way for w in (gone.in_body, gone.on_wall))
-    found = ratio(gone.in_body[tells], gone.by_twist[tells])
+    way = float(np.linalg.norm(gone.by_twist[clear]))
+    in_body, on_wall = (size(w - gone.by_twist, clear) / way for w in (gone.in_body, gone.on_wall))
+    found = ratio(gone.in_body[clear], gone.by_twist[clear])
     value = {"ratio": found, "off_in_body": in_body, "off_on_wall": on_wall}
     if on_wall < min(in_body / 2, thresholds.RATIO_WRONG) and in_body > thresholds.SAME_FRAME:
         return failed(
@@ -131,7 +131,7 @@ def twist(seen: Evidence) -> Finding:
         return failed(said, "both are in metres, x forward", **value)
     said = f"agrees with the pose, but for {in_body:.1%}"
     hint = "take pose and twist of one message from the same measurement"
-    if size(gone.in_body - gone.on_wall, tells) < thresholds.SAME_FRAME * way:
+    if size(gone.in_body - gone.on_wall, clear) < thresholds.SAME_FRAME * way:
         said += "; with a heading near 0 the frame cannot be told"
         return warned(said, "let it face another way", **value)
     return graded(in_body, (thresholds.RATIO_OFF, thresholds.RATIO_WRONG), said, hint, **value)
@@ -142,8 +142,8 @@ def slip(seen: Evidence) -> Finding:
     gone = displacements(seen.motion)
     if not gone.drives:
         return skipped("it did not drive: drive it, or use --move")
-    tells, (ahead, aside) = above_noise(gone.on_wall), gone.in_body.T
-    share = size(aside, tells) / max(float(np.linalg.norm(ahead[tells])), TINY)
+    clear, (ahead, aside) = above_noise(gone.on_wall), gone.in_body.T
+    share = size(aside, clear) / max(float(np.linalg.norm(ahead[clear])), TINY)
     said = f"sideways {share:.2%} of the way forward"
     hint = "pose must be that of the middle between the wheels, and they must not slide"
     return graded(share, (thresholds.SLIP, thresholds.MUCH_SLIP), said, hint, share=share)

@@ -17,7 +17,7 @@ from climber_uk.mechanics.elementary import clipped, wrapped
 from climber_uk.mechanics.quantities import State
 
 GOALS = np.array([0.05, 0.2])  # [m/s], [rad/s] at which torques fall again: some 1 cm, 0.1 rad
-PLACES = np.array([0.01, 0.05])  # [m], [rad] at which they do if no speed is told
+PLACES = np.array([0.01, 0.05])  # [m], [rad] at which they do if odometry has no speed
 # [s] from the first motion to those goals, by the model: friction helps to stop a drive
 RISE_TIMES = 0.06, 0.1
 RISE_PERIODS = 4.0  # and at least so many odometry messages

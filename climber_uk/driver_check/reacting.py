@@ -20,9 +20,7 @@ def trial(seen: Evidence) -> Finding:
     if seen.trial.trouble:
         hint = "stop it, hold it, stop all that commands it besides, and try again"
         return failed(f"stopped: {seen.trial.trouble}", hint)
-    return passed(
-        f"torques up to {_highest_torque(seen):.2f} N m, of {seen.trial.highest:.2f} allowed"
-    )
+    return passed(f"torques up to {_peak(seen):.2f} N m, of {seen.trial.highest:.2f} allowed")
 
 
 def wheels(seen: Evidence) -> Finding:
@@ -32,7 +30,7 @@ def wheels(seen: Evidence) -> Finding:
         return NOT_MOVED
     if not np.isfinite(response.gains).any():
         hint = "are the motors on? If more friction is to be overcome, raise torque_share"
-        return failed(f"no reaction to torques up to {_highest_torque(seen):.2f} N m", hint)
+        return failed(f"no reaction to torques up to {_peak(seen):.2f} N m", hint)
     wiring, likeness = response.wiring
     if likeness < thresholds.LIKENESS:
         gains = np.array2string(response.gains, precision=2).replace("\n", "")
@@ -42,9 +40,7 @@ def wheels(seen: Evidence) -> Finding:
         return failed(wiring, "effort goes by the names in `name`; positive drives forward")
     if np.isnan(response.gains[0, 0]):
         hint = "more friction is to be overcome than the parameters say: raise torque_share"
-        return warned(
-            f"turns rightly, but did not drive with {_highest_torque(seen):.2f} N m", hint
-        )
+        return warned(f"turns rightly, but did not drive with {_peak(seen):.2f} N m", hint)
     return passed("right and left are right, and positive is forward")
 
 
@@ -94,7 +90,7 @@ def watchdog(seen: Evidence) -> Finding:
     return passed(f"pushes no more: {said}", acceleration=acceleration)
 
 
-def _highest_torque(seen: Evidence) -> float:
+def _peak(seen: Evidence) -> float:
     """Highest torque of a wheel in the trial [N m]."""
     assert seen.trial is not None
     return max((float(np.abs(c.torques).max()) for c in seen.trial.commands), default=0.0)

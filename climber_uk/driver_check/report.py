@@ -8,7 +8,7 @@ from enum import Enum
 
 
 class Verdict(Enum):
-    """Verdict of a check."""
+    """How a check ended."""
 
     PASS = "pass"
     WARN = "warn"

@@ -100,7 +100,7 @@ def _fit_all(
 ) -> dict[tuple[int, int], list[Fit]]:
     """Fits of each pulse that moved, by pair (0 drive, 1 yaw) and speed (0 forward, 1 yaw rate)."""
     begin = motion.stamp[0]
-    moments = motion.time - (motion.period / 2 if motion.tells_means else 0.0)
+    moments = motion.time - (motion.period / 2 if motion.has_mean_twist else 0.0)
     times = np.array([command.time - begin for command in trial.commands]) / SECOND
     torques = np.array([command.torques for command in trial.commands])
     impulse = np.vstack([np.zeros((1, 2)), np.cumsum(torques[:-1] * np.diff(times)[:, None], 0)])

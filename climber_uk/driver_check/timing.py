@@ -100,7 +100,7 @@ def age(seen: Evidence) -> Finding:
     typical, timeout = float(np.median(ages)), seen.expected.odometry_timeout
     value = {"age": typical, "age_99": float(np.quantile(ages, 0.99))}
     said = f"{1e3 * typical:.2f} ms old when it comes (99 %: {1e3 * value['age_99']:.2f} ms)"
-    # simulated time is told after the odometry, and not at each one
+    # /clock comes after the odometry, and not at each one
     ahead = thresholds.AHEAD + 2 * seen.expected.control_period * seen.use_sim_time
     if typical < -ahead:
         hint = "stamp the time of measuring; synchronise the computers' clocks"

@@ -33,12 +33,8 @@ class Suction:
     Ṗ = (P_pump - P) / T_pump - P / T_leak, so that P ends at P_pump T_leak / (T_leak + T_pump).
     """
 
-    pump_time: float = parameter(
-        0.0, "s", "time constant T_pump of pumping; 0: the pressure follows at once", at_least=0
-    )
-    leak_time: float = parameter(
-        0.0, "s", "time constant T_leak of the leak; 0: it does not leak", at_least=0
-    )
+    pump_time: float = parameter(0.0, "s", "time constant T_pump; 0: pumped at once", at_least=0)
+    leak_time: float = parameter(0.0, "s", "time constant T_leak; 0: it does not leak", at_least=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -122,14 +118,10 @@ def with_its_seal(climber: Climber, adhesion: str) -> Climber:
 
 @dataclass(frozen=True)
 class Grip:
-    """Where a climber touches its wall: wheels, seal and centre of mass."""
+    """Wheels, seal and centre of mass on the wall, by which slipping and tipping are warned of."""
 
     wheel_friction_coefficient: float = parameter(
-        0.8,
-        "",
-        "μ_w of the wheels on the wall; too high: slip is warned of too late",
-        at_least=0,
-        plausible=(0.01, 3),
+        0.8, "", "μ_w on the wall; too high: slip comes unwarned", at_least=0, plausible=(0.01, 3)
     )
     wheel_inertia: float = parameter(
         2e-5,
@@ -139,11 +131,7 @@ class Grip:
         plausible=(1e-8, 1),
     )
     centre_height: float = parameter(
-        0.05,
-        "m",
-        "h of the centre of mass above the wall; too low: tipping is warned of too late",
-        at_least=0,
-        plausible=(0.001, 1),
+        0.05, "m", "h of the centre of mass above the wall", at_least=0, plausible=(0.001, 1)
     )
     wheelbase: float = parameter(
         0.25, "m", "l between the edges it would tip about", above=0, plausible=(0.02, 3)
@@ -209,11 +197,9 @@ class Attachment:
 class Alarm:
     """Margins of slipping and tipping below which diagnostics warn; see `Attachment`."""
 
-    warn_margin: float = parameter(
-        1.5, "", "slip or tip margin below which diagnostics warn", at_least=0, runtime=True
-    )
+    warn_margin: float = parameter(1.5, "", "margin below which it warns", at_least=0, runtime=True)
     error_margin: float = parameter(
-        1.0, "", "slip or tip margin below which diagnostics are an error", at_least=0, runtime=True
+        1.0, "", "margin below which it is an error", at_least=0, runtime=True
     )
 
     def __post_init__(self) -> None:

@@ -25,6 +25,9 @@ DEGREE = math.pi / 180  # [rad]
 class Climber:
     """Parameters of a two-wheel suction climber; the defaults are the paper's.
 
+    Where a value is wrong: too low a mass, inertia or friction, or too small a wheel, gives too
+    little torque, until the observer has learnt the rest; too high a pressure promises margins
+    that are not there; above the motors' true limit, torques are cut instead of saturated.
     Raises `ValueError` naming field, value and bound.
     """
 
@@ -48,19 +51,10 @@ class Climber:
         plausible=(0.01, 3),
     )
     wheel_load_share: float = parameter(
-        0.53,
-        "",
-        "share k of the suction force on the wheels; the seal carries the rest",
-        at_least=0,
-        at_most=1,
+        0.53, "", "share k of the suction force that the wheels carry", at_least=0, at_most=1
     )
     suction_pressure: float = parameter(
-        2500.0,
-        "Pa",
-        "pressure difference P; too high: the climber may fall off unwarned",
-        at_least=0,
-        runtime=True,
-        plausible=(1000, 1e5),
+        2500.0, "Pa", "pressure difference P", at_least=0, runtime=True, plausible=(1000, 1e5)
     )
     suction_area: float = parameter(
         0.06, "m²", "area S the pressure difference acts on", at_least=0, plausible=(1e-4, 1)
@@ -74,11 +68,7 @@ class Climber:
         plausible=(3.2, 180),
     )
     max_wheel_torque: float = parameter(
-        20.0,
-        "N m",
-        "limit of each wheel's torque; too high: the motors limit it, and the heading suffers",
-        above=0,
-        plausible=(0.02, 300),
+        20.0, "N m", "limit of each wheel's torque, either way", above=0, plausible=(0.02, 300)
     )
     no_load_wheel_rate: float = parameter(
         0.0,
@@ -178,12 +168,8 @@ class Climber:
         to_mean, to_twist = self.leverage
         mean, twist = to_mean * force, to_twist * moment  # τR,L = mean ± twist
         tau_r, tau_l = mean + twist, mean - twist
-        fits = (
-            (right_low <= tau_r)
-            & (tau_r <= right_high)
-            & (left_low <= tau_l)
-            & (tau_l <= left_high)
-        )
+        fits = (right_low <= tau_r) & (tau_r <= right_high)
+        fits = fits & (left_low <= tau_l) & (tau_l <= left_high)
         if fits is True or everywhere(fits):
             return force, moment, tau_r, tau_l
         twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)

@@ -32,7 +32,7 @@ class Tracked:
     """Tracks, which scrub sideways as the climber yaws: μ_t N L / 4, the load spread evenly."""
 
     scrub_friction_coefficient: float = parameter(
-        0.5, "", "friction coefficient μ_t of the tracks, sideways", at_least=0
+        0.5, "", "μ_t of the tracks, sideways", at_least=0
     )
     length: float = parameter(0.3, "m", "length L of the tracks that is on the wall", above=0)
 

@@ -83,7 +83,7 @@ def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any,
     end = heading + angle
     if isinstance(end, float):
         return end, math.cos(end), math.sin(end)
-    return end, *_rotated_direction(heading, cosine, sine, angle)
+    return end, *_rotate(heading, cosine, sine, angle)
 
 
 def swept(
@@ -94,13 +94,11 @@ def swept(
     if isinstance(end, float):
         middle = heading + halfway
         return math.cos(middle), math.sin(middle), end, math.cos(end), math.sin(end)
-    direction = _rotated_direction(heading, cosine, sine, angle)
-    return *_rotated_direction(heading, cosine, sine, halfway), end, *direction
+    direction = _rotate(heading, cosine, sine, angle)
+    return *_rotate(heading, cosine, sine, halfway), end, *direction
 
 
-def _rotated_direction(
-    heading: Array, cosine: Array, sine: Array, angle: Array
-) -> tuple[Array, Array]:
+def _rotate(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[Array, Array]:
     """Cosines and sines (N,) after rotating by `angle` (N,) [rad].
 
     Of small angles the series takes half as long as numpy's cosine and sine; what it leaves

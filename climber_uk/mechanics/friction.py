@@ -56,9 +56,7 @@ class Coulomb:
 class Viscous:
     """Viscous friction, in proportion to the speed, as of a lubricated seal: no stiction."""
 
-    speed: float = parameter(
-        0.1, "m/s", "sliding speed at which it equals Coulomb's friction", above=0
-    )
+    speed: float = parameter(0.1, "m/s", "at which it equals Coulomb's friction", above=0)
 
     bristles: ClassVar[bool] = False
 
@@ -83,12 +81,8 @@ class Stribeck:
     """Stribeck friction: highest at rest, lower in motion, and growing again with speed."""
 
     ratio: float = parameter(1.5, "", "of stiction to Coulomb's friction", at_least=1)
-    speed: float = parameter(
-        0.02, "m/s", "Stribeck speed v_s, at which most of the surplus at rest is gone", above=0
-    )
-    viscous: float = parameter(
-        0.0, "s/m", "κ, viscous friction per speed, as a share of f", at_least=0
-    )
+    speed: float = parameter(0.02, "m/s", "v_s, at which most of the surplus is gone", above=0)
+    viscous: float = parameter(0.0, "s/m", "κ, viscous part of f per speed", at_least=0)
 
     bristles: ClassVar[bool] = False
 

@@ -116,12 +116,8 @@ def _periodic(s: Array, corners: Array, breaks: Array, _: Array) -> Any:
     steps = np.pad(np.diff(breaks), QUINTIC, "wrap")
     knots = np.concatenate([[0.0], np.cumsum(steps)]) - steps[:QUINTIC].sum()
     knots[QUINTIC:-QUINTIC] = breaks
-    return BSpline(
-        knots,
-        _on_polyline(s, corners, _means(knots) % s[-1]),
-        QUINTIC,
-        extrapolate="periodic",
-    )
+    control = _along(s, corners, _means(knots) % s[-1])
+    return BSpline(knots, control, QUINTIC, extrapolate="periodic")
 
 
 def _clamped(s: Array, corners: Array, breaks: Array, reversals: Array) -> Any:
@@ -131,7 +127,7 @@ def _clamped(s: Array, corners: Array, breaks: Array, reversals: Array) -> Any:
     times = np.where(np.isin(breaks, reversals), QUINTIC, 1)
     times[[0, -1]] = QUINTIC + 1
     knots = np.repeat(breaks, times)
-    control = _on_polyline(s, corners, _means(knots))
+    control = _along(s, corners, _means(knots))
     # one tangent on both sides of a reversal: halfway between those of its legs
     tips = np.searchsorted(knots, reversals, "right") - QUINTIC - 1
     before, after = np.where(tips > 0, tips, len(control) - 1) - 1, tips + 1
@@ -149,6 +145,6 @@ def _means(knots: Array) -> Array:
     return np.lib.stride_tricks.sliding_window_view(knots[1:-1], QUINTIC).mean(axis=1)
 
 
-def _on_polyline(s: Array, corners: Array, places: Array) -> Array:
+def _along(s: Array, corners: Array, places: Array) -> Array:
     """Points (n, 2) [m] of the polyline at distances (n,) [m] along it."""
     return np.stack([np.interp(places, s, x) for x in corners.T], axis=1)

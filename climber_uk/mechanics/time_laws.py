@@ -72,9 +72,7 @@ class RestToRest:
     """
 
     rate: float = _rate()
-    ramp_time: float = parameter(
-        3.0, "s", "time from rest to the full rate; short ramps ask for much torque", above=0
-    )
+    ramp_time: float = parameter(3.0, "s", "rest to full rate; shorter takes more torque", above=0)
     laps: int = parameter(1, "", "rounds of a closed shape without a stop", at_least=1)
     runs: int = parameter(1, "", "runs from rest to rest; 0: without end", at_least=0)
     pause: float = parameter(1.0, "s", "rest between two runs", at_least=0)

@@ -15,12 +15,8 @@ class TrajectoryParameters:
     """The trajectory: a shape, a time law, and where they begin."""
 
     shape: str = parameter("ellipse", "", "shape of the path", choices=tuple(SHAPES))
-    time_law: str = parameter(
-        "rest_to_rest", "", "time law by which the shape is travelled", choices=tuple(TIME_LAWS)
-    )
-    reverse_gear: bool = parameter(
-        False, "", "whether the climber drives the path backwards, tail first"
-    )
+    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=tuple(TIME_LAWS))
+    reverse_gear: bool = parameter(False, "", "whether the climber drives backwards, tail first")
     origin_x: float = parameter(0.0, "m", "x of the shape's origin in the wall's frame")
     origin_y: float = parameter(0.0, "m", "y of the shape's origin in the wall's frame")
 
@@ -28,7 +24,7 @@ class TrajectoryParameters:
         check(self)
 
 
-GROUPS: list[tuple[type, str]] = [
+TYPES: list[tuple[type, str]] = [
     (TrajectoryParameters, ""),
     *((kind, f"{name}.") for name, kind in {**SHAPES, **TIME_LAWS}.items()),
 ]

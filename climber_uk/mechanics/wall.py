@@ -55,9 +55,7 @@ class Plane:
 class Cylinder:
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
-    radius: float = parameter(
-        2.0, "m", "radius R of the cylinder: > 0 inside it, < 0 on its outside"
-    )
+    radius: float = parameter(2.0, "m", "radius R: > 0 inside the cylinder, < 0 on its outside")
 
     flat: ClassVar[bool] = False
 

@@ -30,12 +30,8 @@ class Waypoints:
     tolerance: float = parameter(
         0.02, "m", "most distance of the path from the straight lines between points", above=0
     )
-    max_yaw_rate: float = parameter(
-        1.0, "rad/s", "most yaw rate in bends, which are driven as slowly as it needs", above=0
-    )
-    max_acceleration: float = parameter(
-        0.5, "m/s²", "most acceleration in and before bends", above=0
-    )
+    max_yaw_rate: float = parameter(1.0, "rad/s", "most yaw rate; bends are slow for it", above=0)
+    max_acceleration: float = parameter(0.5, "m/s²", "most acceleration, also in bends", above=0)
     reversal_angle: float = parameter(
         0.35,
         "rad",

@@ -76,7 +76,7 @@ def wheel_torques(torques: Array, stamp: int, left_joint: str, right_joint: str)
 
 def left_right(pair: Array) -> list[float]:
     """Numbers of the wheels in the order of messages, from an array (2,) (right, left)."""
-    right, left = pair.tolist()
+    right, left = map(float, pair)
     return [left, right]
 
 

@@ -17,11 +17,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
-from climber_uk.mechanics.trajectory_parameters import (
-    GROUPS,
-    TrajectoryParameters,
-    build_trajectory,
-)
+from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
@@ -55,7 +51,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__("trajectory_publisher")
-        for kind, prefix in [*GROUPS, (PublisherOptions, "")]:
+        for kind, prefix in [*TYPES, (PublisherOptions, "")]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(PublisherOptions)

@@ -44,9 +44,7 @@ LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points, which take a quarter 
 class NodeOptions:
     """Torques for effort controllers of ros2_control."""
 
-    effort_commands: bool = parameter(
-        False, "", "publish torques on effort_controller/commands too"
-    )
+    effort_commands: bool = parameter(False, "", "publish torques on effort_controller/commands")
     effort_order: str = parameter(
         "left_right",
         "",

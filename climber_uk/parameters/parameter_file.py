@@ -27,7 +27,7 @@ HEXADECIMAL = re.compile(r"[-+]?0x([\da-f]+\.?[\da-f]*|\.[\da-f]+)(p[-+]?\d+)?",
 SPECIAL = re.compile(r"[-+]?(\.?(inf|nan)|infinity)", re.IGNORECASE)
 FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE)
-SMALLEST_NORMAL = sys.float_info.min
+SMALLEST = sys.float_info.min
 
 
 @dataclass(frozen=True)
@@ -163,9 +163,7 @@ def scalar(text: str) -> bool | int | float | str:
     if SPECIAL.fullmatch(text):
         return float(text.replace(".", ""))
     # C gives up where there is no normal number: above the largest, and below the least
-    if FLOAT.fullmatch(text) and (
-        ZERO.fullmatch(text) or SMALLEST_NORMAL <= abs(float(text)) < math.inf
-    ):
+    if FLOAT.fullmatch(text) and (ZERO.fullmatch(text) or SMALLEST <= abs(float(text)) < math.inf):
         return float(text)
     return text
 

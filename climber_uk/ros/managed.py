@@ -18,16 +18,14 @@ ACTIVE, INACTIVE = "active", "inactive"
 class Life:
     """The start of a managed node."""
 
-    autostart: bool = parameter(
-        True, "", "become active by itself; false: a lifecycle manager has to do it"
-    )
+    autostart: bool = parameter(True, "", "become active by itself, without a lifecycle manager")
 
     def __post_init__(self) -> None:
         check(self)
 
 
 class ManagedNode(LifecycleNodeMixin, ClimberNode):
-    """A lifecycle node: subscribes when configured (`listen`), and is told its state by `act`.
+    """A lifecycle node: subscribes when configured (`listen`), and gets its state by `act`.
 
     The service `~/enable` activates (true) and deactivates (false).
     """

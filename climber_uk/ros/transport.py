@@ -15,8 +15,8 @@ RANGE, ONLY_LOCAL = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
 def use_udp(environment: MutableMapping[str, str] = os.environ) -> None:
     """Have Fast DDS use UDP only, here and in child processes, unless the environment chooses.
 
-    To be called before `rclpy.init`. Within LOCALHOST rmw_fastrtps adds shared memory whatever
-    Fast DDS is told, so there a profile takes the place of that range.
+    To be called before `rclpy.init`. Within LOCALHOST rmw_fastrtps adds shared memory in any
+    case, so there a profile takes the place of that range.
     """
     middleware = environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     if environment.keys() & {TRANSPORTS, PROFILES} or "fastrtps" not in middleware:
