@@ -16,7 +16,7 @@ import numpy as np
 from limit import Limit, climber_numbers, controller_numbers
 from side_by_side import in_turns, rate, table, timed
 
-from climber_uk.closed_loop.batch import BLOCK, BatchRun, Loops
+from climber_uk.closed_loop.batch import LOOPS_AT_ONCE, BatchRun, Loops
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
 from climber_uk.control.control_law import ControlLaw, ControlOptions
@@ -155,11 +155,11 @@ def half(number: int) -> None:
 def two_processes() -> float:
     """How many times as fast two processes are as one, for the same loops in the same blocks."""
     with ProcessPoolExecutor(2) as pool:
-        list(pool.map(half, [BLOCK // 8] * 2))  # they have started
+        list(pool.map(half, [LOOPS_AT_ONCE // 8] * 2))  # they have started
         ratios = []
         for _ in range(3):
-            one = timed(lambda: pool.submit(half, 2 * BLOCK).result(), time.perf_counter)()
-            two = timed(lambda: list(pool.map(half, [BLOCK] * 2)), time.perf_counter)()
+            one = timed(lambda: pool.submit(half, 2 * LOOPS_AT_ONCE).result(), time.perf_counter)()
+            two = timed(lambda: list(pool.map(half, [LOOPS_AT_ONCE] * 2)), time.perf_counter)()
             ratios.append(one / two)
     return float(np.median(ratios))
 

@@ -190,7 +190,7 @@ def paper_margins() -> Figure:
     figure, axes = plt.subplots(figsize=(6, 3.0))
     time = np.linspace(0, 2 * np.pi, 2001)
     now = Trajectory(Ellipse(), ConstantRate()).at(time)
-    drive = 5 * now.speed_rate + PAPER.seal_friction + 49.05 * np.sin(now.heading)
+    drive = 5 * now.forward_acceleration + PAPER.seal_friction + 49.05 * np.sin(now.heading)
     lateral = 5 * now.speed * now.yaw_rate + 49.05 * np.cos(now.heading)
     margin = Contact().slip_margin(PAPER, 0.0, drive, lateral)
     share = float(np.mean(margin < 1))

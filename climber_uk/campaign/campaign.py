@@ -1,4 +1,4 @@
-"""A campaign as its file tells it: everything is checked before anything runs."""
+"""A campaign read from its file, and checked as a whole before anything runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,38 +10,25 @@ import numpy as np
 import yaml
 
 from climber_uk.campaign import names
-from climber_uk.campaign.distributions import (
-    Distribution,
-    Uniform,
-    distribution,
-    drawn,
-    extremes,
-)
+from climber_uk.campaign.distributions import Distribution, Uniform, distribution, drawn, extremes
 from climber_uk.campaign.limits import Limit
-from climber_uk.campaign.names import (
-    CONSTRAINT_SET,
-    LOSS_TIME,
-    NODES,
-    PARAMETERS,
-    PLANT,
-    SEED,
-)
+from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, NODES, PARAMETERS, PLANT, SEED
 from climber_uk.campaign.scenario import Node, Scenario
 from climber_uk.mechanics import Array
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.parameters.parameter_file import given, load, nothing_for, read_sections, similar
 from climber_uk.simulation.options import SimulationOptions
 
-SEEDS = Uniform(0, 2**31)  # that a node takes, rounded down
+SEEDS = Uniform(0, 2**31)  # of the nodes, rounded down
 
 
 @dataclass(frozen=True)
 class Size:
-    """How many runs of what length."""
+    """Number of runs, their seed, and their duration."""
 
-    runs: int = parameter(10_000, "", "how many", at_least=1)
-    seed: int = parameter(0, "", "of all that is random", at_least=0)
-    duration: float = parameter(20.0, "s", "of each", above=0)
+    runs: int = parameter(10_000, "", "number of runs", at_least=1)
+    seed: int = parameter(0, "", "of all random numbers", at_least=0)
+    duration: float = parameter(20.0, "s", "duration of each run", above=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -49,7 +36,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Campaign:
-    """Run k is drawn from the seed and k, whatever runs before, beside or after it."""
+    """What runs share, and what is drawn for each: run k depends on the seed and k only."""
 
     base: Path  # parameter file of the nodes
     size: Size
@@ -63,7 +50,7 @@ class Campaign:
         self.scenario.loops({**ends, SEED: np.zeros(2, int)})  # bounds hold between, too
 
     def columns(self, first: int, number: int) -> dict[str, Array]:
-        """What runs from `first` on have of their own, (number,) by the parameter's name."""
+        """Values drawn for `number` runs from `first` on, (number,) by the parameter's name."""
         own: dict[str, Any] = {
             name: drawn(of, self.size.seed, name, first, number) for name, of in self.drawn.items()
         }
@@ -73,7 +60,7 @@ class Campaign:
         return own
 
     def described(self) -> dict[str, str]:
-        """All that the results depend on."""
+        """All that the results depend on, as strings by name."""
         size, shared = vars(self.size), self.scenario.values
         return {
             "climber_uk": version("climber_uk"),
@@ -82,15 +69,15 @@ class Campaign:
         }
 
     def _on_grid(self, times: Array) -> Array:
-        """Times [s] at which a control period begins: nodes and closed loops then agree on them."""
+        """Times [s] moved to the next begin of a control period, as nodes act on them."""
         period = Node(PLANT, self.scenario.values).read(SimulationOptions).control_period
         return np.round(np.ceil(times / period) * period, 9)
 
 
 def read(path: Path, runs: int | None = None) -> Campaign:
-    """Campaign of a file, with so many `runs` if that is given.
+    """Campaign of a file, with `runs` in place of the file's if given.
 
-    Raises `ValueError` or `OSError` naming the file, and what is wrong in it.
+    Raises `OSError`, or `ValueError` naming the file and what is wrong in it.
     """
     try:
         tree = load(path.read_text(encoding="utf-8"))
@@ -100,6 +87,7 @@ def read(path: Path, runs: int | None = None) -> Campaign:
 
 
 def _campaign(tree: Any, directory: Path, instead: dict[str, int]) -> Campaign:
+    """Campaign of a file's content; `instead` replaces entries of it."""
     if not isinstance(tree, dict):
         raise ValueError("must have base, parameters and limits")
     given = {**tree, **instead}
@@ -136,7 +124,7 @@ def _size(given: dict[str, Any]) -> Size:
 
 
 def _read_base(path: Path) -> dict[str, Any]:
-    """Parameters of all nodes that matter, by full name."""
+    """Values of the nodes' parameter file, by full name."""
     found = {}
     sections = read_sections(path)
     for node in NODES:

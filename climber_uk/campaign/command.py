@@ -17,7 +17,7 @@ EXTRA = ["pyarrow", "matplotlib", "tqdm"]  # packages that no node needs
 
 
 def main() -> None:
-    """Run what is missing of a campaign and tell what came out, or run one run again."""
+    """Run what is missing of a campaign and report its results, or run one run again."""
     options = _options()
     _check_installed(EXTRA + ["distributed"] * bool(options.scheduler))
     output = options.output or Path("campaign_output") / options.file.stem
@@ -83,7 +83,7 @@ def _run(campaign: Campaign, options: argparse.Namespace, output: Path) -> None:
     # what takes a second to import, and no worker needs
     from climber_uk.campaign import figures, results
 
-    told = results.report(campaign, store, f"{sys.argv[0]} {options.file} --rerun {{}}")
-    (output / "report.txt").write_text(told + "\n", encoding="utf-8")
-    print(told)
+    report = results.report(campaign, store, f"{sys.argv[0]} {options.file} --rerun {{}}")
+    (output / "report.txt").write_text(report + "\n", encoding="utf-8")
+    print(report)
     print("\n".join(str(path) for path in figures.draw(campaign, store, output)))

@@ -12,28 +12,28 @@ from climber_uk.mechanics import Array
 
 SIGN = np.uint64(1 << 63)
 ROUNDING = 1e-12
-BITS = 8  # of the values, that a pass finds
+BITS = 8  # of the values, that each pass determines
 
 
 class Batches(Protocol):
-    """Runs, a bounded number at a time, and always the same ones in the same order."""
+    """Runs that can be read repeatedly, a bounded number at a time, in the same order."""
 
     def batches(self, names: Sequence[str]) -> Iterator[dict[str, Array]]:
         """Columns (n,) of these names, from the first runs to the last."""
 
 
 class Histogram(NamedTuple):
-    """Of what is finite."""
+    """Histogram of the finite values."""
 
     counts: Array  # (bins,)
     edges: Array  # (bins + 1,)
-    infinite: int  # how many are not
+    infinite: int  # number of infinite values
 
 
 def quantiles(runs: Batches, names: Sequence[str], shares: Sequence[float]) -> dict[str, Array]:
-    """Of each column the values (shares,) that `numpy.nanquantile` gives by "inverted_cdf": exact.
+    """Exact quantiles (shares,) of each column, as `numpy.nanquantile` by "inverted_cdf".
 
-    The k-th of all values has the highest bits that the k-th of all highest bits has, and so on.
+    The k-th value has the highest bits that the k-th of all highest bits has, and so on downwards.
     """
     numbers = sum(_numbers(batch, names) for batch in runs.batches(names))
     left = np.maximum(np.ceil(np.outer(numbers, shares) - 1), 0).astype(int)
@@ -54,21 +54,23 @@ def quantiles(runs: Batches, names: Sequence[str], shares: Sequence[float]) -> d
 
 
 def _numbers(batch: dict[str, Array], names: Sequence[str]) -> Array:
+    """Count of values that are not nan, of each column."""
     return np.array([np.count_nonzero(~np.isnan(batch[name])) for name in names])
 
 
 def _keys(values: Array) -> Any:
-    """Unsigned integers that have the order of floats; nan is the largest."""
+    """Unsigned integers (n,) in the order of floats (n,); nan is the largest."""
     bits = np.where(np.isnan(values), np.nan, values + 0.0).view(np.uint64)  # 0.0 for -0.0, too
     return np.where(bits & SIGN, ~bits, bits | SIGN)
 
 
 def _values(keys: Any) -> Array:
+    """Floats of keys: the inverse of `_keys`."""
     return np.where(keys & SIGN, keys ^ SIGN, ~keys).view(np.float64)
 
 
 def histograms(runs: Batches, names: Sequence[str], bins: int) -> dict[str, Histogram]:
-    """Of each column that of `numpy.histogram`, from its least to its largest finite value."""
+    """Histogram of each column, as `numpy.histogram` from its least to its largest finite value."""
     ends = dict.fromkeys(names, (np.inf, -np.inf))
     for batch in runs.batches(names):
         for name, (low, high) in ends.items():
@@ -117,5 +119,5 @@ def rank_correlations(
 
 
 def _cells(edges: Array, values: Array) -> Any:
-    """Number of each value's cell: 1, 3, … are at the edges, 0, 2, … between them."""
+    """Cell (n,) of each value: 1, 3, … are at the edges, 0, 2, … between them."""
     return np.searchsorted(edges, values) + np.searchsorted(edges, values, side="right")

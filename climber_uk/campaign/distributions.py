@@ -1,7 +1,7 @@
-"""From where a parameter of each run is drawn: x = F⁻¹(u), u evenly from (0, 1).
+"""Distributions from which a parameter of each run is drawn: x = F⁻¹(u), u uniform in (0, 1).
 
-u of run k is the k-th number of a stream that the seed and the parameter's name begin: it depends
-on nothing else. A new distribution is one class with `quantile`, and one entry.
+u of run k is the k-th number of a stream that the seed and the parameter's name determine. A new
+distribution is one class with `quantile`, and one entry in `DISTRIBUTIONS`.
 """
 
 import math
@@ -17,10 +17,10 @@ EXTREMES = np.array([2.0**-54, 1 - 2.0**-53])  # the least and the largest u tha
 
 
 class Distribution(Protocol):
-    """What a parameter is drawn from."""
+    """A distribution, by its quantile function."""
 
     def quantile(self, share: Array) -> Array:
-        """Value (n,) that this share (n,) of all draws is below."""
+        """Values (n,) below which a `share` (n,) of all draws is: F⁻¹."""
 
 
 @dataclass(frozen=True)
@@ -113,22 +113,24 @@ DISTRIBUTIONS: dict[str, type[Distribution]] = {
 
 
 def distribution(given: Any) -> Distribution:
-    """Distribution as a file tells it, `{name: its numbers}`; `ValueError` if there is no such."""
+    """Distribution from `{name: its numbers}` of a file; `ValueError` if there is no such."""
     if not (isinstance(given, dict) and len(given) == 1 and next(iter(given)) in DISTRIBUTIONS):
         raise ValueError(f"{given} must be a value or one of {', '.join(DISTRIBUTIONS)}")
-    [(name, told)] = given.items()
-    if name == "choice" and told and isinstance(told, list | dict):
-        weights = list(told.values()) if isinstance(told, dict) else [1.0] * len(told)
-        return Categorical(tuple(_numbers(name, list(told))), tuple(_numbers("weights", weights)))
+    [(name, numbers)] = given.items()
+    if name == "choice" and numbers and isinstance(numbers, list | dict):
+        weights = list(numbers.values()) if isinstance(numbers, dict) else [1.0] * len(numbers)
+        return Categorical(
+            tuple(_numbers(name, list(numbers))), tuple(_numbers("weights", weights))
+        )
     try:
-        return DISTRIBUTIONS[name](*_numbers(name, told))
+        return DISTRIBUTIONS[name](*_numbers(name, numbers))
     except TypeError:
         wanted = (DISTRIBUTIONS[name].__doc__ or "").rstrip(".")
-        raise ValueError(f"{name} {told} must be {wanted}") from None
+        raise ValueError(f"{name} {numbers} must be {wanted}") from None
 
 
 def drawn(from_: Distribution, seed: int, name: str, first: int, number: int) -> Array:
-    """Values (number,) of a parameter for the runs from `first` on."""
+    """Values (number,) of a parameter, drawn for the runs from `first` on."""
     stream = np.random.PCG64(np.random.SeedSequence([seed, *name.encode()]))
     stream.advance(first)
     shares = np.random.Generator(stream).random(number)

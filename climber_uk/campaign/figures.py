@@ -1,4 +1,4 @@
-"""A campaign in pictures: what came out how often, and which parameter it depends on."""
+"""Figures of a campaign: histograms of metrics, and failures and metrics by each parameter."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,9 +21,9 @@ from climber_uk.campaign.parts import Store
 from climber_uk.campaign.results import broken, wilson
 from climber_uk.mechanics import Array
 
-POINTS = 5000  # in a scatter figure: the first ones are drawn at random as all are
-BARS = 60  # of a histogram
-BINS = 12  # of a parameter, one as likely as another
+POINTS = 5000  # in a scatter figure: the first runs, which are random as all are
+BARS = 60  # in a histogram
+BINS = 12  # of a parameter, equally likely
 
 
 def draw(campaign: Campaign, store: Store, directory: Path) -> list[Path]:
@@ -71,7 +71,7 @@ def _failures(campaign: Campaign, store: Store, directory: Path) -> Path:
 
 
 def binned(campaign: Campaign, store: Store) -> Mapping[str, Array]:
-    """By bins: how many runs, the sum of their values, how many broke each limit."""
+    """By parameter (2 + limits, bins): runs, sum of their values, runs that broke each limit."""
     inner = np.arange(1, BINS) / BINS
     edges = {name: np.unique(of.quantile(inner)) for name, of in campaign.drawn.items()}
     sums = {name: np.zeros((2 + len(campaign.limits), len(e) + 1)) for name, e in edges.items()}
@@ -99,7 +99,7 @@ def _scatters(campaign: Campaign, store: Store, directory: Path) -> Iterator[Pat
 
 
 def first(store: Store, names: Sequence[str]) -> dict[str, Array]:
-    """Columns of the first runs, `POINTS` at most."""
+    """Columns of the first `POINTS` runs, or of all if there are fewer."""
     batches = store.batches(["run", *names])
     held = [*takewhile(lambda batch: batch["run"][0] < POINTS, batches)]
     return {name: np.concatenate([batch[name] for batch in held])[:POINTS] for name in names}
@@ -115,8 +115,8 @@ def _scatter(
             points = some[name][runs], some[metric][runs]
             axes.plot(*points, ".", color=colour, markersize=size, label=label)
         axes.set(xlabel=_parameter(name), ylabel=_label(metric, METRICS[metric][0]))
-        told = "no" if np.isnan(correlation) else f"{correlation:z.2f}"
-        axes.set_title(f"rank correlation: {told}", fontsize="small")
+        shown = "no" if np.isnan(correlation) else f"{correlation:z.2f}"
+        axes.set_title(f"rank correlation: {shown}", fontsize="small")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, markerscale=5)
     return figure

@@ -1,4 +1,4 @@
-"""What is told of each run, and the limits within which it is a success."""
+"""Metrics of a run, and the limits within which it succeeds."""
 
 import operator
 import re
@@ -34,7 +34,7 @@ RELATIONS: dict[str, Callable[[Any, Any], Any]] = {
 
 @dataclass(frozen=True)
 class Limit:
-    """A metric, and the bound within which it must be."""
+    """A bound that a metric must keep."""
 
     metric: str
     relation: str
@@ -42,7 +42,7 @@ class Limit:
 
     @classmethod
     def read(cls, text: Any) -> "Limit":
-        """Limit as a file tells it; `ValueError` if it does not."""
+        """Limit of a text like 'max_distance < 0.05'; `ValueError` if it is none."""
         found = re.fullmatch(r"\s*(\w+)\s*([<>=]+)\s*(\S+)\s*", str(text))
         try:
             metric, relation, bound = found.groups() if found else ("", "", "")
@@ -59,18 +59,18 @@ class Limit:
         return f"{self.metric} {self.relation} {self.bound:.12g}"
 
     def holds(self, values: Array) -> Any:
-        """Whether each of some values (n,) of the metric is within; nan is not."""
+        """Whether values (n,) of the metric keep the bound; nan does not."""
         return RELATIONS[self.relation](values, self.bound)
 
     def excess(self, values: Array) -> Array:
-        """How far each of some values (n,) is on the wrong side; nan is furthest."""
+        """Excess (n,) of values (n,) over the bound; infinite for nan."""
         over = values - self.bound
         over = {"<": over, ">": -over, "=": np.abs(over)}[self.relation[0]]
         return np.where(np.isnan(over), np.inf, over)
 
 
 def verdicts(limits: tuple[Limit, ...], metrics: dict[str, Array]) -> list[str]:
-    """Of each run: 'ok', or the limits that it broke."""
+    """Verdict of each run: 'ok', or the limits that it broke."""
     held = np.array([limit.holds(metrics[limit.metric]) for limit in limits])
     return [
         "; ".join(str(limit) for limit, holds in zip(limits, run, strict=True) if not holds) or "ok"

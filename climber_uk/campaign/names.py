@@ -1,4 +1,4 @@
-"""Parameters of the nodes as closed loops by the thousand have them, or do not.
+"""Parameters of the nodes in a campaign: which can be drawn, which are fixed, which do not matter.
 
 A name is that of a node and of its parameter, as in `plant_simulator.mass`.
 """
@@ -6,11 +6,11 @@ A name is that of a node and of its parameter, as in `plant_simulator.mass`.
 import dataclasses
 from typing import Any
 
-from climber_uk.control.build import KINDS as CONTROLLER_KINDS
+from climber_uk.control.build import KINDS as CONTROLLER_TYPES
 from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.trajectory_parameters import KINDS as PLAN_KINDS
+from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
@@ -37,21 +37,21 @@ def _names(node: str, *kinds: tuple[type, str]) -> dict[str, "dataclasses.Field[
 
 ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHESION.items())]
 PARAMETERS = {
-    **_names(PLANNER, *PLAN_KINDS),
-    **_names(CONTROLLER, *CONTROLLER_KINDS, *ON_WALL),
+    **_names(PLANNER, *TRAJECTORY_TYPES),
+    **_names(CONTROLLER, *CONTROLLER_TYPES, *ON_WALL),
     **_names(
         PLANT, *((kind, "") for kind in (SimulationOptions, Climber, Physics, Motors, Sensors))
     ),
     **_names(PLANT, *((k, f"{name}.") for group in VARIANTS.values() for name, k in group.items())),
     **_names(PLANT, *ON_WALL),
 }
-# Parameters of the nodes that nothing in lock-step depends on: who is told what, and how often
+# Parameters of the nodes that have no effect in lock-step: names, topics, rates of publishing
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
     *("stop_time", "effort_commands", "effort_order", "odom_frame", "base_frame"),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames", "qos_overrides"),
 }
-# What each run may have its own of
+# Parameters that may differ from run to run
 VARIED = {
     *_names(PLANT, (Climber, "")),
     *(f"{PLANT}.{error.name}" for error in Sensors.errors()),
@@ -82,7 +82,7 @@ REQUIRED = {
     f"{PLANT}.odometry_source": "truth",
     f"{PLANT}.odometry_delay": 0.0,
 }
-# What they do without: each controller would have a timing of its own
+# Values that they have instead of the defaults: each controller would have a timing of its own
 WITHOUT = {
     f"{CONTROLLER}.learn_delay": False,
     f"{CONTROLLER}.observer.twist": "instantaneous",
@@ -90,7 +90,7 @@ WITHOUT = {
 
 
 def check_drawn(name: str, constraints: str) -> None:
-    """Raise `ValueError` unless each run may have its own value of a parameter."""
+    """Raise `ValueError` unless a parameter may differ from run to run."""
     _check_known(name)
     if name not in VARIED:
         raise ValueError(f"{name} cannot be drawn: all runs share one value")
@@ -100,13 +100,13 @@ def check_drawn(name: str, constraints: str) -> None:
 
 
 def fixed(name: str, value: Any) -> Any:
-    """Value of a parameter that all runs share; `ValueError` if it cannot be that."""
+    """Value of a parameter that all runs share; `ValueError` if it is unknown or unfit."""
     _check_known(name)
     return typed(name, value, PARAMETERS[name].default)
 
 
 def typed(name: str, value: Any, default: Any) -> Any:
-    """Value of the type of `default`, integers for floats as well; `ValueError` if it is not."""
+    """`value` in the type of `default`, an integer as a float; `ValueError` if it is another."""
     if isinstance(default, float) and type(value) is int:
         return float(value)
     if type(value) is not type(default):

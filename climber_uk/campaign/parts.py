@@ -1,9 +1,9 @@
-"""The runs of a campaign in parts that fit the cache, and the Parquet files that keep them.
+"""Parts of a campaign, each as many runs as fit the cache, and the Parquet files that keep them.
 
     DIRECTORY/campaign.json           what the results depend on
     DIRECTORY/runs/part-00000.parquet, ...
 
-A file is there once it is whole: whoever is killed goes on with the parts that are missing.
+A file is there once it is complete: after an end on the way, the missing parts are computed.
 """
 
 import json
@@ -24,7 +24,7 @@ PART = 4096  # runs
 
 @dataclass(frozen=True)
 class CampaignPart:
-    """Some runs, one after the other."""
+    """Consecutive runs of a campaign."""
 
     number: int
     first: int
@@ -32,7 +32,7 @@ class CampaignPart:
 
 
 def computed(campaign: Campaign, first: int, runs: int) -> pa.Table:
-    """One row for each run: number, what was drawn for it, metrics, verdict."""
+    """Table of `runs` runs from `first` on: number, values drawn, metrics, verdict."""
     own = campaign.columns(first, runs)
     outcome = campaign.scenario.loops(own).run(campaign.scenario.course(), block=runs)
     metrics = {name: of(outcome) for name, (_, of) in METRICS.items()}
@@ -47,7 +47,7 @@ def computed(campaign: Campaign, first: int, runs: int) -> pa.Table:
 
 
 class Store:
-    """The directory of a campaign; raises `ValueError` if it is that of another one."""
+    """The directory of a campaign; raises `ValueError` if it holds another campaign."""
 
     def __init__(self, directory: Path, campaign: Campaign) -> None:
         self.directory = directory / "runs"
@@ -60,7 +60,7 @@ class Store:
 
     @property
     def parts(self) -> Iterator[CampaignPart]:
-        """All of them."""
+        """All parts of the campaign."""
         for first in range(0, self.runs, PART):
             yield CampaignPart(first // PART, first, min(PART, self.runs - first))
 
@@ -70,20 +70,20 @@ class Store:
         return (part for part in self.parts if not self._path(part.number).exists())
 
     def keep(self, part: CampaignPart, table: pa.Table) -> None:
-        """Write a part."""
+        """Write the table of a part."""
         sink = pa.BufferOutputStream()
         parquet.write_table(table, sink)
         _write(self._path(part.number), sink.getvalue())
 
     def batches(self, names: Sequence[str]) -> Iterator[dict[str, Array]]:
-        """Columns (n,) of these names, a part at a time: all runs may be too much to hold."""
+        """Columns (n,) of these names, a part at a time, as memory may not hold all."""
         for part in self.parts:
             file = parquet.ParquetFile(self._path(part.number))
             table = file.read([*dict.fromkeys(names)], use_threads=False)
             yield {name: table[name].to_numpy() for name in table.column_names}
 
     def row(self, run: int) -> dict[str, object]:
-        """All that is known of one run."""
+        """Row of a run: number, values drawn, metrics, verdict."""
         table = parquet.ParquetFile(self._path(run // PART)).read()
         row: dict[str, object] = table.slice(run % PART, 1).to_pylist()[0]
         return row

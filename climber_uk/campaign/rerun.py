@@ -1,4 +1,4 @@
-"""One run of a campaign again, through the nodes: its parameters, its bag, its figures."""
+"""A run of a campaign repeated by the nodes: parameter file, bag and figures."""
 
 import sys
 from pathlib import Path
@@ -13,7 +13,7 @@ from climber_uk.system.processes import call
 
 
 def rerun(campaign: Campaign, run: int, output: Path) -> int:
-    """Run a run as `run_demo` does, in a new directory; return the exit status."""
+    """Repeat a run with `run_demo` in a new directory, and analyse its bag; return the status."""
     output.mkdir(parents=True)
     config, demo = output / "parameters.yaml", output / "demo"
     write_changed(campaign.base, parameters(campaign, run), config)
@@ -32,7 +32,7 @@ def rerun(campaign: Campaign, run: int, output: Path) -> int:
 
 
 def parameters(campaign: Campaign, run: int) -> dict[str, dict[str, Any]]:
-    """All parameters of a run, by node and name."""
+    """Parameters of a run, by node and name."""
     own = {name: column.tolist()[0] for name, column in campaign.columns(run, 1).items()}
     values = {**WITHOUT, **campaign.scenario.values, **own}
     values[MEASURED] = values.get(PRESSURE, PARAMETERS[PRESSURE].default)

@@ -1,4 +1,4 @@
-"""What came out of a campaign, in words: how often, how far, and which runs to look at."""
+"""Report of a campaign: shares of runs that broke a limit, quantiles, and the worst runs."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -15,22 +15,22 @@ from climber_uk.campaign.parts import Store
 from climber_uk.mechanics import Array
 
 QUANTILES = {"lowest": 0.0, "1 %": 0.01, "50 %": 0.5, "99 %": 0.99, "highest": 1.0}
-WORST = 3  # runs that are told of each limit
+WORST = 3  # runs that are reported for each limit
 
 
 def wilson(count: int, number: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a probability, of which `count` in `number` were seen."""
+    """Wilson's 95 % interval of the probability of what came `count` times in `number`."""
     interval = binomtest(count, number).proportion_ci(confidence_level=0.95, method="wilson")
     return float(interval.low), float(interval.high)
 
 
 def broken(limits: Sequence[Limit], batch: dict[str, Array]) -> Any:
-    """Which of the limits (limits, n) some runs broke."""
+    """Whether each limit is broken by each run of a batch, (limits, n)."""
     return np.array([~limit.holds(batch[limit.metric]) for limit in limits])
 
 
 def report(campaign: Campaign, store: Store, rerun: str) -> str:
-    """All of it; `rerun` is the command to run a run again, with its number in place of {}."""
+    """The report; `rerun` is the command that repeats a run, with {} for its number."""
     size, limits = campaign.size, campaign.limits
     failed, by_limit = _counted(limits, store)
     found = quantiles(store, [*METRICS], [*QUANTILES.values()])
@@ -50,7 +50,7 @@ def report(campaign: Campaign, store: Store, rerun: str) -> str:
 
 
 def _counted(limits: Sequence[Limit], store: Store) -> tuple[int, list[int]]:
-    """How many runs broke any limit, and how many each."""
+    """Number of runs that broke any limit, and numbers that broke each."""
     failed, by_limit = 0, np.zeros(len(limits), int)
     for batch in store.batches([limit.metric for limit in limits]):
         broke = broken(limits, batch)
@@ -82,5 +82,5 @@ def _worst(limit: Limit, store: Store, rerun: str) -> Iterator[str]:
         yield ""
         yield f"run {run}: {limit.metric} {row[limit.metric]:.5g}, verdict {row['verdict']}"
         yield f"  {rerun.format(run)}"
-        told = ", ".join([*own, f"{SEED}={row[SEED]}"]).replace("plant_simulator.", "")
-        yield textwrap.fill(told, 98, initial_indent="  ", subsequent_indent="  ")
+        drawn = ", ".join([*own, f"{SEED}={row[SEED]}"]).replace("plant_simulator.", "")
+        yield textwrap.fill(drawn, 98, initial_indent="  ", subsequent_indent="  ")

@@ -1,14 +1,8 @@
-"""Run what is missing of a campaign: in processes of this machine, or on a Dask cluster."""
+"""Computes the missing parts of a campaign: in processes here, or on a Dask cluster."""
 
 import sys
 from collections.abc import Iterator
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    wait,
-)
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
 from itertools import islice
 
@@ -19,11 +13,11 @@ from climber_uk.campaign.campaign import Campaign
 from climber_uk.campaign.parts import CampaignPart, Store, computed
 from climber_uk.system.workers import workers
 
-Workers = tuple[Executor, int]  # and how many parts they may have in hand at a time
+Workers = tuple[Executor, int]  # and the number of parts that are submitted at a time
 
 
 def run_missing(campaign: Campaign, store: Store, workers: Workers) -> None:
-    """Keep each part as it is finished, and tell the time that is left."""
+    """Compute and keep the missing parts, and show the progress on stderr."""
     total = campaign.size.runs
     done = total - sum(part.runs for part in store.missing)
     with tqdm(total=total, initial=done, unit=" runs", file=sys.stderr) as progress:
@@ -35,7 +29,7 @@ def run_missing(campaign: Campaign, store: Store, workers: Workers) -> None:
 def _finished(
     campaign: Campaign, waiting: Iterator[CampaignPart], workers: Workers
 ) -> Iterator[tuple[CampaignPart, pa.Table]]:
-    """Parts in the order in which they are finished; no more are in hand than workers can take."""
+    """Parts and their tables, as they are finished; no more are submitted than workers can take."""
     executor, at_once = workers
     in_hand = dict[Future[pa.Table], CampaignPart]()
     while True:
@@ -49,17 +43,17 @@ def _finished(
 
 @contextmanager
 def processes(jobs: int) -> Iterator[Workers]:
-    """Processes of this machine, which end when this one does, however it ends."""
+    """Worker processes of this computer, which end with this process."""
     with workers(jobs) as executor:
         yield executor, 2 * jobs
 
 
 @contextmanager
 def cluster(address: str) -> Iterator[Workers]:
-    """Workers of the Dask scheduler at `address`, which computes again what a lost one had."""
+    """Workers of the Dask scheduler at `address`, which repeats what a lost worker had."""
     from distributed import Client, KilledWorker
 
-    # pure tasks would be recognised by a hash of the campaign, which nobody needs
+    # pure tasks would be recognised by a hash of the campaign, which takes time
     with Client(address) as client, client.get_executor(pure=False) as executor:
         try:
             yield executor, 2 * sum(client.nthreads().values())

@@ -1,4 +1,4 @@
-"""Closed loops of what the parameters of the nodes say."""
+"""Closed loops that have the parameters of the nodes."""
 
 import math
 from collections.abc import Mapping
@@ -29,18 +29,18 @@ from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import Physics
 
 T = TypeVar("T")
-GAUGE = 0.05  # [s] between two messages on `suction_pressure`
+GAUGE = 0.05  # [s] period of `suction_pressure`
 
 
 @dataclass(frozen=True)
 class Node:
-    """Parameters of one node; `read` raises `ValueError` naming parameter, value and bound."""
+    """Parameters of one node, among those of all."""
 
     name: str
     values: Mapping[str, Any]  # by full name, of all nodes
 
     def read(self, kind: type[T], prefix: str = "") -> T:
-        """Instance of `kind`."""
+        """Instance of `kind`; raises `ValueError` naming parameter, value and bound."""
         own = f"{self.name}."
         mine = {n.removeprefix(own): v for n, v in self.values.items() if n.startswith(own)}
         try:
@@ -51,7 +51,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Scenario:
-    """What all runs share; raises `ValueError` if closed loops by the thousand cannot have it."""
+    """Values that all runs share; raises `ValueError` for one that a campaign cannot have."""
 
     values: Mapping[str, Any]  # of parameters, by full name
     duration: float  # [s]
@@ -64,13 +64,13 @@ class Scenario:
                 raise ValueError(f"{name}={value!r} must be {wanted!r} in a campaign")
 
     def course(self) -> BatchRun:
-        """Where to, for how long and how often; raises as `Node.read` does."""
+        """Trajectory, duration and timing of all runs; raises as `Node.read` does."""
         options = Node(PLANT, self.values).read(SimulationOptions)
         trajectory = build_trajectory(Node(PLANNER, self.values).read)
         return BatchRun(trajectory, self.duration, options.control_period, options.steps)
 
     def loops(self, own: Mapping[str, Any]) -> Loops:
-        """Loops with their `own` values (n,) of some parameters; raises as `Node.read` does."""
+        """Loops of runs with `own` values (n,) of parameters; raises as `Node.read` does."""
         values = {**self.values, **own}
         plant = Node(PLANT, values)
         climber, number = plant.read(Climber), len(own[SEED])
@@ -90,11 +90,8 @@ class Scenario:
 
 
 def _start(options: SimulationOptions, number: int) -> Motion:
-    x, y, heading, speed, yaw_rate = (
-        np.zeros(number) + getattr(options, f"initial_{name}")
-        for name in ("x", "y", "heading", "speed", "yaw_rate")
-    )
-    return Motion(x, y, heading, np.cos(heading), np.sin(heading), speed, yaw_rate)
+    names = "x", "y", "heading", "speed", "yaw_rate"
+    return Motion.at(*(np.zeros(number) + getattr(options, f"initial_{name}") for name in names))
 
 
 def _changes(climber: Climber, physics: Physics, number: int) -> tuple[Change, ...]:

@@ -1,10 +1,10 @@
-"""Thousands of closed loops at once: the node's `SampledController`, with plain climbers.
+"""Thousands of closed loops at once: the node's `SampledController` with unicycle climbers.
 
 Whatever is a number in a `Climber`, in gains, in sensors or in a start may be an array (N,) of one
-for each loop. Loops go through time in blocks that fit the cache, and what is told of them is
-gathered on the way: memory grows with the block, not with N or the duration. Not in here, but in
-`simulate`: a reference that waits, jumps and safe outputs, lost and late messages, motors with a
-lag, wheel odometry, pumps, and every contact but that of a `UnicycleModel` climber.
+for each loop. Loops run in blocks that fit the cache, and their outcome is summed up on the way:
+memory grows with the block, not with N or the duration. Not in here, but in `simulate`: a
+reference that waits, jumps and safe outputs, lost and late messages, motors with a lag, wheel
+odometry, pumps, and every contact but that of a `UnicycleModel` climber.
 """
 
 from collections import deque
@@ -29,21 +29,16 @@ from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, keep_what_is_freed, part
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import (
-    Motion,
-    ReferencePoint,
-    Torques,
-    Wrench,
-)
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques, Wrench
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.sensors import Sensors
 
-BLOCK = 16384  # loops that are gone through together; by measurement
-CHUNK = 64  # periods for which noise and targets are made together
+LOOPS_AT_ONCE = 16384  # fastest, by measurement
+PERIODS_AT_ONCE = 64  # for which noise and targets are made together
 
 
 class Change(NamedTuple):
-    """From `time` [s] on the true climbers are others: less suction, other friction."""
+    """The true climbers become `climber` at `time` [s]: less suction, other friction."""
 
     time: Any
     climber: Climber
@@ -51,22 +46,22 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True)
 class BatchRun:
-    """What all loops share."""
+    """Trajectory, duration and timing, which all loops share."""
 
     trajectory: Trajectory
     duration: float  # [s]
     period: float = 0.005  # [s] of the controller
     steps: int = 2  # of the plant in a period
     delay: int = 0  # periods of a torque on its way to the wheels
-    compiled: bool = False  # whether the plant is, by numba: the extra `fast`
+    compiled: bool = False  # the plant, by numba: the extra `fast`
 
 
 @dataclass(frozen=True)
 class Loops:
-    """Climbers, their controllers, and what is between them; see the module."""
+    """N climbers, their controllers and sensors; `ValueError` for what the module excludes."""
 
     start: Motion  # arrays (N,)
-    climber: Climber  # the true ones
+    climber: Climber  # the true ones; those that the controllers believe in are in `law`
     law: ControlLaw
     observer: Observer = field(default_factory=Observer)
     sensors: Sensors = field(default_factory=Sensors)
@@ -74,7 +69,7 @@ class Loops:
     changes: tuple[Change, ...] = ()
     timing: Timing = field(default_factory=Timing)
     contact: Contact = field(default_factory=Contact)  # for the margins
-    gauge: float = 0.0  # [s] between two times that the controllers hear of the pressure; 0: never
+    gauge: float = 0.0  # [s] period in which controllers are sent the pressure; 0: never
 
     def __post_init__(self) -> None:
         if self.seeds is None and not self.sensors.is_ideal:
@@ -90,8 +85,8 @@ class Loops:
             if value != wanted:
                 raise ValueError(f"{name}={value!r} must be {wanted!r} in many loops at once")
 
-    def run(self, course: BatchRun, block: int = BLOCK) -> Outcome:
-        """What became of each loop, arrays (N,)."""
+    def run(self, course: BatchRun, block: int = LOOPS_AT_ONCE) -> Outcome:
+        """Outcome of each loop, arrays (N,); `block` loops run at once."""
         number = len(self.start.x)
         keep_what_is_freed()
         preview = sampled(course.trajectory, course.duration)
@@ -104,33 +99,33 @@ class Loops:
     def run_block(
         self, course: BatchRun, preview: Preview, on_period: Callable[[], object] = lambda: None
     ) -> Outcome:
-        """The same, of few enough for the cache; `on_period` is called in every period."""
+        """The same, all loops at once; `on_period` is called in every period."""
         sampled_controller = SampledController(
             self.law, self.observer, self.timing, Pacing(catch_up=0.0)
         )
         tally = Tally(len(self.start.x), self.contact)
         motion, step = self.start, course.period / course.steps
-        advance = _advancing(course.compiled)
+        advance = _advance_function(course.compiled)
         on_their_way: deque[Torques] = deque()
         ticks = round(course.duration / course.period)
         controllers = pressure_gauge.controllers(
             self.law, self._climbers(course, ticks), course.period, self.gauge
         )
-        given = (
+        by_tick = (
             *(self._noise(ticks), self._climbers(course, ticks)),
             *(controllers, _targets(course, ticks)),
         )
-        for tick, (noise, climber, law, target) in enumerate(zip(*given, strict=True)):
-            told = motion if noise is None else self.sensors.told(motion, noise)
+        for tick, (noise, climber, law, target) in enumerate(zip(*by_tick, strict=True)):
+            measured = motion if noise is None else self.sensors.corrupted(motion, noise)
             sampled_controller.law = law
-            sampled_controller.see(SECOND + round(tick * course.period * SECOND), told)
+            sampled_controller.see(SECOND + round(tick * course.period * SECOND), measured)
             command = sampled_controller.answer(preview, 0.0)
             assert command is not None  # the preview goes beyond the duration
             if not on_their_way:
                 before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
                 on_their_way.extend([before] * course.delay)
             on_their_way.append(command.wheels)
-            wheels = _within(on_their_way.popleft(), climber, motion)
+            wheels = _within_bounds(on_their_way.popleft(), climber, motion)
             tally.add(tick * course.period, motion, target, command, wheels, climber)
             wrench = Wrench(*climber.wrench(*wheels))
             on_period()
@@ -142,14 +137,14 @@ class Loops:
         return bool(np.any(self.start.speed) or np.any(self.start.yaw_rate))
 
     def _noise(self, ticks: int) -> Iterator[Array | None]:
-        """Five numbers (5, N) for every odometry."""
+        """For every odometry five numbers of unit variance (5, N), or None if sensors are ideal."""
         if self.sensors.is_ideal:
             yield from [None] * (ticks + 1)
             return
         seeds = np.asarray(self.seeds).tolist()
         randoms = [np.random.default_rng(seed) for seed in seeds]
-        for first in range(0, ticks + 1, CHUNK):
-            many = min(CHUNK, ticks + 1 - first)
+        for first in range(0, ticks + 1, PERIODS_AT_ONCE):
+            many = min(PERIODS_AT_ONCE, ticks + 1 - first)
             drawn = np.array([random.normal(size=(many, 5)) for random in randoms])
             yield from np.ascontiguousarray(drawn.transpose(1, 2, 0))
 
@@ -166,14 +161,16 @@ class Loops:
 
 
 def _targets(course: BatchRun, ticks: int) -> Iterator[ReferencePoint]:
-    for first in range(0, ticks + 1, CHUNK):
-        times = np.arange(first, min(first + CHUNK, ticks + 1)) * course.period
+    for first in range(0, ticks + 1, PERIODS_AT_ONCE):
+        times = np.arange(first, min(first + PERIODS_AT_ONCE, ticks + 1)) * course.period
         target = course.trajectory.at(times).target
         rows = zip(*(each.tolist() for each in target), strict=True)
         yield from (ReferencePoint(*numbers) for numbers in rows)
 
 
-def _advancing(compiled: bool) -> Callable[[UnicycleModel, Motion, Wrench, float, int], Motion]:
+def _advance_function(
+    compiled: bool,
+) -> Callable[[UnicycleModel, Motion, Wrench, float, int], Motion]:
     if not compiled:
         return advanced_often
     from climber_uk.closed_loop.compiled import advanced  # numba takes long to import
@@ -181,6 +178,6 @@ def _advancing(compiled: bool) -> Callable[[UnicycleModel, Motion, Wrench, float
     return advanced
 
 
-def _within(torques: Torques, climber: Climber, motion: Motion) -> Torques:
+def _within_bounds(torques: Torques, climber: Climber, motion: Motion) -> Torques:
     right, left = climber.bounds(motion)
     return Torques(clipped(torques.right, *right), clipped(torques.left, *left))

@@ -1,8 +1,8 @@
-"""`plain.advanced` for many climbers, compiled by numba: the extra `fast`.
+"""`unicycle.advanced_often` for many climbers, compiled by numba: the extra `fast`.
 
-No equation stands here: numba is handed the functions of `plain` as they are, and is told anew only
-how to choose, to clip and to turn. The law is not compiled: numpy's tanh and arctan do eight at a
-time and numba's one, so that nothing would be won.
+No equation stands here: numba compiles the functions of `unicycle` as they are, and gets anew only
+how to select, clip and rotate (`FOR_NUMBA`). The control law is not compiled: numpy's tanh and
+arctan do eight at a time and numba's one, so that nothing would be won.
 """
 
 from typing import Any
@@ -11,16 +11,16 @@ import numpy as np
 from numba import njit
 from numba.extending import overload, register_jitable
 
-from climber_uk.closed_loop import unicycle as plain
+from climber_uk.closed_loop import unicycle
 from climber_uk.closed_loop.unicycle import Accelerations, UnicycleModel
 from climber_uk.mechanics import Array, elementary, many
 from climber_uk.mechanics.quantities import Motion, Wrench
 
-BLOCK = 256  # climbers that are gone through together, so that their numbers stay in the cache
-SMALL = 0.1  # [rad] that no climber may turn by in a step: the series is good to 1e-16 up to that
+CLIMBERS_AT_ONCE = 256  # whose numbers stay in the cache
+MAX_ROTATION = 0.1  # [rad] in a step: up to that the series is good to 1e-16
 # numpy's division, a product and a sum in one: as in C; `forceinline` lets LLVM do eight at once
-EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
-INLINE = EXACT | {"forceinline": True}
+LIKE_C: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+INLINE = LIKE_C | {"forceinline": True}
 
 
 def _rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
@@ -44,7 +44,7 @@ def _amended(condition: Any, regular: Any, exceptional: Any, *arguments: Any) ->
     return exceptional(*arguments) if condition else regular
 
 
-ANEW = {
+FOR_NUMBA = {
     elementary.sign: lambda x: float((x > 0) - (x < 0)),
     elementary.with_sign_of: lambda size, of: size if of >= 0 else -size,
     elementary.clipped: lambda value, lowest, highest: min(max(value, lowest), highest),
@@ -54,21 +54,21 @@ ANEW = {
     elementary.swept: _swept,
     many.amended: _amended,
 }
-for function, anew in ANEW.items():
-    overload(function, strict=False, jit_options=INLINE)(lambda *_, found=anew: found)
-for function in (plain.slid, plain._held, plain._push):
+for function, replacement in FOR_NUMBA.items():
+    overload(function, strict=False, jit_options=INLINE)(lambda *_, chosen=replacement: chosen)
+for function in (unicycle.slid, unicycle._stuck, unicycle._applied):
     register_jitable(**INLINE)(function)
-for function in (plain._from_rest, plain._stopped, plain._given_way, plain.stepped):
-    register_jitable(**EXACT)(function)
+for function in (unicycle._from_rest, unicycle._to_rest, unicycle._broken_loose, unicycle.stepped):
+    register_jitable(**LIKE_C)(function)
 
 
 def advanced(
     body: UnicycleModel, motion: Motion, wrench: Wrench, time: float, steps: int
 ) -> Motion:
     """Motions (N,) after `steps` steps of `time` [s]."""
-    fastest = abs(motion.yaw_rate) + steps * time * abs(wrench.turn / body.yaw_inertia)
-    if not np.max(fastest, initial=0.0) * time <= SMALL:
-        return plain.advanced_often(body, motion, wrench, time, steps)
+    fastest = abs(motion.yaw_rate) + steps * time * abs(wrench.moment / body.yaw_inertia)
+    if not np.max(fastest, initial=0.0) * time <= MAX_ROTATION:
+        return unicycle.advanced_often(body, motion, wrench, time, steps)
     rows = np.empty((11, len(motion.x)))
     for row, numbers in zip(rows, (*motion, *body.under(wrench)), strict=True):
         row[:] = numbers
@@ -76,32 +76,32 @@ def advanced(
     return Motion(*rows[:7])
 
 
-@njit(nogil=True, **EXACT)
+@njit(nogil=True, **LIKE_C)
 def _advance(rows: Array, time: float, steps: int) -> None:
-    now, end = np.empty((11, BLOCK)), np.empty((7, BLOCK))
-    for first in range(0, rows.shape[1], BLOCK):
-        number = min(BLOCK, rows.shape[1] - first)
+    now, end = np.empty((11, CLIMBERS_AT_ONCE)), np.empty((7, CLIMBERS_AT_ONCE))
+    for first in range(0, rows.shape[1], CLIMBERS_AT_ONCE):
+        number = min(CLIMBERS_AT_ONCE, rows.shape[1] - first)
         now[:, :number] = rows[:, first : first + number]
         for _ in range(steps):
             _slide(now, end, time, number)
             for i in range(number):
                 if not now[5, i] * end[5, i] > 0:  # it rests, or stops
-                    pushed, motion = _given(now, i)
-                    _put(end, i, plain.stepped(pushed, motion, time))
+                    rates, motion = _get(now, i)
+                    _put(end, i, unicycle.stepped(rates, motion, time))
             now[:7, :number] = end[:, :number]
         rows[:7, first : first + number] = now[:7, :number]
 
 
-@njit(**EXACT)
+@njit(**LIKE_C)
 def _slide(now: Array, end: Array, time: float, number: int) -> None:
     for i in range(number):
-        pushed, motion = _given(now, i)
-        rubbing = elementary.with_sign_of(pushed.friction, motion.speed)
-        _put(end, i, plain.slid(pushed, motion, rubbing, time))
+        rates, motion = _get(now, i)
+        friction = elementary.with_sign_of(rates.friction, motion.speed)
+        _put(end, i, unicycle.slid(rates, motion, friction, time))
 
 
 @njit(**INLINE)
-def _given(a: Array, i: int) -> tuple[Accelerations, Motion]:
+def _get(a: Array, i: int) -> tuple[Accelerations, Motion]:
     motion = Motion(a[0, i], a[1, i], a[2, i], a[3, i], a[4, i], a[5, i], a[6, i])
     return Accelerations(a[7, i], a[8, i], a[9, i], a[10, i]), motion
 

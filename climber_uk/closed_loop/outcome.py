@@ -1,4 +1,4 @@
-"""What became of many closed loops, gathered while they run."""
+"""Outcome of many closed loops, summed up while they run."""
 
 from typing import Any, NamedTuple
 
@@ -12,35 +12,35 @@ from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
 
-NEAR = 0.01  # [m] from the reference within which a loop has settled
+SETTLED = 0.01  # [m] from the reference, within which a loop has settled
 
 
 class Outcome(NamedTuple):
-    """What became of each loop, arrays (N,): until it fell, if it did."""
+    """Outcome of each loop, arrays (N,), up to its fall if it fell."""
 
     rms: Array  # of the distance from the reference [m]
-    worst: Array  # distance [m]
-    last: Array  # distance, at the end [m]
-    settled: Array  # last time further than `NEAR` from it [s]
+    worst: Array  # highest distance [m]
+    last: Array  # distance at the end [m]
+    settled: Array  # last time further away than `SETTLED` [s]
     peak_torque: Array  # of a wheel [N m]
-    saturated: Array  # share of the answers that limits cut
+    saturated: Array  # share of the commands that limits cut
     slip_margin: Array  # lowest
     tip_margin: Array  # lowest
-    fell: Array  # when [s]; infinite if it did not
+    fell: Array  # time of the fall [s]; infinite without one
 
 
 class Tally:
-    """Sums and extremes of n loops."""
+    """Sums and extremes of `number` loops, period by period."""
 
     def __init__(self, number: int, contact: Contact) -> None:
         self.contact, self.times = contact, np.zeros(number)
-        self.squares, self.cuts = np.zeros(number), np.zeros(number)
-        self.worst, self.last, self.late = np.zeros(number), np.zeros(number), np.zeros(number)
+        self.squares, self.saturated = np.zeros(number), np.zeros(number)
+        self.worst, self.last, self.settled_at = np.zeros((3, number))
         self.peak = np.zeros(number)
         self.slip, self.tip = np.full(number, MAX_MARGIN), np.full(number, MAX_MARGIN)
         self.fell = np.full(number, np.inf)
         self._climber: Climber | None = None
-        self._on_wall: Any = True  # or, once one fell, whether each did not
+        self._on_wall: Any = True  # or an array (N,), once one has fallen
 
     def add(
         self,
@@ -51,18 +51,18 @@ class Tally:
         wheels: Torques,
         climber: Climber,
     ) -> None:
-        """Take in a period that begins at `time` [s], in which `wheels` act."""
+        """Add a period that begins at `time` [s], with the torques that act on the wheels in it."""
         if climber is not self._climber:
-            self._hold(time, climber)
+            self._update_fallen(time, climber)
         x, y = motion.x - target.x, motion.y - target.y
         square, on = x * x + y * y, self._on_wall
         np.add(self.times, 1, out=self.times, where=on)
         np.add(self.squares, square, out=self.squares, where=on)
         np.maximum(self.worst, square, out=self.worst, where=on)
         np.copyto(self.last, square, where=on)
-        np.copyto(self.late, time, where=(square > NEAR * NEAR) & on)
-        cut = (np.abs(command.lost.drive) > CUT) | (np.abs(command.lost.turn) > CUT)
-        np.add(self.cuts, cut, out=self.cuts, where=on)
+        np.copyto(self.settled_at, time, where=(square > SETTLED * SETTLED) & on)
+        is_saturated = (np.abs(command.lost.force) > CUT) | (np.abs(command.lost.moment) > CUT)
+        np.add(self.saturated, is_saturated, out=self.saturated, where=on)
         for torque in wheels:
             np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
         lateral = climber.mass * motion.speed * motion.yaw_rate
@@ -70,23 +70,23 @@ class Tally:
         margin = self.contact.slip_margin(climber, self._into, climber.wrench(*wheels)[0], lateral)
         np.minimum(self.slip, margin, out=self.slip, where=on)
 
-    def _hold(self, time: float, climber: Climber) -> None:
-        """Tell who falls off, now that the climbers are these."""
+    def _update_fallen(self, time: float, climber: Climber) -> None:
+        """Find the loops that fall at `time` [s], as `climber` becomes the true one."""
         self._climber = climber
         self._into = climber.gravity_into_wall
-        hold = self.contact.hold(climber, self._into)
+        normal = self.contact.normal_force(climber, self._into)
         along = climber.weight_along_wall / climber.mass
         tip = self.contact.tip_margin(climber, self._into, along)
-        falls = (hold < 1e-9 * climber.mass * GRAVITY) | (tip < 1)
+        falls = (normal < 1e-9 * climber.mass * GRAVITY) | (tip < 1)
         self.tip = np.minimum(self.tip, tip)
         self.fell = np.minimum(self.fell, np.where(falls, time, np.inf))
         if np.isfinite(self.fell).any():
             self._on_wall = np.isinf(self.fell)
 
     def outcome(self) -> Outcome:
-        """All of it."""
+        """Outcome of the periods so far."""
         times = np.maximum(self.times, 1)
         return Outcome(
             *(np.sqrt(self.squares / times), np.sqrt(self.worst), np.sqrt(self.last)),
-            *(self.late, self.peak, self.cuts / times, self.slip, self.tip, self.fell),
+            *(self.settled_at, self.peak, self.saturated / times, self.slip, self.tip, self.fell),
         )

@@ -1,7 +1,7 @@
-"""Controller and plant in one process, with what lies between them: lock-step without messages.
+"""One closed loop in one process: controller, plant, and the link between them, in lock-step.
 
 The same `Controller` and `SimulatedRobot` that the nodes run, on a grid of the plant's step. All
-that is random comes from one seed.
+noise comes from one seed.
 """
 
 from collections import deque
@@ -26,7 +26,7 @@ from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 @dataclass(frozen=True)
 class Link:
-    """What lies between a climber and its controller; times are multiples of `step`."""
+    """Delays, losses and noise between climber and controller; times are multiples of `step`."""
 
     step: float = 0.0025  # [s] of the plant
 
@@ -44,27 +44,27 @@ class Link:
 
 
 class Controlling(Protocol):
-    """Whatever answers odometry with torques: a `Controller`, or a rival."""
+    """What answers odometry with torques: a `Controller`, or another one to compare with."""
 
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
-        """Keep a reference."""
+        """Take a reference, at `now` [ns]."""
 
     def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
-        """Answer an odometry."""
+        """Answer an odometry, at `now` [ns]; `stamp` [ns] is when `state` was measured."""
 
 
 def as_commanded(state: State, command: Array) -> Array:
-    """Torques of motors that do as they are told."""
+    """Torques of ideal motors: those commanded."""
     return command
 
 
 @dataclass(frozen=True)
 class Run:
-    """What happened at n times at which odometry was due."""
+    """History of a closed loop, at the n times at which odometry was due."""
 
     time: Array  # (n,) [s]
-    pose: Array  # (n, 3) the true one
-    velocity: Array  # (n, 3)
+    pose: Array  # (n, 3) true, [m], [rad]
+    velocity: Array  # (n, 3) true, in the wall's frame
     error: Array  # (n, 3) along-track [m], cross-track [m], heading [rad]
     torques: Array  # (n, 2) that acted, right, left [N m]
 
@@ -74,11 +74,11 @@ class Run:
         return np.hypot(self.error[:, 0], self.error[:, 1])
 
     def rms(self, after: float = 0.0) -> float:
-        """Root mean square of the distance from the reference, `after` [s] [m]."""
+        """Root mean square [m] of the distance from the reference, from `after` [s] on."""
         return float(np.sqrt(np.mean(self.distance[self.time >= after] ** 2)))
 
     def chatter(self, after: float = 0.0) -> float:
-        """Root mean square of the torques' changes from one odometry to the next [N m]."""
+        """Root mean square [N m] of the torques' change in a period, from `after` [s] on."""
         return float(np.sqrt(np.mean(np.diff(self.torques[self.time >= after], axis=0) ** 2)))
 
 
@@ -95,9 +95,9 @@ def simulate(
 ) -> Run:
     """Run of `duration` [s] from `start`; `climber` may change with time.
 
-    `plant_of` makes the plant of a climber and a step. `motors` turn the state and what was
-    answered last into torques, at every step. A climber that starts in motion starts with the first
-    answer.
+    `plant_of` makes a plant from a climber and a step [s]. `motors` makes torques (2,) [N m] from
+    the state and the command in force, at every step. No torque acts before the first command,
+    unless the climber starts in motion: then that one does.
     """
     random = np.random.default_rng(seed)
     climber_at = climber if callable(climber) else lambda _: climber
@@ -105,8 +105,8 @@ def simulate(
     arriving: deque[tuple[int, int, State]] = deque()  # step of arrival, stamp, odometry
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
-    rows, now_it_is = [], climber_at(0.0)
-    robot = SimulatedRobot(link.parts(plant_of(now_it_is, link.step)), start, link.period)
+    rows, current = [], climber_at(0.0)
+    robot = SimulatedRobot(link.parts(plant_of(current, link.step)), start, link.period)
     every, late = round(link.period / link.step), round(link.delay / link.step)
     for step in range(round(duration / link.step) + 1):
         now = SECOND + round(step * link.step * SECOND)
@@ -129,9 +129,9 @@ def simulate(
                 commanded.append((step + late, answer.torques))
         while commanded and commanded[0][0] <= step:
             _, acting = commanded.popleft()
-        before, now_it_is = now_it_is, climber_at(step * link.step)
-        if now_it_is is not before:
-            robot.take(link.parts(plant_of(now_it_is, link.step)))
+        before, current = current, climber_at(step * link.step)
+        if current is not before:
+            robot.take(link.parts(plant_of(current, link.step)))
         robot.advance(np.zeros(2) if acting is None else motors(robot.state, acting))
     table = np.array(rows)
     return Run(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10:12])
@@ -147,6 +147,8 @@ def sampled(trajectory: Trajectory, duration: float) -> Preview:
 
 def measured(state: State, link: Link, random: np.random.Generator) -> State:
     """State as odometry tells it, with its errors."""
-    x, y, heading, _, _, speed, yaw_rate = link.sensors.told(state.motion, random.normal(size=5))
+    x, y, heading, _, _, speed, yaw_rate = link.sensors.corrupted(
+        state.motion, random.normal(size=5)
+    )
     pose = np.array([x, y, heading])
     return State.rolling(pose, speed, yaw_rate) if link.with_twist else State(pose, np.zeros(3))

@@ -1,10 +1,10 @@
-"""A plain climber over a step: on a plane, Coulomb's friction on its seal, wheels that do not slip.
+"""Steps of a unicycle climber: on a plane, with Coulomb friction, and wheels that do not slip.
 
     v̇ = (F - f σ)/m - g_t sinθ    ω̇ = N/J    ẋ = v cosθ    ẏ = v sinθ       (11), (15), (12), (17)
 
 Under a constant wrench θ(t) is known; the rest is Simpson's rule, of fourth order as the plant is
-that integrates (30). Floats, or arrays (N,) of many climbers at once; numbers are those of `Plant`
-to its own error. Within a step, friction stops a climber or gives way once, at the exact instant.
+that integrates (30). Floats, or arrays (N,) of many climbers at once; it agrees with `Plant` to the
+latter's error. Within a step, friction stops a climber or gives way once, at the exact instant.
 """
 
 from typing import Any, NamedTuple
@@ -27,7 +27,7 @@ ITERATIONS = 5  # of Newton's method to an instant within a step; each squares w
 
 
 class UnicycleModel(NamedTuple):
-    """What of a climber matters to its motion."""
+    """The parameters of (11) and (15), of one climber or of many."""
 
     mass: Any  # [kg]
     yaw_inertia: Any  # [kg m²]
@@ -36,23 +36,23 @@ class UnicycleModel(NamedTuple):
 
     @classmethod
     def of(cls, climber: Climber) -> "UnicycleModel":
-        """That of a climber, or of many."""
+        """Model of a climber whose parameters are floats, or arrays (N,)."""
         gravity = GRAVITY * sin(climber.inclination * DEGREE)
         return cls(climber.mass, climber.yaw_inertia, climber.seal_friction, gravity)
 
     def under(self, wrench: Wrench) -> "Accelerations":
-        """It, with what a wrench does to it."""
+        """Accelerations by friction, gravity and a wrench [N, N m]."""
         mass, yaw_inertia, friction, gravity = self
         return Accelerations(
-            wrench.drive / mass, wrench.turn / yaw_inertia, friction / mass, gravity
+            wrench.force / mass, wrench.moment / yaw_inertia, friction / mass, gravity
         )
 
 
 class Accelerations(NamedTuple):
-    """What accelerates a climber."""
+    """What accelerates a climber during a step, by its mass and its yaw inertia."""
 
-    drive: Any  # F/m [m/s²]
-    turning: Any  # ω̇ = N/J [rad/s²]
+    forward: Any  # F/m [m/s²]
+    yaw: Any  # ω̇ = N/J [rad/s²]
     friction: Any  # f/m [m/s²]
     gravity: Any  # g_t [m/s²]
 
@@ -65,34 +65,34 @@ def advanced(body: UnicycleModel, motion: Motion, wrench: Wrench, time: float) -
 def advanced_often(
     body: UnicycleModel, motion: Motion, wrench: Wrench, time: float, steps: int
 ) -> Motion:
-    """Motion after `steps` such steps."""
+    """Motion after `steps` steps of `time` [s] under a constant wrench."""
     keep_what_is_freed()
-    pushed = body.under(wrench)
+    rates = body.under(wrench)
     for _ in range(steps):
-        motion = stepped(pushed, motion, time)
+        motion = stepped(rates, motion, time)
     return motion
 
 
-def stepped(pushed: Accelerations, motion: Motion, time: float) -> Motion:
-    """Motion after a step of `time` [s]."""
-    end = slid(pushed, motion, with_sign_of(pushed.friction, motion.speed), time)
+def stepped(rates: Accelerations, motion: Motion, time: float) -> Motion:
+    """Motion after a step of `time` [s], in which the seal may stick and slide."""
+    end = slid(rates, motion, with_sign_of(rates.friction, motion.speed), time)
     if everywhere(motion.speed * end.speed > 0):
         return end
     direction, rests = with_sign_of(1.0, motion.speed), motion.speed == 0
-    end = amended(direction * end.speed < 0, end, _stopped, pushed, motion, direction, time)
-    return amended(rests, end, _from_rest, pushed, motion, time)
+    end = amended(direction * end.speed < 0, end, _to_rest, rates, motion, direction, time)
+    return amended(rests, end, _from_rest, rates, motion, time)
 
 
-def slid(pushed: Accelerations, motion: Motion, rubbing: Any, time: Any) -> Motion:
-    """Motion `time` [s] later of a climber whose seal slides: friction decelerates by `rubbing`."""
-    x, y, heading, c_0, s_0, v_0, omega = motion
-    faster = 0.5 * time * pushed.turning  # in half of the time
+def slid(rates: Accelerations, motion: Motion, friction: Any, time: Any) -> Motion:
+    """Motion `time` [s] later while the seal slides, decelerated by `friction` [m/s²]."""
+    x, y, heading, c_0, s_0, v_0, omega = motion  # an inner loop: faster than attributes
+    faster = 0.5 * time * rates.yaw  # in half of the time
     omega_1 = omega + faster
     halfway, angle = 0.5 * time * (omega + 0.5 * faster), time * omega_1
     c_1, s_1, heading, c_2, s_2 = swept(heading, c_0, s_0, halfway, angle)
     part = time / 6
-    fall = part * pushed.gravity
-    v_2 = v_0 + (time * (pushed.drive - rubbing) - fall * (s_0 + 4 * s_1 + s_2))
+    fall = part * rates.gravity
+    v_2 = v_0 + (time * (rates.forward - friction) - fall * (s_0 + 4 * s_1 + s_2))
     v_14 = 2 * (v_0 + v_2) - 3 * fall * (s_0 - s_2)  # four times the speed halfway
     return Motion(
         x + part * (v_0 * c_0 + v_14 * c_1 + v_2 * c_2),
@@ -105,48 +105,51 @@ def slid(pushed: Accelerations, motion: Motion, rubbing: Any, time: Any) -> Moti
     )
 
 
-def _held(pushed: Accelerations, motion: Motion, time: Any) -> Motion:
-    """Motion `time` [s] later of a climber that friction holds: it may turn on the spot."""
+def _stuck(rates: Accelerations, motion: Motion, time: Any) -> Motion:
+    """Motion `time` [s] later while the seal sticks: it may only yaw on the spot."""
     x, y, heading, cosine, sine, v, omega = motion
-    angle = time * (omega + time / 2 * pushed.turning)
+    angle = time * (omega + time / 2 * rates.yaw)
     heading, cosine, sine = rotated(heading, cosine, sine, angle)
-    return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * pushed.turning)
+    return Motion(x, y, heading, cosine, sine, 0.0 * v, omega + time * rates.yaw)
 
 
-def _push(pushed: Accelerations, motion: Motion) -> Any:
-    """What friction at rest is up against [m/s²]."""
-    return pushed.drive - pushed.gravity * motion.sine
+def _applied(rates: Accelerations, motion: Motion) -> Any:
+    """Forward acceleration [m/s²] without friction."""
+    return rates.forward - rates.gravity * motion.sine
 
 
-def _from_rest(pushed: Accelerations, motion: Motion, time: Any) -> Motion:
-    """Motion after a step, or what is left of one, that begins at rest."""
-    push = _push(pushed, motion)
-    end = _held(pushed, motion, time)
-    later = abs(_push(pushed, end)) > pushed.friction
-    end = amended(later, end, _given_way, pushed, motion, end, time)
-    starts = abs(push) > pushed.friction
-    return amended(starts, end, slid, pushed, motion, sign(push) * pushed.friction, time)
+def _from_rest(rates: Accelerations, motion: Motion, time: Any) -> Motion:
+    """Motion after `time` [s] that begin at rest."""
+    applied = _applied(rates, motion)
+    end = _stuck(rates, motion, time)
+    later = abs(_applied(rates, end)) > rates.friction
+    end = amended(later, end, _broken_loose, rates, motion, end, time)
+    starts = abs(applied) > rates.friction
+    return amended(starts, end, slid, rates, motion, sign(applied) * rates.friction, time)
 
 
-def _stopped(pushed: Accelerations, motion: Motion, direction: Any, time: Any) -> Motion:
-    """Motion after a step within which the climber comes to rest."""
-    until, there, rubbing = 0.0 * motion.speed, motion, direction * pushed.friction
+def _to_rest(rates: Accelerations, motion: Motion, direction: Any, time: Any) -> Motion:
+    """Motion after a step in which a climber that slides in `direction` comes to rest."""
+    until, there, friction = 0.0 * motion.speed, motion, direction * rates.friction
     for _ in range(ITERATIONS):
-        slope = _push(pushed, there) - rubbing
+        slope = _applied(rates, there) - friction
         until = clipped(until - there.speed / slope, 0.0, time)
-        there = slid(pushed, motion, rubbing, until)
+        there = slid(rates, motion, friction, until)
     x, y, heading, cosine, sine, v, omega = there
     there = Motion(x, y, heading, cosine, sine, 0.0 * v, omega)
-    return _from_rest(pushed, there, time - until)
+    return _from_rest(rates, there, time - until)
 
 
-def _given_way(pushed: Accelerations, motion: Motion, end: Motion, time: Any) -> Motion:
-    """Motion after a step within which what friction holds, turning, becomes too much for it."""
-    way, until, there = sign(_push(pushed, end)), time + 0.0 * end.x, end
-    rubbing = way * pushed.friction
+def _broken_loose(rates: Accelerations, motion: Motion, end: Motion, time: Any) -> Motion:
+    """Motion after a step that begins at rest, and in which yawing overcomes stiction.
+
+    `end` is the motion as if it stuck throughout.
+    """
+    direction, until, there = sign(_applied(rates, end)), time + 0.0 * end.x, end
+    friction = direction * rates.friction
     for _ in range(ITERATIONS):
-        slope = -pushed.gravity * there.cosine * there.yaw_rate
-        over = _push(pushed, there) - rubbing
+        slope = -rates.gravity * there.cosine * there.yaw_rate
+        over = _applied(rates, there) - friction
         until = clipped(until - over / select(slope == 0, float("inf"), slope), 0.0, time)
-        there = _held(pushed, motion, until)
-    return slid(pushed, there, rubbing, time - until)
+        there = _stuck(rates, motion, until)
+    return slid(rates, there, friction, time - until)

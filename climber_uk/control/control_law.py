@@ -88,7 +88,7 @@ class Command(NamedTuple):
     @property
     def constraint_force(self) -> Array:
         """Drive [N], lateral [N], about z [N m], (..., 3): x, y, z of a wrench's message."""
-        return pack(self.demanded.drive, self.lateral, self.demanded.turn)
+        return pack(self.demanded.force, self.lateral, self.demanded.moment)
 
     @property
     def missing(self) -> Array:
@@ -146,7 +146,7 @@ class ControlLaw:
             drive, turn, lateral = solve(prepared, predicted)
             wanted = Wrench(drive - r_drive, turn - r_turn)
             drive, turn, tau_r, tau_l, fits = climber.saturate(*wanted, right, left)
-        lost = NOTHING if fits else Wrench(wanted.drive - drive, wanted.turn - turn)
+        lost = NOTHING if fits else Wrench(wanted.force - drive, wanted.moment - turn)
         return Command(Torques(tau_r, tau_l), wanted, lateral, lost)
 
     def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:

@@ -215,10 +215,10 @@ class Guard:
         explained = self.adhesion.force(climber) + climber.mass * GRAVITY
         most = self.options.max_disturbance * explained
         moment = most * climber.half_track
-        if most == 0 or (abs(disturbance.drive) <= most and abs(disturbance.turn) <= moment):
+        if most == 0 or (abs(disturbance.force) <= most and abs(disturbance.moment) <= moment):
             return None
         return Mode.DISTURBED, (
-            f"{disturbance.drive:.0f} N, {disturbance.turn:.0f} N m; "
+            f"{disturbance.force:.0f} N, {disturbance.moment:.0f} N m; "
             f"explained are {most:.0f} N, {moment:.0f} N m"
         )
 

@@ -30,8 +30,8 @@ FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 
 
-def predict(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float) -> Motion:
-    """Motion `time` [s] later under a constant drive [N] and turn [N m], by the midpoint rule.
+def predict(climber: Climber, motion: Motion, force: Any, moment: Any, time: float) -> Motion:
+    """Motion `time` [s] later under a constant force [N] and moment [N m], by the midpoint rule.
 
     Both include the disturbance. Below `SLOW`, where the sign of a measured speed tells nothing,
     friction is taken to balance what pushes, up to f: while that suffices the speed stays as it is,
@@ -39,10 +39,10 @@ def predict(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float
     """
     mass, inertia, friction, weight = climber.inertial
     x, y, heading, cosine, sine, v, omega = motion
-    half, omega_1 = 0.5 * time, turn / inertia
+    half, omega_1 = 0.5 * time, moment / inertia
     halfway, angle = half * (omega + 0.5 * half * omega_1), time * (omega + half * omega_1)
     c, s, heading, cosine, sine = swept(heading, cosine, sine, halfway, angle)
-    push = drive - weight * s
+    push = force - weight * s
     # sliding, friction is all of f, against the motion; at rest, as much as is pushed against it
     rubbing, slides = with_sign_of(friction, v), abs(v) > SLOW
     if not (slides is True or everywhere(slides)):
@@ -62,15 +62,15 @@ def predict(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float
 class DisturbanceEstimate(NamedTuple):
     """What is known of the disturbance: itself, and how it changes."""
 
-    drive: Any = 0.0  # r_F [N]
-    turn: Any = 0.0  # r_N [N m]
-    drive_rate: Any = 0.0  # [N/s]
-    turn_rate: Any = 0.0  # [N m/s]
+    force: Any = 0.0  # r_F [N]
+    moment: Any = 0.0  # r_N [N m]
+    force_rate: Any = 0.0  # [N/s]
+    moment_rate: Any = 0.0  # [N m/s]
 
     @property
     def held(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
-        return DisturbanceEstimate(self.drive, self.turn)
+        return DisturbanceEstimate(self.force, self.moment)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,18 +123,18 @@ class Observer:
             return self._from_pose(climber, learnt, expected, found, time)
         if everywhere(self.bandwidth == 0):
             return found, _faded(learnt, time)
-        drive, turn, drive_rate, turn_rate = learnt
+        force, moment, force_rate, moment_rate = learnt
         mass, inertia, _, _ = climber.inertial
         new, newer = shares
         faster = (found.speed - expected.speed) / time
         turning = (found.yaw_rate - expected.yaw_rate) / time
-        drive, turn = drive + time * drive_rate, turn + time * turn_rate
-        drive, turn = drive + new * mass * faster, turn + new * inertia * turning
+        force, moment = force + time * force_rate, moment + time * moment_rate
+        force, moment = force + new * mass * faster, moment + new * inertia * turning
         # at rest, where friction holds whatever it is, nothing tells of a change
         slides = abs(expected.speed) > REST
-        drive_rate = select(slides, drive_rate + newer / time * mass * faster, 0.0)
-        turn_rate = turn_rate + newer / time * inertia * turning
-        return found, DisturbanceEstimate(drive, turn, drive_rate, turn_rate)
+        force_rate = select(slides, force_rate + newer / time * mass * faster, 0.0)
+        moment_rate = moment_rate + newer / time * inertia * turning
+        return found, DisturbanceEstimate(force, moment, force_rate, moment_rate)
 
     def shares(self, time: float, delay: float) -> tuple[Any, Any]:
         """What of an acceleration that was not expected is put down to the disturbance.
@@ -169,10 +169,10 @@ class Observer:
         v, omega = v + h / time * ahead, omega + h / time * turned
         motion = Motion(x, y, *rotated(heading, cosine, sine, g * turned), v, omega)
         mass, inertia, _, _ = climber.inertial
-        drive = learnt.drive + k / time**2 * mass * ahead
-        return motion, DisturbanceEstimate(drive, learnt.turn + k / time**2 * inertia * turned)
+        force = learnt.force + k / time**2 * mass * ahead
+        return motion, DisturbanceEstimate(force, learnt.moment + k / time**2 * inertia * turned)
 
 
 def _faded(learnt: DisturbanceEstimate, time: float) -> DisturbanceEstimate:
     left = exp(-time / FORGETTING_TIME)
-    return DisturbanceEstimate(learnt.drive * left, learnt.turn * left)
+    return DisturbanceEstimate(learnt.force * left, learnt.moment * left)

@@ -111,7 +111,7 @@ class SampledController:
     @property
     def disturbance(self) -> Wrench:
         """What pushes and turns the climber besides what the model knows."""
-        return Wrench(self.learnt.drive, self.learnt.turn)
+        return Wrench(self.learnt.force, self.learnt.moment)
 
     @disturbance.setter
     def disturbance(self, disturbance: Wrench) -> None:
@@ -178,9 +178,9 @@ class SampledController:
         if target is None:
             return None
         command = law.command(situation, target)
-        if self.pacing.catch_up > 0 and abs(command.lost.drive) > CUT:
+        if self.pacing.catch_up > 0 and abs(command.lost.force) > CUT:
             progress = progress.slowed(
-                command.lost.drive / law.climber.mass, preview, aim, self.period
+                command.lost.force / law.climber.mass, preview, aim, self.period
             )
             command = law.command(situation, progress.target(preview, aim) or target)
         wheels, _, _, (drive, turn) = command

@@ -1,6 +1,6 @@
 """`run_demo --config FILE`: the nodes and a recorder, in processes of their own, once.
 
-All of it happens on this machine, in a ROS domain of its own unless ROS_DOMAIN_ID is set.
+They run on this computer, in a ROS domain of their own unless ROS_DOMAIN_ID is set.
 """
 
 import argparse
@@ -31,17 +31,17 @@ from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import ignore_end, on_end
 
-# One topic of each node that only the recorder subscribes, and does once it has found the node.
-FOUND = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")
+# One topic of each node that the recorder alone subscribes, which it does once it knows the node
+RECORDED = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")
 FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
 START_TIMEOUT = 60.0  # [s]
 STOP_TIMEOUT = 20.0  # [s] for the recorder, and then for the nodes
-HURRIED = 3.8, 1.0  # [s] the same, once more than one signal has come
+HURRIED_TIMEOUTS = 3.8, 1.0  # [s] of recorder and nodes, after more than one signal
 
 
 class Ended(RuntimeError):  # noqa: N818 - it is what happened
-    """A process, of a `name`, ended that should go on."""
+    """A process that should go on has ended; `name` is the key of its log."""
 
     def __init__(self, name: str, status: int) -> None:
         super().__init__(f"{name} ended with status {status}")
@@ -49,21 +49,21 @@ class Ended(RuntimeError):  # noqa: N818 - it is what happened
 
 
 class Interrupted(Exception):  # noqa: N818 - as above
-    """A signal came."""
+    """A signal to end has come."""
 
 
 @dataclass(frozen=True)
 class DemoOptions:
-    """How long the demonstration takes."""
+    """Duration of the demonstration."""
 
-    duration: float = parameter(20.0, "s", "of the trajectory that is run", above=0)
+    duration: float = parameter(20.0, "s", "how long the trajectory is run", above=0)
 
     def __post_init__(self) -> None:
         check(self)
 
 
 class Demo(ClimberNode):
-    """Starts the trajectories once everybody listens, and watches the time go by."""
+    """Starts the trajectories once all nodes are connected, and waits for their duration."""
 
     def __init__(
         self, climbers: Sequence[str], signals: Sequence[int], arguments: Sequence[str]
@@ -76,7 +76,7 @@ class Demo(ClimberNode):
         self.parameters.refuse_unknown()
         self.duration = self.parameters.read(DemoOptions).duration
         self.time: float | None = None  # [s] of the plant
-        self.fall = ""  # what the plant said of it
+        self.fall = ""  # diagnostics of a fall
         self.subscription(FluidPressure, f"{climbers[0]}/suction_pressure", self.on_pressure)
         self.subscription(DiagnosticArray, "/diagnostics", self.on_diagnostics)
         self.starters = [
@@ -85,18 +85,18 @@ class Demo(ClimberNode):
         ]
 
     def on_pressure(self, message: FluidPressure) -> None:
-        """Keep the time of what is published least often."""
+        """Keep the plant's time, by a topic that is not published often."""
         self.time = reading.nanoseconds(message.header.stamp) / SECOND
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
-        """Note that the climber fell."""
+        """Keep the message of a fall."""
         for status in message.status:
             if FELL in status.message:
                 self.fall = status.message
 
     def recorder_has_found_all(self) -> bool:
-        """Whether the recorder knows every node, and there are starts to ask for."""
-        topics = [f"{climber}/{topic}" for climber in self.climbers for topic in FOUND]
+        """Whether the recorder subscribes every node, and the services to start are there."""
+        topics = [f"{climber}/{topic}" for climber in self.climbers for topic in RECORDED]
         return all(starter.service_is_ready() for starter in self.starters) and all(
             self.count_publishers(topic) and self.count_subscribers(topic) for topic in topics
         )
@@ -118,7 +118,7 @@ class Demo(ClimberNode):
                 raise RuntimeError(f"waited {START_TIMEOUT:.0f} s in vain for {what}")
 
     def start(self, simulated: bool) -> None:
-        """Start every trajectory, once everybody has found everybody; raises as `wait` does."""
+        """Start every trajectory, once all nodes are connected; raises as `wait` does."""
         self.wait(self.recorder_has_found_all, "the recorder to find the nodes")
         for climber in [] if simulated else self.climbers:  # in lock-step none answers before
             answered: list[JointState] = []
@@ -131,7 +131,7 @@ class Demo(ClimberNode):
         self.wait(lambda: all(start.done() for start in started), "the trajectories to start")
 
     def run(self) -> None:
-        """Watch the trajectories for their duration; raises as `wait` does."""
+        """Wait for the duration, or a fall, and show the progress; raises as `wait` does."""
         self.wait(lambda: self.time is not None, "the plant")
         first = self.time or 0.0
         begin = shown = time.monotonic()
@@ -146,7 +146,7 @@ class Demo(ClimberNode):
             print(self.fall)
 
     def progress(self, passed: float, wall_time: float) -> str:
-        """Return a line about the time [s] that has passed, and on the wall clock."""
+        """Line of progress, by the plant's time [s] and the wall clock's [s]."""
         speed = passed / wall_time
         return f"{passed:6.1f} of {self.duration:.1f} s, {speed:4.1f} × real time"
 
@@ -160,7 +160,7 @@ def has_answered(torques: list[JointState]) -> bool:
 def running(
     commands: dict[str, list[str]], logs: Path, signals: Sequence[int]
 ) -> Iterator[Processes]:
-    """Processes of some commands, all ended whatever happens, the first one, a recorder, first."""
+    """Processes of commands by name; at the end all are stopped, the first, the recorder, first."""
     processes: Processes = {}
     try:
         for name, command in commands.items():
@@ -175,29 +175,29 @@ def running(
                 )
         yield processes
     finally:
-        # what a node sent last would be lost where its end is heard of first
+        # else a node's last messages would be lost, where its end is known before them
         groups = [*processes.values()][:1], [*processes.values()][1:]
-        for group, hurried in zip(groups, HURRIED, strict=True):
+        for group, hurried in zip(groups, HURRIED_TIMEOUTS, strict=True):
             end(group, partial(patience, signals, hurried))
 
 
 def patience(signals: Sequence[int], hurried: float) -> float:
-    """How long [s] processes may take to end, or `hurried` if more than one signal has come."""
+    """Time [s] for processes to end: `hurried` if more than one signal has come."""
     return hurried if len(signals) > 1 else STOP_TIMEOUT
 
 
 def log_of(name: str, logs: Path) -> Path:
-    """File that has what a process says."""
+    """File with the output of a process."""
     return logs / f"{name}.log"
 
 
 def executable(name: str, *arguments: str) -> list[str]:
-    """Command that starts an executable of this package."""
+    """Command of an executable of this package, with its arguments."""
     return [str(Path(sys.argv[0]).parent / name), *arguments]
 
 
 def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dict[str, list[str]]:
-    """Commands of the nodes by the names of their logs; climbers share one plant, and its time."""
+    """Commands of the nodes, by names of their logs; climbers share one plant, and its time."""
 
     def ros(*parameters: str, namespace: str = "") -> list[str]:
         given = [part for parameter in parameters for part in ("-p", parameter)]
@@ -205,7 +205,7 @@ def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dic
         return ["--ros-args", "--params-file", str(config), *where, *given]
 
     use_sim_time = f"use_sim_time:={str(simulated).lower()}"
-    # on the wall clock a climber that starts in motion needs everybody ready
+    # on the wall clock a climber that starts in motion needs all nodes ready
     delay = f"start_delay:={0.0 if simulated else 0.2}"
     commands = {}
     for climber in climbers:
@@ -225,7 +225,7 @@ def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dic
 
 
 def parse() -> argparse.Namespace:
-    """Return the options of the command line."""
+    """Options of the command line."""
     parser = Parser("run_demo", __doc__)
     parser.add_argument("--config", type=Path, required=True, help="parameter file of all nodes")
     parser.add_argument("--output", "-o", type=Path, required=True, help="new directory")
@@ -269,7 +269,7 @@ def main() -> None:
 
 
 def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequence[int]) -> None:
-    """Run nodes and recorder into a new directory, which is removed if nothing has begun."""
+    """Run nodes and recorder into a new directory; remove it if no trajectory was started."""
     bag, simulated = options.output / "bag", options.clock == "sim"
     commands = {
         "record_bag": executable("record_bag", "--output", str(bag)),

@@ -1,4 +1,4 @@
-"""Checks whatever publishes `odom`, row by row, and with `--move` how it takes torques.
+"""Checks the driver that publishes `odom`, row by row, and with `--move` how it takes torques.
 
 Parameters are those of the controller: its sections of the parameter files hold here as well.
 """
@@ -35,20 +35,20 @@ from climber_uk.system.command_line import Parser
 from climber_uk.system.signals import on_end
 
 NODE, CONTROLLER = "check_driver", "uk_torque_controller"
-PATIENCE = 10.0  # [s] for a publisher to be found
+DISCOVERY_TIMEOUT = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques
-CATCH_UP = 0.2  # [s] to hear what came while the first report was made, and is old
+FLUSH_TIME = 0.2  # [s] in which odometry from before the trial is received
 
 
 class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
-    """A signal came."""
+    """A signal to end has come."""
 
 
 @contextmanager
 def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
-    """Arguments of ROS, with a file of this node's own in the place of the controller's files.
+    """ROS arguments in which a file with the controller's parameters replaces the parameter files.
 
-    Raises `OSError`, or `ValueError` if a file has nothing for either.
+    Raises `OSError`, or `ValueError` if a file has none for this node or the controller.
     """
     known = {field.name for kind in (Names, Climber, ExpectedDriver) for field in fields(kind)}
     as_controller: list[Section] = []
@@ -72,7 +72,7 @@ def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
 
 
 def without_files(arguments: Sequence[str]) -> Iterator[str]:
-    """Arguments but for parameter files."""
+    """Arguments without parameter files."""
     skipped = False
     for word in arguments:
         if not skipped and word != "--params-file":
@@ -81,20 +81,20 @@ def without_files(arguments: Sequence[str]) -> Iterator[str]:
 
 
 class Spinner:
-    """Lets a node work; raises `Interrupted` once `ended()`."""
+    """Spins a node; raises `Interrupted` once `ended()`."""
 
     def __init__(self, node: DriverNode, ended: Callable[[], bool]) -> None:
         self.executor, self.ended = SingleThreadedExecutor(), ended
         self.executor.add_node(node)
 
     def once(self) -> None:
-        """Do one thing."""
+        """Spin for one callback, or 0.1 s."""
         self.executor.spin_once(timeout_sec=0.1)
         if self.ended():
             raise Interrupted
 
     def until(self, condition: Callable[[], bool], timeout: float) -> None:
-        """Go on until a condition holds, or for a time [s]."""
+        """Spin until a condition holds, at most for `timeout` [s]."""
         begin = time.monotonic()
         while not condition() and time.monotonic() < begin + timeout:
             self.once()
@@ -103,7 +103,7 @@ class Spinner:
 def check(
     options: argparse.Namespace, arguments: Sequence[str], ended: Callable[[], bool]
 ) -> report.Report:
-    """Listen, move if wanted, and look at what was seen; raises `Interrupted`."""
+    """Report after listening and, with `--move`, a trial; raises `Interrupted`."""
     node = DriverNode(arguments)
     for remark in node.parameters.remarks:
         say(remark)
@@ -116,37 +116,39 @@ def check(
             move(node, spin)
         return checks.report(node.evidence())
     finally:
-        node.let_go()
+        node.end_with_zero()
         spin.executor.shutdown()
         node.destroy_node()
 
 
 def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None:
-    """Hear odometry for a while, by the wall clock or by its stamps."""
-    spin.until(lambda: bool(node.count_publishers("odom")), PATIENCE)
+    """Collect odometry for `options.duration` [s] of the wall clock, or of its stamps."""
+    spin.until(lambda: bool(node.count_publishers("odom")), DISCOVERY_TIMEOUT)
     if not node.count_publishers("odom"):
         return
-    spin.until(lambda: node.hears, PATIENCE / 2)
-    node.arrivals.clear()  # when they came says nothing
+    spin.until(lambda: node.hears, DISCOVERY_TIMEOUT / 2)
+    node.arrivals.clear()  # their times of arrival are of no use
     if options.move and node.has_clock():
-        spin.until(lambda: node.simulated_for > 0 or len(node.arrivals) > COPIES, PATIENCE / 2)
-        if node.simulated_for == 0:  # in lock-step, and nobody answers
-            node.speak()
+        spin.until(
+            lambda: node.simulated_for > 0 or len(node.arrivals) > COPIES, DISCOVERY_TIMEOUT / 2
+        )
+        if node.simulated_for == 0:  # in lock-step, and no torque comes
+            node.start_commanding()
     duration = options.duration
-    longest = max(duration, PATIENCE / 2) if node.has_clock() else duration
-    spin.until(lambda: node.simulated_for > duration or node.disturbs, longest)
-    if node.disturbs:
-        node.hush()
+    longest = max(duration, DISCOVERY_TIMEOUT / 2) if node.has_clock() else duration
+    spin.until(lambda: node.simulated_for > duration or node.has_rival, longest)
+    if node.has_rival:
+        node.stop_commanding()
         spin.until(lambda: node.simulated_for > duration, longest)
 
 
 def move(node: DriverNode, spin: Spinner) -> None:
-    """Try the driver."""
-    if node.torques is None and node.simulated_for > 0:  # whoever answers may not be found yet
-        spin.until(lambda: any(is_known(n) for n in others_commanding(node)), PATIENCE / 2)
-    node.speak()
-    spin.until(lambda: node.is_heard, PATIENCE / 2)
-    spin.until(lambda: False, CATCH_UP)
+    """Run the trial."""
+    if node.torques is None and node.simulated_for > 0:  # another commander may not be found yet
+        spin.until(lambda: any(is_known(n) for n in others_commanding(node)), DISCOVERY_TIMEOUT / 2)
+    node.start_commanding()
+    spin.until(lambda: node.is_heard, DISCOVERY_TIMEOUT / 2)
+    spin.until(lambda: False, FLUSH_TIME)
     trial = node.begin_trial()
     while trial.stage is not None:
         spin.once()
@@ -154,7 +156,7 @@ def move(node: DriverNode, spin: Spinner) -> None:
 
 
 def plan(climber: Climber, bounds: Bounds) -> str:
-    """What is going to happen to the climber."""
+    """Announcement of the trial, for the user."""
     return (
         "the climber is going to turn left, drive forward, back and turn right, some 0.1 rad and "
         f"1 cm, by torques that rise until it moves, to {bounds.torque_share:g} of "
@@ -164,19 +166,19 @@ def plan(climber: Climber, bounds: Bounds) -> str:
 
 
 def say(text: str) -> None:
-    """Print a line that is no part of the report."""
+    """Print a line beside the report."""
     print(f"check_driver: {text}", file=sys.stderr, flush=True)
 
 
 def positive(text: str) -> float:
-    """Number above zero."""
+    """Finite number above 0, for `argparse`; raises `ValueError`."""
     if not 0 < (value := float(text)) < float("inf"):
         raise ValueError
     return value
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options of the command line."""
+    """Options of the command line."""
     parser = Parser(
         "check_driver",
         __doc__,

@@ -1,4 +1,4 @@
-"""All checks, in order: a new one is a function and an entry here."""
+"""The checks, in their order; a new one is a function and an entry here."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from climber_uk.driver_check.report import Finding, Report, Verdict, skipped
 
 
 class Check(NamedTuple):
-    """Looks at the evidence, unless one of some checks before found nothing that it could use."""
+    """A check, which is skipped if one of those that it comes `after` has failed."""
 
     look: Callable[[Evidence], Finding]
     after: tuple[str, ...] = ()
@@ -45,7 +45,7 @@ CHECKS: Mapping[str, Check] = {
 
 
 def report(seen: Evidence) -> Report:
-    """What each check says."""
+    """Findings of all checks, by name."""
     found: dict[str, Finding] = {}
     blocked: set[str] = set()
     for name, (look, after) in CHECKS.items():
@@ -59,5 +59,5 @@ def report(seen: Evidence) -> Report:
 
 
 def may_move(found: Report) -> bool:
-    """Whether odometry is good enough, and commands go to one climber only."""
+    """Whether a trial is safe: odometry is good, and one climber alone is commanded."""
     return not any(found[name].verdict is Verdict.FAIL for name in SAFE)

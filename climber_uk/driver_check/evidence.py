@@ -1,4 +1,4 @@
-"""What was seen of a driver: who publishes, what arrived and when, and which torques it was given.
+"""What was seen of a driver: its topics, its odometry with times of arrival, torques of a trial.
 
 Stamps and times of arrival are integers in nanoseconds.
 """
@@ -28,12 +28,12 @@ PLANAR = 0, 7, 35  # x, y and about z, on the diagonal of a covariance
 
 @dataclass(frozen=True)
 class ExpectedDriver:
-    """What the controller is told of the driver; the same names as there."""
+    """Parameters of the controller that describe the driver."""
 
     control_period: float = parameter(
         0.005, "s", "from an odometry to the next", above=0, at_most=1
     )
-    odometry_timeout: float = parameter(0.1, "s", "age at which odometry is stale", above=0)
+    odometry_timeout: float = parameter(0.1, "s", "age above which odometry is refused", above=0)
     transport_delay: float = parameter(
         0.0, "s", "from a torque's publication to its action", at_least=0
     )
@@ -43,27 +43,27 @@ class ExpectedDriver:
 
 
 class Endpoint(NamedTuple):
-    """Who publishes or subscribes a topic."""
+    """A publisher or subscription of a topic."""
 
     node: str
     kind: str  # the type's full name
-    fits: bool  # whether its QoS goes with that of the controller
+    fits: bool  # whether its QoS is compatible with the controller's
     reliable: bool
 
 
 @dataclass(frozen=True)
 class Graph:
-    """Who is there."""
+    """Publishers and subscriptions around the driver."""
 
     topic: str  # full name of odom
     odometry: Sequence[Endpoint]  # publishers
     commanded: Sequence[Endpoint]  # subscribers of wheel_torques
     elsewhere: Sequence[str]  # other topics with odometry
-    has_clock: bool  # whether somebody publishes /clock
+    has_clock: bool  # whether /clock is published
 
 
 class Arrival(NamedTuple):
-    """An odometry, and what the clocks said when the middleware received it [ns]."""
+    """An odometry, and the times of three clocks at which it was received [ns]."""
 
     message: "Odometry"
     wall: int
@@ -73,7 +73,7 @@ class Arrival(NamedTuple):
 
 @dataclass(frozen=True)
 class MotionSeen:
-    """Odometry in numbers: n messages, each stamp once."""
+    """Odometry as arrays: n messages, each stamp once."""
 
     stamp: Times  # (n,)
     pose: Array  # (n, 3) x [m], y [m], θ [rad], continuous
@@ -81,17 +81,17 @@ class MotionSeen:
 
     @cached_property
     def time(self) -> Array:
-        """Time (n,) [s] since the first one."""
+        """Time (n,) [s] since the first stamp."""
         time: Array = (self.stamp - self.stamp[:1]) / SECOND
         return time
 
     @cached_property
     def period(self) -> float:
-        """The usual time between two of them [s]."""
+        """Median time between two stamps [s]; 0 if there is one only."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
     @cached_property
-    def tells_means(self) -> bool:
+    def has_mean_twist(self) -> bool:
         """Whether twists are means of the period before, as of encoders; see `TwistKind`."""
         kind, motions = TwistKind(), self._motions()
         for before, now, time in zip(motions, motions[1:], np.diff(self.time), strict=False):
@@ -105,19 +105,19 @@ class MotionSeen:
 
     @cached_property
     def reaction(self) -> Array:
-        """What torques change (n, 2): forward speed [m/s], yaw rate [rad/s]."""
+        """Forward speed [m/s] and yaw rate [rad/s] (n, 2), which torques change."""
         return self.twist[:, [0, 2]]
 
 
 class Command(NamedTuple):
-    """Torques from a time on."""
+    """Torques in force from a time [ns] on."""
 
     time: int
     torques: Array  # (2,) right, left [N m]
 
 
-class Pulse(NamedTuple):
-    """When a pair of torques rose and fell."""
+class PulseTimes(NamedTuple):
+    """Begin and end [ns] of a pulse of torques."""
 
     turns: bool  # τR = -τL, else τR = τL
     begin: int
@@ -125,19 +125,19 @@ class Pulse(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What the driver was told to do."""
+class TrialRecord:
+    """The torques of a trial, and why it was stopped if it was."""
 
-    pulses: Sequence[Pulse]
+    pulses: Sequence[PulseTimes]
     commands: Sequence[Command]
-    highest: float  # [N m] torque a wheel may have been given
-    silence: tuple[int, int] | None = None  # in which it was told nothing
+    highest: float  # [N m] limit of a wheel's torque in the trial
+    silence: tuple[int, int] | None = None  # begin and end [ns] without commands
     trouble: str = ""  # why it was stopped before the end
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """All that was seen."""
+    """All that was seen of a driver, for the checks."""
 
     climber: Climber
     expected: ExpectedDriver
@@ -145,18 +145,18 @@ class Evidence:
     use_sim_time: bool
     graph: Graph
     arrivals: Sequence[Arrival]
-    trial: Trial | None = None
+    trial: TrialRecord | None = None
 
     @cached_property
     def stamps(self) -> Times:
-        """Stamps of all that arrived."""
+        """Stamps (n,) [ns] of all odometry, as it arrived."""
         return np.array(
             [reading.nanoseconds(a.message.header.stamp) for a in self.arrivals], np.int64
         )
 
     @cached_property
     def errors(self) -> list[str]:
-        """What is wrong with the numbers of messages."""
+        """Messages of what is unfit in odometry, one for each that is."""
         errors = []
         for arrival in self.arrivals:
             try:
@@ -167,7 +167,7 @@ class Evidence:
 
     @cached_property
     def covariances(self) -> Array:
-        """Planar ones (n, 6): of x, y, θ, and of their rates."""
+        """Covariances (n, 6), on the diagonal: of x, y, θ, and of their rates."""
         return np.array(
             [
                 [
@@ -181,7 +181,7 @@ class Evidence:
 
     @cached_property
     def motion(self) -> MotionSeen:
-        """Poses and twists, of messages that are good."""
+        """Odometry as arrays; raises `ValueError` if one is unfit."""
         return motion_of(self.arrivals)
 
 

@@ -1,4 +1,4 @@
-"""Who publishes odometry and who listens to torques, and whether the controller would meet them."""
+"""Publishers of odometry and subscriptions of torques, and whether their QoS fits."""
 
 from rclpy.duration import Infinite
 from rclpy.node import Node
@@ -20,7 +20,7 @@ OFFERED = QoSProfile(
 
 
 def graph(node: Node, topic: str) -> Graph:
-    """Who is there now besides `node`, which has subscribed `topic` as odom."""
+    """Graph as `node` sees it now, which has subscribed `topic` as odom."""
     odometry = node.get_publishers_info_by_topic("odom")
     commanded = node.get_subscriptions_info_by_topic("wheel_torques")
     return Graph(
@@ -37,13 +37,13 @@ def graph(node: Node, topic: str) -> Graph:
 
 
 def others_commanding(node: Node) -> list[str]:
-    """Names of those that publish torques besides `node`."""
+    """Full names of other nodes than `node` that publish torques."""
     names = map(_name, node.get_publishers_info_by_topic("wheel_torques"))
     return [name for name in names if name != node.get_fully_qualified_name()]
 
 
 def is_known(name: str) -> bool:
-    """Whether it is a node's name, not what stands for one that is not yet known."""
+    """Whether a name is a node's, not the placeholder of one that is still being discovered."""
     return "_NODE_NAME_UNKNOWN_" not in name
 
 

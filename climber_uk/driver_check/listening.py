@@ -1,4 +1,4 @@
-"""Checks of what a driver publishes, however it moves: topics and contents."""
+"""Checks of topics and contents, for which the climber need not move."""
 
 from collections import Counter
 
@@ -11,7 +11,7 @@ ODOMETRY, TORQUES = "nav_msgs/msg/Odometry", "sensor_msgs/msg/JointState"
 
 
 def topic(seen: Evidence) -> Finding:
-    """Odometry comes, on the topic and of the type that the controller listens to."""
+    """Odometry comes, on the topic and of the type that the controller subscribes."""
     graph, kinds = seen.graph, {end.kind for end in seen.graph.odometry}
     if not kinds:
         there = f"; there is {', '.join(graph.elsewhere)}" if graph.elsewhere else ""
@@ -26,7 +26,7 @@ def topic(seen: Evidence) -> Finding:
 
 
 def publishers(seen: Evidence) -> Finding:
-    """One publishes odometry."""
+    """Odometry has one publisher."""
     nodes = [end.node for end in seen.graph.odometry]
     if len(nodes) > 1:
         hint = "stop all but one, or remap the topics of the others"
@@ -35,7 +35,7 @@ def publishers(seen: Evidence) -> Finding:
 
 
 def qos(seen: Evidence) -> Finding:
-    """Who wants to receive odometry does."""
+    """The QoS of odometry fits that of its subscribers."""
     if not all(end.fits for end in seen.graph.odometry):
         hint = "publish with the default QoS: reliable, volatile, keep last, no deadline"
         return failed("the controller's subscription does not match", hint)
@@ -48,7 +48,7 @@ def qos(seen: Evidence) -> Finding:
 
 
 def commands(seen: Evidence) -> Finding:
-    """Torques are listened to."""
+    """The driver subscribes torques."""
     drivers = {end.node for end in seen.graph.odometry}
     if not drivers:
         return skipped("first mend topic")
@@ -68,7 +68,7 @@ def commands(seen: Evidence) -> Finding:
 
 
 def frames(seen: Evidence) -> Finding:
-    """Pose and twist are in the frames that the controller knows."""
+    """Pose and twist are in the controller's frames."""
     found = Counter((a.message.header.frame_id, a.message.child_frame_id) for a in seen.arrivals)
     wrong = [frames for frames in found if frames != seen.frames]
     if wrong:
@@ -83,7 +83,7 @@ def frames(seen: Evidence) -> Finding:
 
 
 def finite(seen: Evidence) -> Finding:
-    """Numbers are numbers, and turns are turns about z."""
+    """All numbers are finite, and orientations are rotations about z."""
     if seen.errors:
         share = f"{len(seen.errors)} of {len(seen.arrivals)} messages"
         if "orientation" in seen.errors[0]:
@@ -95,7 +95,7 @@ def finite(seen: Evidence) -> Finding:
 
 
 def covariance(seen: Evidence) -> Finding:
-    """Uncertainties are told."""
+    """Covariances are filled, and sound."""
     found = seen.covariances
     hint = "fill the diagonals for x, y, yaw: in m², rad², (m/s)², (rad/s)²; 1e-12 for exact ones"
     if not np.isfinite(found).all():

@@ -1,4 +1,4 @@
-"""Keeps all odometry that comes, and answers it with the torques of a trial."""
+"""The node of check_driver: collects odometry, and answers it with the torques of a trial."""
 
 import time
 from bisect import bisect_right
@@ -21,12 +21,12 @@ from climber_uk.messages import reading, writing
 from climber_uk.ros.running import ClimberNode
 
 MANY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
-SILENT, PATIENT = 0.5, 5.0  # [s] without odometry: no torque more; no trial more
-RECENT = 100  # messages that tell the period
+ZERO_AFTER, STOP_AFTER = 0.5, 5.0  # [s] without odometry: zero torque; end of the trial
+PERIOD_MESSAGES = 100  # by which the period is estimated
 
 
 class DriverNode(ClimberNode):
-    """Listens to odometry and, where it is on it to do so, answers."""
+    """Collects odometry and, once it commands, answers each with torques."""
 
     def __init__(self, arguments: Sequence[str] | None = None) -> None:
         super().__init__("check_driver", arguments=arguments)
@@ -37,19 +37,19 @@ class DriverNode(ClimberNode):
         self.simulated: list[tuple[int, int]] = []  # [ns] when it came, what /clock said
         self.heard_at = 0  # [ns] on the steady clock
         self.trial: Trial | None = None
-        self.torques: Publisher | None = None  # only once it is clear that nobody else commands
+        self.torques: Publisher | None = None  # only once no other node commands
         self.answer: JointState | None = None
         self.odometry = self.subscription(Odometry, "odom", self.on_odometry, MANY)
         self.subscription(Clock, "/clock", self.on_clock, MANY)
 
     def on_clock(self, message: Clock, info: dict[str, int]) -> None:
-        """Keep the simulated time."""
+        """Keep a simulated time, and when it was received."""
         self.simulated.append((info["received_timestamp"], reading.nanoseconds(message.clock)))
 
     def on_odometry(self, message: Odometry, info: dict[str, int]) -> None:
-        """Keep an odometry, and answer it if it is on this node to do so.
+        """Keep an odometry, and answer it if this node commands.
 
-        It came when the middleware received it: how long it then waited for this node is no
+        Its arrival is when the middleware received it: how long it then waited for this node is no
         property of the driver.
         """
         self.heard_at = time.monotonic_ns()
@@ -57,10 +57,10 @@ class DriverNode(ClimberNode):
         boot = self.heard_at - (time.time_ns() - came)
         self.arrivals.append(Arrival(message, came, boot, simulated=0))
         if self.torques is not None:
-            self.tell(message)
+            self.command(message)
 
-    def tell(self, message: Odometry) -> None:
-        """Answer an odometry, and the same one with the same."""
+    def command(self, message: Odometry) -> None:
+        """Answer an odometry with torques; a repeated one with the same torques."""
         stamp = reading.nanoseconds(message.header.stamp)
         if self.answer is None or stamp != reading.nanoseconds(self.answer.header.stamp):
             torques = self.decide(message, stamp)
@@ -69,12 +69,12 @@ class DriverNode(ClimberNode):
             self.torques.publish(self.answer)
 
     def message(self, torques: Array, stamp: int) -> JointState:
-        """Command of torques (right, left)."""
+        """Message of torques (2,) (right, left) [N m] that answers the odometry of `stamp` [ns]."""
         left, right = self.names.left_wheel_joint, self.names.right_wheel_joint
         return writing.wheel_torques(torques, stamp, left, right)
 
     def decide(self, message: Odometry, stamp: int) -> Array | None:
-        """Torques of now (right, left); none while there is no trial, but in simulated time."""
+        """Torques (2,) (right, left) [N m], or None; before a trial 0 in simulated time only."""
         if self.trial is None:
             return np.zeros(2) if self.has_clock() else None
         try:
@@ -85,46 +85,48 @@ class DriverNode(ClimberNode):
         return self.trial.torques(stamp, self.get_clock().now().nanoseconds, state)
 
     def has_clock(self) -> bool:
-        """Whether somebody publishes simulated time."""
+        """Whether /clock is published."""
         return bool(self.count_publishers("/clock"))
 
     @property
     def hears(self) -> bool:
-        """Whether odometry comes, and the simulated time if there is one."""
+        """Whether odometry has come, and a simulated time if there is one."""
         return bool(self.arrivals) and (bool(self.simulated) or not self.has_clock())
 
     @property
     def simulated_for(self) -> float:
-        """How much simulated time the stamps have passed through [s]."""
+        """Simulated time [s] between the first and the last stamp; 0 without."""
         if not (self.arrivals and self.has_clock()):
             return 0.0
         first, last = (self.arrivals[i].message.header.stamp for i in (0, -1))
         return (reading.nanoseconds(last) - reading.nanoseconds(first)) / SECOND
 
-    def speak(self) -> None:
-        """Be the one who commands, unless another is."""
+    def start_commanding(self) -> None:
+        """Begin to publish torques, unless another node does."""
         if self.torques is None and not others_commanding(self):
             self.torques = self.publisher(JointState, "wheel_torques")
 
     @property
-    def disturbs(self) -> bool:
-        """Whether another commands as well, who was found late."""
+    def has_rival(self) -> bool:
+        """Whether another node commands as well, which was discovered late."""
         return self.torques is not None and bool(others_commanding(self))
 
-    def hush(self) -> None:
-        """Command no more, and forget what was heard meanwhile."""
+    def stop_commanding(self) -> None:
+        """End publishing torques, and drop the odometry of meanwhile."""
         self.destroy_publisher(self.torques)
         self.torques = None
         self.arrivals.clear()
 
     @property
     def is_heard(self) -> bool:
-        """Whether somebody receives what this node commands."""
+        """Whether this node's torques have a subscription."""
         return self.torques is not None and self.torques.get_subscription_count() > 0
 
     def begin_trial(self) -> Trial:
-        """Begin one, or not: then its `trouble` says why."""
-        stamps = [reading.nanoseconds(a.message.header.stamp) for a in self.arrivals[-RECENT:]]
+        """Begin a trial; if it may not begin, its `trouble` says why."""
+        stamps = [
+            reading.nanoseconds(a.message.header.stamp) for a in self.arrivals[-PERIOD_MESSAGES:]
+        ]
         period = float(np.median(np.diff(np.unique(stamps)))) / SECOND
         climber, bounds = self.parameters.read(Climber), self.parameters.read(Bounds)
         self.trial = Trial(climber, bounds, self.arrivals, period, not self.use_sim_time)
@@ -132,37 +134,37 @@ class DriverNode(ClimberNode):
         return self.trial
 
     def watch(self, trial: Trial) -> None:
-        """Stop a trial if others command, nobody listens, or odometry has stopped."""
+        """Stop a trial if others command, nothing receives torques, or odometry has stopped."""
         if others := others_commanding(self):
             trial.stop(f"{', '.join(others)} publishes wheel_torques")
         elif not self.is_heard:
             trial.stop("nobody receives wheel_torques")
         silent = (time.monotonic_ns() - self.heard_at) / SECOND
-        if silent > PATIENT:
-            trial.stop(f"no odometry for {PATIENT:g} s")
-        elif silent > SILENT and not self.use_sim_time:
+        if silent > STOP_AFTER:
+            trial.stop(f"no odometry for {STOP_AFTER:g} s")
+        elif silent > ZERO_AFTER and not self.use_sim_time:
             self.release()
 
     def release(self) -> None:
-        """Command no torque."""
+        """Command zero torque."""
         if self.torques is not None and self.trial is not None:
             stamp = reading.nanoseconds(self.arrivals[-1].message.header.stamp)
             self.torques.publish(self.message(np.zeros(2), stamp))
 
-    def let_go(self) -> None:
-        """Command no torque, as the last word."""
+    def end_with_zero(self) -> None:
+        """Command zero torque, and wait until it is received."""
         self.release()
         if self.torques is not None:
             self.torques.wait_for_all_acked(Duration(seconds=1.0))
 
     def clocked_arrivals(self) -> list[Arrival]:
-        """All that arrived, each with the simulated time that had come before it."""
+        """All arrivals, each with the latest simulated time before it."""
         came = [came for came, _ in self.simulated]
-        told = [0, *(told for _, told in self.simulated)]
-        return [a._replace(simulated=told[bisect_right(came, a.wall)]) for a in self.arrivals]
+        clock = [0, *(now for _, now in self.simulated)]
+        return [a._replace(simulated=clock[bisect_right(came, a.wall)]) for a in self.arrivals]
 
     def evidence(self) -> Evidence:
-        """All that was seen until now."""
+        """Evidence of all that was seen until now."""
         return Evidence(
             climber=self.parameters.read(Climber),
             expected=self.parameters.read(ExpectedDriver),
@@ -175,5 +177,5 @@ class DriverNode(ClimberNode):
 
     @property
     def use_sim_time(self) -> bool:
-        """Whether this node's clock, as the controller's, is to be /clock."""
+        """Whether /clock is this node's clock, and so the controller's."""
         return bool(self.get_parameter("use_sim_time").value)

@@ -1,8 +1,8 @@
-"""Pairs of wheel torques that move a climber a little, whatever it is made of.
+"""Pulses of wheel torques that move a climber a little, whatever its mass and friction.
 
     τ = k t until it moves, then τ falls at the same rate until it stops
 
-so that nobody has to know how much friction and weight there are, and none gets more than it takes.
+so that friction and weight need not be known, and no torque is higher than it has to be.
 Times are in seconds.
 """
 
@@ -17,7 +17,7 @@ from climber_uk.mechanics.elementary import clipped, wrapped
 from climber_uk.mechanics.quantities import State
 
 GOALS = np.array([0.05, 0.2])  # [m/s], [rad/s] at which torques fall again: some 1 cm, 0.1 rad
-PLACES = np.array([0.01, 0.05])  # [m], [rad] at which they do if no speed is told
+PLACES = np.array([0.01, 0.05])  # [m], [rad] at which they do if odometry has no speed
 # [s] from the first motion to those goals, by the model: friction helps to stop a drive
 RISE_TIMES = 0.06, 0.1
 RISE_PERIODS = 4.0  # and at least so many odometry messages
@@ -25,19 +25,19 @@ LOWEST = 1.5  # times the highest level: √2 stops what nothing else brakes
 STOPPED = 0.1  # of the highest speed, at which what is left is damped
 RUNAWAY = 4.0  # of the goals, of which 2 are reached: damp at once
 DAMPING_TIME, REST_TIME = 0.1, 1.0  # [s] of the motion that is left, and the longest
-AT_REST = 0.05  # of the goals
-PUSH_TIME, PUSHED_BY = 0.15, 0.5  # [s], [rad/s²]: a turn that is left alone
-LOOK_TIME = 0.25  # [s] for which it is looked at after the watchdog's time
+REST_SHARE = 0.05  # of the goals, below which it is at rest
+PUSH_TIME, PUSHED_BY = 0.15, 0.5  # [s], [rad/s²] of yawing, before commands stop
+LOOK_TIME = 0.25  # [s] after the watchdog's time, in which the motion is judged
 
 
 class Stage(Protocol):
-    """What is commanded for a while."""
+    """Torques for a while."""
 
     def torques(self, time: float, state: State) -> Array | None:
-        """Torques (2,) right, left [N m] at a time since the stage's begin; None: say nothing."""
+        """Torques (2,) (right, left) [N m] at `time` [s] since the begin; None: send nothing."""
 
     def finish(self) -> None:
-        """Do nothing more but damp what motion there is."""
+        """From now on only damp the motion."""
 
     @property
     def done(self) -> bool:
@@ -45,7 +45,7 @@ class Stage(Protocol):
 
 
 class Pulse:
-    """A pair of torques that rises, falls and damps what motion is left."""
+    """A pair of torques τR = ±τL that rises, falls, and damps the motion that is left."""
 
     def __init__(
         self, turns: bool, sign: float, climber: Climber, period: float, limit: float
@@ -62,13 +62,13 @@ class Pulse:
         self.start: State | None = None
         self.rests, self.rested_at = False, 0.0
         self.top = self.level = self.highest = 0.0
-        self.reacts, self.sign = int(turns), sign  # which speed reacts, and which way
+        self.reacts, self.sign = int(turns), sign  # which speed reacts, and its sign
         self.falls = self.done = False
 
     def torques(self, time: float, state: State) -> Array:
-        """Torques of now."""
+        """See `Stage`."""
         self.start = self.start or state
-        # what was missed is not made up for: nobody saw what the torque did meanwhile
+        # missed periods are not made up for: their reaction was not seen
         step, self.last = min(time - self.last, self.longest_step), time
         shares = np.array([float(state.forward_speed), float(state.yaw_rate)]) / self.goals
         if self.rests:
@@ -81,7 +81,7 @@ class Pulse:
         return self.level * self.direction
 
     def rise(self, state: State, shares: Array, step: float) -> float:
-        """Level until something moves, or the limit is reached."""
+        """Level [N m] while it rises, until the climber moves or the limit is reached."""
         assert self.start is not None
         way = state.pose - self.start.pose
         places = np.array([np.hypot(*way[:2]), abs(wrapped(float(way[2])))])
@@ -94,7 +94,7 @@ class Pulse:
         return self.level + self.rate * step
 
     def fall(self, shares: Array, step: float) -> float:
-        """Level until it has almost stopped."""
+        """Level [N m] while it falls, until the climber has almost stopped."""
         share = self.sign * float(shares[self.reacts])
         self.highest = max(self.highest, share)
         level = self.level - self.rate * step
@@ -102,40 +102,40 @@ class Pulse:
         return self.rest(shares) if stopped or level < -LOWEST * self.top else level
 
     def finish(self) -> None:
-        """Do nothing more but damp what motion there is."""
+        """See `Stage`."""
         self.top = max(self.top, abs(self.level))
         self.rests = True
 
     def rest(self, shares: Array) -> float:
-        """Level that takes away what motion is left, little by little."""
+        """Level [N m] that damps the motion that is left."""
         self.finish()
         self.rested_at = self.rested_at or self.last
-        at_rest = bool(np.abs(shares).max() < AT_REST)
+        at_rest = bool(np.abs(shares).max() < REST_SHARE)
         self.done = at_rest or self.last - self.rested_at > REST_TIME
         level = -self.sign * float(shares[self.reacts]) * self.damping
         return 0.0 if self.done else clipped(level, -self.top, self.top)
 
 
 class Silence:
-    """A small turning torque, then none is commanded any more; at last the turn is damped."""
+    """A small yawing torque, then no command, to see the watchdog act; then damping."""
 
     def __init__(self, torque: float, watchdog_time: float, after: Pulse) -> None:
         self.torque, self.after = torque, after
         self.after.top = self.after.damping
-        self.speaks_at = PUSH_TIME + watchdog_time + LOOK_TIME
+        self.resumes_at = PUSH_TIME + watchdog_time + LOOK_TIME
 
     def torques(self, time: float, state: State) -> Array | None:
-        """Torques of now."""
-        if time < min(PUSH_TIME, self.speaks_at):
+        """See `Stage`."""
+        if time < min(PUSH_TIME, self.resumes_at):
             return self.torque * PAIR[1]
-        if time < self.speaks_at:
+        if time < self.resumes_at:
             return None
         self.after.finish()
-        return self.after.torques(time - self.speaks_at, state)
+        return self.after.torques(time - self.resumes_at, state)
 
     def finish(self) -> None:
-        """Do nothing more but damp what motion there is."""
-        self.speaks_at = 0.0
+        """See `Stage`."""
+        self.resumes_at = 0.0
 
     @property
     def done(self) -> bool:

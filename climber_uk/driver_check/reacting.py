@@ -14,23 +14,23 @@ NOT_MOVED = skipped("only with --move")
 
 
 def trial(seen: Evidence) -> Finding:
-    """The trial came to its end."""
+    """The trial was completed."""
     if seen.trial is None:
         return NOT_MOVED
     if seen.trial.trouble:
         hint = "stop it, hold it, stop all that commands it besides, and try again"
         return failed(f"stopped: {seen.trial.trouble}", hint)
-    return passed(f"torques up to {_most(seen):.2f} N m, of {seen.trial.highest:.2f} allowed")
+    return passed(f"torques up to {_peak(seen):.2f} N m, of {seen.trial.highest:.2f} allowed")
 
 
 def wheels(seen: Evidence) -> Finding:
-    """Each torque acts on its wheel, and the right way."""
+    """Each torque acts on its wheel, with its sign."""
     response = response_of(seen)
     if response is None:
         return NOT_MOVED
     if not np.isfinite(response.gains).any():
         hint = "are the motors on? If more friction is to be overcome, raise torque_share"
-        return failed(f"no reaction to torques up to {_most(seen):.2f} N m", hint)
+        return failed(f"no reaction to torques up to {_peak(seen):.2f} N m", hint)
     wiring, likeness = response.wiring
     if likeness < thresholds.LIKENESS:
         gains = np.array2string(response.gains, precision=2).replace("\n", "")
@@ -40,12 +40,12 @@ def wheels(seen: Evidence) -> Finding:
         return failed(wiring, "effort goes by the names in `name`; positive drives forward")
     if np.isnan(response.gains[0, 0]):
         hint = "more friction is to be overcome than the parameters say: raise torque_share"
-        return warned(f"turns rightly, but did not drive with {_most(seen):.2f} N m", hint)
+        return warned(f"turns rightly, but did not drive with {_peak(seen):.2f} N m", hint)
     return passed("right and left are right, and positive is forward")
 
 
 def gain(seen: Evidence) -> Finding:
-    """It accelerates as mass, inertia, wheel radius and half track say."""
+    """Accelerations are those of mass, yaw inertia, wheel radius and half track."""
     response = response_of(seen)
     if response is None:
         return NOT_MOVED
@@ -61,20 +61,20 @@ def gain(seen: Evidence) -> Finding:
 
 
 def latency(seen: Evidence) -> Finding:
-    """A torque acts soon."""
+    """A torque acts as late as `transport_delay` has it."""
     response = response_of(seen)
     if response is None:
         return NOT_MOVED
-    told = seen.expected.transport_delay
+    configured = seen.expected.transport_delay
     said = f"{1e3 * response.delay:.1f} ms from a torque to its acceleration"
-    said += f"; transport_delay says {1e3 * told:.1f} ms" if told else ""
+    said += f"; transport_delay says {1e3 * configured:.1f} ms" if configured else ""
     hint = f"set the controller's transport_delay to {response.delay:.3f}"
     bounds = thresholds.REACTION, thresholds.LATE_REACTION
-    return graded(abs(response.delay - told), bounds, said, hint, delay=response.delay)
+    return graded(abs(response.delay - configured), bounds, said, hint, delay=response.delay)
 
 
 def watchdog(seen: Evidence) -> Finding:
-    """A torque ends when no other comes."""
+    """The driver's watchdog: a torque ends when no other comes."""
     if seen.trial is None:
         return NOT_MOVED
     if seen.trial.silence is None:
@@ -90,6 +90,7 @@ def watchdog(seen: Evidence) -> Finding:
     return passed(f"pushes no more: {said}", acceleration=acceleration)
 
 
-def _most(seen: Evidence) -> float:
+def _peak(seen: Evidence) -> float:
+    """Highest torque of a wheel in the trial [N m]."""
     assert seen.trial is not None
     return max((float(np.abs(c.torques).max()) for c in seen.trial.commands), default=0.0)

@@ -1,4 +1,4 @@
-"""What the checks found: a verdict, a line and, where something is wrong, one hint."""
+"""Findings of the checks, each a verdict, a line and maybe a hint; as text and as JSON."""
 
 import json
 import math
@@ -13,16 +13,16 @@ class Verdict(Enum):
     PASS = "pass"
     WARN = "warn"
     FAIL = "fail"
-    SKIP = "skip"  # nothing was seen that could tell
+    SKIP = "skip"  # not enough was seen
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check says, and by which numbers."""
+    """Result of a check: verdict, line, hint, and its numbers."""
 
     verdict: Verdict
     said: str
-    hint: str = ""  # how to mend it
+    hint: str = ""  # how to mend what is wrong
     values: Mapping[str, float] = field(default_factory=dict)  # in SI units
 
 
@@ -30,29 +30,29 @@ Report = Mapping[str, Finding]  # by the name of the check
 
 
 def passed(said: str, **values: float) -> Finding:
-    """All is well."""
+    """Finding of a check that passes."""
     return Finding(Verdict.PASS, said, "", values)
 
 
 def warned(said: str, hint: str, **values: float) -> Finding:
-    """It works, but."""
+    """Finding of a check that passes with a warning."""
     return Finding(Verdict.WARN, said, hint, values)
 
 
 def failed(said: str, hint: str, **values: float) -> Finding:
-    """It must be mended."""
+    """Finding of a check that fails."""
     return Finding(Verdict.FAIL, said, hint, values)
 
 
 def skipped(said: str) -> Finding:
-    """Nothing can be told, and why."""
+    """Finding of a check that could not be made; `said` is why."""
     return Finding(Verdict.SKIP, said)
 
 
 def graded(
     badness: float, bounds: tuple[float, float], said: str, hint: str, **values: float
 ) -> Finding:
-    """Pass up to the first bound of what is wrong, warn up to the second, fail beyond or if nan."""
+    """Finding that passes up to the first bound, warns up to the second, else (or nan) fails."""
     warns, fails = bounds
     if badness <= warns:
         return passed(said, **values)
@@ -60,12 +60,12 @@ def graded(
 
 
 def has_failed(report: Report) -> bool:
-    """Whether anything has."""
+    """Whether any check has failed."""
     return any(finding.verdict is Verdict.FAIL for finding in report.values())
 
 
 def as_text(report: Report) -> str:
-    """Return a line for each check, and one for each hint."""
+    """Report as text: a line for each check, and one for each hint."""
     lines = []
     for name, finding in report.items():
         lines.append(f"{finding.verdict.value}  {name:<11}  {finding.said}")
@@ -75,7 +75,7 @@ def as_text(report: Report) -> str:
 
 
 def as_json(report: Report) -> str:
-    """Return all of it for a machine: the rows, and whether none has failed."""
+    """Report as JSON: the rows, and `ok` if none has failed."""
     rows = [
         {
             "check": name,

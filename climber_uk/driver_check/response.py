@@ -1,8 +1,8 @@
-"""What torques do to the climber, from pulses of the pairs τR = ±τL.
+"""Response of a climber to torques, fitted to pulses of the pairs τR = ±τL.
 
     speed(t) = speed₀ + G ∫ τ(t - L) dt + c t - κ ∫ speed dt
 
-while it slides one way: c and κ take up friction and weight, whatever they are. By (11) and (15)
+while it slides in one direction: c and κ stand for friction and weight. By (11) and (15)
 G = 2/(r m) for the drive and 2 d/(r J) for the turn. A speed that is the mean of the period before
 its stamp, as of encoders, is that of the period's middle.
 """
@@ -13,11 +13,11 @@ from functools import partial
 import numpy as np
 
 from climber_uk.driver_check import thresholds
-from climber_uk.driver_check.evidence import Evidence, MotionSeen, Trial
+from climber_uk.driver_check.evidence import Evidence, MotionSeen, TrialRecord
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 
-PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])  # wheels (right, left) of drive and turn
+PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])  # (right, left), to drive and to yaw
 COARSE = 20  # delays that are tried, and again so many around the best
 WIRINGS = {  # torque at the wheels (right, left) of the torques commanded
     "": [[1, 0], [0, 1]],
@@ -34,34 +34,34 @@ WIRINGS = {  # torque at the wheels (right, left) of the torques commanded
 
 
 def expected_gain(climber: Climber) -> Array:
-    """Accelerations per torque of each wheel of a pair (2,): [m/s² / N m], [rad/s² / N m]."""
-    drive, _ = climber.drive_and_turn(PAIR[0])
-    _, turn = climber.drive_and_turn(PAIR[1])
-    return np.array([drive / climber.mass, turn / climber.yaw_inertia])
+    """Accelerations (2,) per torque of the wheels of each pair: [m/s² / N m], [rad/s² / N m]."""
+    force, _ = climber.force_and_moment(PAIR[0])
+    _, moment = climber.force_and_moment(PAIR[1])
+    return np.array([force / climber.mass, moment / climber.yaw_inertia])
 
 
 @dataclass(frozen=True)
 class Fit:
-    """One speed in one pulse."""
+    """Fit of one speed in one pulse."""
 
     gain: float  # per torque of each wheel of the pair
     offset: float  # c
-    misfit: float  # sum of squares, of that of the speed
+    misfit: float  # sum of squares, by that of the speed
 
 
 @dataclass(frozen=True)
 class Response:
-    """Reactions to pairs of torques, of those that the model expects; nan: it did not move."""
+    """Gains of the pairs of torques, by those of the model; nan where it did not move."""
 
-    gains: Array  # (2, 2): of a drive, a turn (rows) on forward speed, yaw rate (columns)
+    gains: Array  # (2, 2): driving, yawing pair (rows) on forward speed, yaw rate (columns)
     offsets: Array  # (2, 2) c
     delay: float  # L [s]
 
     @property
     def wiring(self) -> tuple[str, float]:
-        """Key of WIRINGS that is most like it, and how like (cosine)."""
+        """Key of `WIRINGS` whose gains are most similar, and their cosine similarity."""
         found = self.gains.copy()
-        # where it drives, it does not turn; a drive may be less than the friction
+        # what drives does not yaw; a driving pair may be less than the friction
         found[np.isnan(found[:, 1]) & np.isfinite(found[:, 0]), 1] = 0.0
         known = np.isfinite(found)
         likeness = {
@@ -72,8 +72,8 @@ class Response:
         return best, likeness[best]
 
 
-def respond(motion: MotionSeen, trial: Trial, climber: Climber) -> Response:
-    """Response that explains the pulses, with the delay that explains them best."""
+def respond(motion: MotionSeen, trial: TrialRecord, climber: Climber) -> Response:
+    """Response with the delay and gains of the least misfit over all pulses."""
     at_rest = motion.stamp < trial.commands[0].time
     noise = np.std(motion.reaction[at_rest], axis=0) if at_rest.sum() > 1 else np.zeros(2)
     still = np.array([thresholds.STANDING_SPEED, thresholds.STANDING_RATE]) / 2
@@ -96,11 +96,11 @@ def respond(motion: MotionSeen, trial: Trial, climber: Climber) -> Response:
 
 
 def _fit_all(
-    motion: MotionSeen, trial: Trial, floor: Array, delay: float
+    motion: MotionSeen, trial: TrialRecord, floor: Array, delay: float
 ) -> dict[tuple[int, int], list[Fit]]:
-    """Fits by pair (drive, turn) and speed (forward, yaw rate), one for each pulse that moved."""
+    """Fits of each pulse that moved, by pair (0 drive, 1 yaw) and speed (0 forward, 1 yaw rate)."""
     begin = motion.stamp[0]
-    moments = motion.time - (motion.period / 2 if motion.tells_means else 0.0)
+    moments = motion.time - (motion.period / 2 if motion.has_mean_twist else 0.0)
     times = np.array([command.time - begin for command in trial.commands]) / SECOND
     torques = np.array([command.torques for command in trial.commands])
     impulse = np.vstack([np.zeros((1, 2)), np.cumsum(torques[:-1] * np.diff(times)[:, None], 0)])
@@ -118,6 +118,7 @@ def _fit_all(
 
 
 def _fit(time: Array, impulse: Array, speed: Array, floor: float) -> Fit | None:
+    """Least-squares fit of one pulse; None if it slid for too few messages."""
     slides = _sliding(speed, floor)
     if slides.stop - slides.start < thresholds.FEWEST:
         return None
@@ -125,7 +126,7 @@ def _fit(time: Array, impulse: Array, speed: Array, floor: float) -> Fit | None:
     way = np.concatenate([[0.0], np.cumsum(np.diff(time) * (speed[1:] + speed[:-1]) / 2)])
     columns = np.stack([impulse, time, np.ones_like(time), -way], axis=-1)
     found, *_ = np.linalg.lstsq(columns, speed, rcond=None)
-    if found[3] < 0:  # friction that falls with speed is over soon
+    if found[3] < 0:  # friction cannot fall with speed for long
         columns = columns[:, :3]
         found, *_ = np.linalg.lstsq(columns, speed, rcond=None)
     misfit = float(np.sum((columns @ found - speed) ** 2) / np.sum(speed**2))
@@ -133,7 +134,7 @@ def _fit(time: Array, impulse: Array, speed: Array, floor: float) -> Fit | None:
 
 
 def _sliding(speed: Array, floor: float) -> slice:
-    """Where it surely slides, one way: around the highest speed."""
+    """Messages around the highest speed in which it surely slides, in one direction."""
     if not len(speed) or np.abs(speed).max() < floor:
         return slice(0, 0)
     peak = int(np.argmax(np.abs(speed)))
@@ -144,19 +145,20 @@ def _sliding(speed: Array, floor: float) -> slice:
 
 
 def response_of(seen: Evidence) -> Response | None:
-    """Response to what was tried, if something was."""
+    """Response to the pulses of the trial; None without any."""
     if seen.trial is None or not seen.trial.pulses:
         return None
     return respond(seen.motion, seen.trial, seen.climber)
 
 
-def _cosine(one: Array, other: Array) -> float:
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(one @ other) / size if size else 0.0
+def _cosine(a: Array, b: Array) -> float:
+    """Cosine similarity of two vectors (n,)."""
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size else 0.0
 
 
 def pushed_on(motion: MotionSeen, silence: tuple[int, int]) -> tuple[float, float]:
-    """Yaw rate when a silence began [rad/s], and its acceleration at the silence's end [rad/s²]."""
+    """Yaw rate [rad/s] at the begin of a silence [ns], and yaw acceleration [rad/s²] at its end."""
     begin, end = silence
     last = (motion.stamp > end - (end - begin) // 3) & (motion.stamp <= end)
     slope, _ = np.polyfit(motion.time[last], motion.twist[last, 2], 1)

@@ -1,6 +1,6 @@
-"""Where a driver passes, and where it fails; each with its reason.
+"""Thresholds at which a driver passes or fails a check, each with its reason.
 
-What the machine that listens can spoil is judged by medians, so that a busy one fails no driver.
+What a busy computer can spoil is judged by medians, so that it fails no driver.
 """
 
 # Time
@@ -10,17 +10,17 @@ UNEVEN, VERY_UNEVEN = 0.1, 0.5  # typical error of a step of the stamps, in step
 OLD = 0.5  # of `odometry_timeout`, at which the controller refuses an odometry
 AHEAD = 0.02  # [s] of the clock: two computers synchronised by NTP, or a tick of /clock
 NEAREST_CLOCK = 10.0  # [s] from a clock that may be meant by a stamp; clocks are further apart
-FEWEST = 5  # messages that tell anything
-# [s] of a delay that is not told: half of what the controller bears, docs/control.md; its timeout
+FEWEST = 5  # messages of which a statistic is made
+# [s] of an unconfigured delay: half of what the controller bears, docs/control.md; its timeout
 REACTION, LATE_REACTION = 0.01, 0.1
 
 # Motion
-MOVED, TURNED = 0.005, 0.01  # [m], [rad] from which on a motion says something
-BLOCK = 0.05  # [s] over which speeds are compared with ways, as single steps are mostly noise
-RATIO_OFF, RATIO_WRONG = 0.1, 0.25  # of way and speed: rounding and noise; a wrong unit or radius
-GAP = 4.0  # periods from which on messages were lost, and with them what twist said
-TELLING = 0.2  # of the largest way of all blocks: the others are mostly noise
-NOTHING = 5e-4  # of the pose's way: less than a speed would be that is in km/s
+MOVED, TURNED = 0.005, 0.01  # [m], [rad] of a motion that is long enough to judge
+BLOCK = 0.05  # [s] over which speed and displacement are compared: steps are noise
+RATIO_OFF, RATIO_WRONG = 0.1, 0.25  # of pose and twist: rounding and noise; a wrong unit or radius
+GAP = 4.0  # periods from which on messages, and their twist, are lost
+TELLING = 0.2  # of a block's largest displacement: smaller ones are mostly noise
+NO_TWIST = 5e-4  # of the pose's displacement: less than a speed in km/s would be
 UNIT_OFF = 0.2  # by which a wrong unit may be missed, of 57.3
 SAME_FRAME = 0.05  # of the way: too small a difference to tell body from wall
 SLIP, MUCH_SLIP = 0.02, 0.1  # sideways, of the speed: noise; a wheel that slides or is misaligned
@@ -30,9 +30,7 @@ STANDING_SPEED, STANDING_RATE = 0.02, 0.05  # [m/s], [rad/s] that still are rest
 NOISES = 5.0  # standard deviations at rest that are no motion
 MOVING = 0.2  # of the highest speed: where friction surely slides
 LIKENESS = 0.9  # cosine of a reaction and the one it is taken for
-GAIN_OFF, GAIN_WRONG = (
-    1.2,
-    1.5,
-)  # times the model's: the controller learns the first, docs/control.md
+# times the model's: the controller learns the first, docs/control.md
+GAIN_OFF, GAIN_WRONG = 1.2, 1.5
 STILL_PUSHED = 0.5  # of the acceleration that a torque gave while it was commanded
 LONGEST_DELAY = 0.2  # [s] that is looked for

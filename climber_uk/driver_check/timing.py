@@ -1,4 +1,4 @@
-"""Checks of when a driver publishes, and of what its stamps say about that."""
+"""Checks of rate, jitter, age and clock of odometry, by its stamps and arrivals."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from climber_uk.mechanics import SECOND
 
 
 def rate(seen: Evidence) -> Finding:
-    """Odometry comes as often as the controller expects, by its stamps."""
+    """The rate of odometry, by its stamps, is the controller's."""
     steps = np.diff(np.unique(seen.stamps)) / SECOND
     if len(steps) < thresholds.FEWEST:
         if seen.graph.has_clock:
@@ -30,7 +30,7 @@ def rate(seen: Evidence) -> Finding:
 
 
 def jitter(seen: Evidence) -> Finding:
-    """Odometry is measured evenly, by its stamps; how evenly it comes is the machine's affair."""
+    """Odometry is measured evenly, by its stamps: arrivals depend on the computer's load."""
     steps = np.diff(np.unique(seen.stamps))
     # neither a gap nor two kinds of steps shall decide
     period = float(np.mean(np.sort(steps)[len(steps) // 20 : -(len(steps) // 20) or None]))
@@ -44,7 +44,7 @@ def jitter(seen: Evidence) -> Finding:
 
 
 def clock(seen: Evidence) -> Finding:
-    """Stamps are of the clock that the controller uses."""
+    """Stamps are of the controller's clock."""
     stamps = seen.stamps
     if not stamps.any():
         return failed("stamps are zero", "stamp each odometry with the time of its measuring")
@@ -81,7 +81,7 @@ def clock(seen: Evidence) -> Finding:
 
 
 def order(seen: Evidence) -> Finding:
-    """Stamps increase. In lock-step an odometry that was not answered comes again."""
+    """Stamps increase; only in lock-step an unanswered odometry is repeated."""
     steps, count = np.diff(seen.stamps), len(seen.stamps)
     backwards = int((steps < 0).sum())
     hint = "publish each measurement once, in order, with the time at which it was made"
@@ -94,13 +94,13 @@ def order(seen: Evidence) -> Finding:
 
 
 def age(seen: Evidence) -> Finding:
-    """Odometry is fresh when it comes."""
+    """Odometry is fresh when it arrives."""
     now = [a.simulated if seen.use_sim_time else a.wall for a in seen.arrivals]
     ages = (np.array(now) - seen.stamps) / SECOND
     typical, timeout = float(np.median(ages)), seen.expected.odometry_timeout
     value = {"age": typical, "age_99": float(np.quantile(ages, 0.99))}
     said = f"{1e3 * typical:.2f} ms old when it comes (99 %: {1e3 * value['age_99']:.2f} ms)"
-    # simulated time is told after the odometry, and not at each one
+    # /clock comes after the odometry, and not at each one
     ahead = thresholds.AHEAD + 2 * seen.expected.control_period * seen.use_sim_time
     if typical < -ahead:
         hint = "stamp the time of measuring; synchronise the computers' clocks"

@@ -1,4 +1,4 @@
-"""A trial: one stage after the other, from odometry to odometry, within bounds."""
+"""A trial: pulses of torque one after the other, from odometry to odometry, within bounds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,27 +16,25 @@ from climber_uk.mechanics.quantities import State, along
 from climber_uk.messages import reading
 from climber_uk.parameters.declaration import check, parameter
 
-RECENT = 20  # messages that tell whether it stands
-ORDER = True, False, False, True  # whether each pulse turns
-LATE = (
-    0.02  # [s] or periods of odometry, whichever is more, that odometry may come later than usual
-)
-LATE_PERIODS = 4
-TRIES = 20  # of stages in all, of which a busy machine spoils some
+REST_MESSAGES = 20  # by which it is judged whether the climber is at rest
+ORDER = True, False, False, True  # whether each pulse yaws, or drives
+# odometry is late by so much [s] or so many periods, whichever is more
+LATE, LATE_PERIODS = 0.02, 4
+TRIES = 20  # of stages in all, as a busy computer spoils some
 BACK = 0.005, 0.02  # [m], [rad] from its start at which the next pulse leads back
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """How far a trial may go."""
+    """Limits of a trial: torque, travel, yaw, and the watchdog's time."""
 
     torque_share: float = parameter(
-        0.5, "", "of `max_wheel_torque` that a trial may command", above=0, at_most=1
+        0.5, "", "of `max_wheel_torque` that a trial commands at most", above=0, at_most=1
     )
-    max_travel: float = parameter(0.15, "m", "from its start, at which a trial is stopped", above=0)
-    max_turn: float = parameter(0.6, "rad", "from its start, at which a trial is stopped", above=0)
+    max_travel: float = parameter(0.15, "m", "distance at which a trial is stopped", above=0)
+    max_turn: float = parameter(0.6, "rad", "yaw angle at which a trial is stopped", above=0)
     watchdog_time: float = parameter(
-        0.5, "s", "after which a torque must have ended if no other came", above=0
+        0.5, "s", "from the last command to the end of its torque, at most", above=0
     )
 
     def __post_init__(self) -> None:
@@ -44,10 +42,10 @@ class Bounds:
 
 
 class Trial:
-    """Turns left, drives forward, back, turns right, and is silent while it turns a little.
+    """Yaws left, drives forward and back, yaws right, and stops commanding during a small yaw.
 
-    A stage in which odometry came late, on the wall clock, is ended and tried again: nobody knows
-    from when on its torques acted.
+    A stage in which odometry came late, on the wall clock, is ended and repeated, as it is not
+    known from when on its torques acted.
     """
 
     def __init__(
@@ -65,7 +63,7 @@ class Trial:
         ages = [a.wall - reading.nanoseconds(a.message.header.stamp) for a in heard]
         self.usual_age = float(np.median(ages))  # [ns]
         self.commands: list[Command] = []
-        self.pulses: list[evidence.Pulse] = []
+        self.pulses: list[evidence.PulseTimes] = []
         self.silence: tuple[int, int] | None = None
         self.trouble = ""
         self.start: State | None = None
@@ -75,7 +73,7 @@ class Trial:
         self.begun_at = self.last = 0  # [ns] stamps: at which the stage began; the last one
 
     def next_stage(self) -> Stage | None:
-        """The first stage that is not yet done, or none."""
+        """The first stage that is not done yet; None if all are, or the trial is in trouble."""
         self.tries, self.spoilt, self.begun_at = self.tries + 1, False, 0
         if self.tries > TRIES:
             self.stop(f"odometry came late in {TRIES - len(self.pulses)} of {TRIES} pulses")
@@ -83,17 +81,17 @@ class Trial:
             return None
         if len(self.pulses) < len(ORDER):
             return self.pulse(ORDER[len(self.pulses)])
-        return self.turn_left_alone() if self.on_wall_clock and self.silence is None else None
+        return self.silence_in_a_yaw() if self.on_wall_clock and self.silence is None else None
 
     def pulse(self, turns: bool) -> Pulse:
-        """Pulse to the left or forward at first, then to the right or back, but never far away."""
+        """Pulse to the left or forward at first, then to the right or back, to stay near."""
         way, back = self.way[int(turns)], BACK[int(turns)]
         is_second = len(self.pulses) >= len(ORDER) / 2
         sign = -1.0 if way > back or (is_second and way > -back) else 1.0
         return Pulse(turns, sign, self.climber, self.period, self.limit)
 
-    def turn_left_alone(self) -> Silence | None:
-        """Silence in a turn, if it is known which torque turns it."""
+    def silence_in_a_yaw(self) -> Silence | None:
+        """Stage that tries the watchdog; None if no torque is known that yaws the climber."""
         response = respond(motion_of(self.heard), self.record(), self.climber)
         name, likeness = response.wiring
         gain, offset = response.gains[1, 1], response.offsets[1, 1]
@@ -103,16 +101,18 @@ class Trial:
         after = Pulse(True, 1.0, self.climber, self.period, self.limit)
         return Silence(torque, self.bounds.watchdog_time, after) if torque <= self.limit else None
 
-    def record(self) -> evidence.Trial:
-        """What was done so far."""
-        return evidence.Trial(self.pulses, self.commands, self.limit, self.silence, self.trouble)
+    def record(self) -> evidence.TrialRecord:
+        """Pulses, commands and trouble so far."""
+        return evidence.TrialRecord(
+            self.pulses, self.commands, self.limit, self.silence, self.trouble
+        )
 
     def stop(self, why: str) -> None:
-        """Say nothing more but zero, at once."""
+        """Command zero torque from now on; `why` is the trouble, unless there is one."""
         self.stage, self.trouble = None, self.trouble or why
 
     def torques(self, stamp: int, now: int, state: State) -> Array | None:
-        """Torques (2,) right, left [N m] that answer an odometry; None: say nothing."""
+        """Torques (2,) (right, left) [N m] that answer an odometry; None: send nothing."""
         self.keep_within_bounds(state)
         is_late = self.on_wall_clock and (
             now - stamp > self.usual_age + self.late or 0 < self.last < stamp - self.late
@@ -124,16 +124,16 @@ class Trial:
             if is_late:
                 self.spoilt = True
                 self.stage.finish()
-            torques = self.go_on(self.stage, stamp, state)
+            torques = self.stage_torques(self.stage, stamp, state)
         if torques is not None:
             self.commands.append(Command(max(stamp, now), torques))
         return torques
 
     def keep_within_bounds(self, state: State) -> None:
-        """Do not begin if it moves; if it has gone too far, only damp what motion there is."""
+        """Do not begin if the climber moves; only damp its motion if it has gone too far."""
         if self.start is None:
             self.start = state
-            speed, rate = np.median(np.abs(motion_of(self.heard[-RECENT:]).reaction), axis=0)
+            speed, rate = np.median(np.abs(motion_of(self.heard[-REST_MESSAGES:]).reaction), axis=0)
             if speed > thresholds.STANDING_SPEED or rate > thresholds.STANDING_RATE:
                 self.stop(f"it moves already, with {speed:.2f} m/s and {rate:.2f} rad/s")
         way = state.pose - self.start.pose
@@ -146,8 +146,8 @@ class Trial:
         if self.trouble and self.stage is not None:
             self.stage.finish()
 
-    def go_on(self, stage: Stage, stamp: int, state: State) -> Array | None:
-        """Torques of a stage, which may be its last."""
+    def stage_torques(self, stage: Stage, stamp: int, state: State) -> Array | None:
+        """Torques (2,) [N m] of a stage; begins the next one if it is done."""
         torques = stage.torques((stamp - self.begun_at) / SECOND, state)
         if torques is None:
             self.silence = self.silence[0] if self.silence else stamp, stamp
@@ -155,6 +155,6 @@ class Trial:
             if self.spoilt and isinstance(stage, Silence):
                 self.silence = None
             elif not self.spoilt and isinstance(stage, Pulse):
-                self.pulses.append(evidence.Pulse(stage.turns, self.begun_at, stamp))
+                self.pulses.append(evidence.PulseTimes(stage.turns, self.begun_at, stamp))
             self.stage = self.next_stage()
         return torques

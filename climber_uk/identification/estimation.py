@@ -145,7 +145,7 @@ class Task:
     def _gone(self, kind: str) -> Array:
         """Time, impulses of drive and turn, way and turn (5, n) in each window."""
         motion = self.motion
-        impulses: Any = self.climber.drive_and_turn(motion.impulse)
+        impulses: Any = self.climber.force_and_moment(motion.impulse)
         gone = np.stack([motion.time, *impulses, motion.way, motion.pose[:, 2]])
         ends = np.array([window[[0, -1]] for window in self.windows[kind]], np.intp).reshape(-1, 2)
         passed: Array = gone[:, ends[:, 1]] - gone[:, ends[:, 0]]

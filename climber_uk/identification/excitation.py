@@ -126,7 +126,7 @@ def driven(trajectory: Trajectory, climber: Climber) -> tuple[RecordedMotion, Ar
     heading, speed = np.unwrap(reference.heading), reference.speed
     resisted = climber.seal_friction * sign(speed) + climber.weight_along_wall * sin(heading)
     turn = climber.yaw_inertia * unpack(reference.acceleration)[2]
-    torques = climber.wheel_torques(climber.mass * reference.speed_rate + resisted, turn)
+    torques = climber.wheel_torques(climber.mass * reference.forward_acceleration + resisted, turn)
     motion = RecordedMotion(
         time=time,
         pose=np.column_stack([reference.pose[:, :2], heading]),

@@ -1,4 +1,4 @@
-"""What holds a climber on its wall, and how near it is to slipping, tipping and falling (§7).
+"""Adhesion to the wall, and the margins to slipping, tipping and falling off (§7).
 
     slip margin = μ_w N_w / |traction demanded|     tip margin = (F_a + m g_n) l/2 / (m g_t h)
 
@@ -15,14 +15,14 @@ from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sq
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.parameters.registry import Variants
 
-MAX_MARGIN = 100.0  # margins are told within ± that: without a demand there would be no end
+MAX_MARGIN = 100.0  # margins are clipped to ± this: where nothing is demanded they are infinite
 
 
 class Adhesion(Protocol):
     """What pulls a climber towards its wall."""
 
     def force(self, climber: Climber) -> float:
-        """F_a [N]."""
+        """Adhesion F_a [N], along the wall's normal."""
 
     # What most need not say:
 
@@ -44,13 +44,13 @@ class Adhesion(Protocol):
 
 @dataclass(frozen=True)
 class Suction(Adhesion):
-    """P S, of which a seal carries (1 - k), and rubs; the pump fills a volume that leaks.
+    """Suction force P S; its seal carries (1 - k) of it and rubs; the pumped volume leaks.
 
     Ṗ = (P_pump - P) / T_pump - P / T_leak, so that P ends at P_pump T_leak / (T_leak + T_pump).
     """
 
-    pump_time: float = parameter(0.0, "s", "T_pump; 0: at once", at_least=0)
-    leak_time: float = parameter(0.0, "s", "T_leak; 0: it does not leak", at_least=0)
+    pump_time: float = parameter(0.0, "s", "time constant T_pump; 0: pumped at once", at_least=0)
+    leak_time: float = parameter(0.0, "s", "time constant T_leak; 0: it does not leak", at_least=0)
 
     has_seal: ClassVar[bool] = True
 
@@ -67,7 +67,7 @@ class Suction(Adhesion):
         return pump if tight else pump * self.leak_time / (self.leak_time + self.pump_time)
 
     def pressure(self, before: Any, pump: Any, time: Any) -> Any:
-        """See `Adhesion`."""
+        """Pressure (...) [Pa] a `time` (...) [s] after `before` (...) [Pa]."""
         if self.pump_time == 0:
             return pump
         rate = 1 / self.pump_time + (1 / self.leak_time if self.leak_time > 0 else 0.0)
@@ -77,16 +77,16 @@ class Suction(Adhesion):
 
 @dataclass(frozen=True)
 class Magnetic(Adhesion):
-    """F₀ / (1 + gap/g₀)², as of a magnet whose flux crosses the gap twice; nothing slides."""
+    """Magnets: F₀ / (1 + gap/g₀)², as the flux crosses the gap twice; no seal rubs."""
 
     force_at_contact: float = parameter(
-        300.0, "N", "F₀, of the magnets on bare steel", at_least=0, plausible=(1, 1e5)
+        300.0, "N", "force F₀ of all magnets on bare steel", at_least=0, plausible=(1, 1e5)
     )
     gap: float = parameter(
-        0.0, "m", "of air or paint", at_least=0, runtime=True, plausible=(1e-6, 0.1)
+        0.0, "m", "of air or paint at the magnets", at_least=0, runtime=True, plausible=(1e-6, 0.1)
     )
     gap_of_a_quarter: float = parameter(
-        2e-3, "m", "g₀, which leaves a quarter of F₀", above=0, plausible=(1e-6, 0.1)
+        2e-3, "m", "gap g₀ at which a quarter of F₀ is left", above=0, plausible=(1e-6, 0.1)
     )
 
     def __post_init__(self) -> None:
@@ -100,7 +100,7 @@ class Magnetic(Adhesion):
 
 @dataclass(frozen=True)
 class NoAdhesion(Adhesion):
-    """Weight alone, as on a floor."""
+    """No adhesion: weight alone, as on a floor."""
 
     def force(self, climber: Climber) -> float:
         """See `Adhesion`."""
@@ -115,7 +115,7 @@ ADHESION = Variants[type[Adhesion]](
 def with_its_seal(climber: Climber, adhesion: str) -> Climber:
     """The climber with the friction that its kind of `ADHESION` has: none without a seal.
 
-    For models that know no more of what holds a climber than its own parameters.
+    For models that know of the adhesion only the parameters of `Climber`.
     """
     has_seal = ADHESION[adhesion].has_seal
     return climber if has_seal else replace(climber, seal_friction_coefficient=0.0)
@@ -123,15 +123,15 @@ def with_its_seal(climber: Climber, adhesion: str) -> Climber:
 
 @dataclass(frozen=True)
 class Grip:
-    """How a climber stands on its wall."""
+    """Wheels, seal and centre of mass on the wall, by which slipping and tipping are warned of."""
 
     wheel_friction_coefficient: float = parameter(
-        0.8, "", "μ_w of the wheels (or tracks) on the wall", at_least=0, plausible=(0.01, 3)
+        0.8, "", "μ_w on the wall; too high: slip comes unwarned", at_least=0, plausible=(0.01, 3)
     )
     wheel_inertia: float = parameter(
         2e-5,
         "kg m²",
-        "of a wheel about its axle, counted in mass and yaw inertia",
+        "of a wheel about its axle; mass and yaw inertia contain it",
         above=0,
         plausible=(1e-8, 1),
     )
@@ -144,7 +144,7 @@ class Grip:
     seal_radius: float = parameter(
         0.0,
         "m",
-        "of the ring that resists turning; 0: it does not",
+        "of the ring whose friction resists yawing; 0: none",
         at_least=0,
         plausible=(0.01, 1),
     )
@@ -155,7 +155,7 @@ class Grip:
 
 @dataclass(frozen=True, kw_only=True)
 class Attachment:
-    """All that a climber's hold on its wall depends on."""
+    """Adhesion and grip: what the normal force and the margins depend on."""
 
     adhesion: Adhesion = field(default_factory=Suction)
     grip: Grip = field(default_factory=Grip)
@@ -164,51 +164,61 @@ class Attachment:
         """Coulomb's friction f of the seal [N]."""
         return self.adhesion.seal_friction(climber)
 
-    def hold(self, climber: Climber, into_wall: Any) -> Any:
-        """Force (...) [N] that keeps it on the wall: F_a + m g_n; below 0 it falls.
+    def normal_force(self, climber: Climber, into_wall: Any) -> Any:
+        """F_a + m g_n (...) [N], which presses the climber onto its wall; below 0 it falls off.
 
-        `into_wall` (...) [m/s²] is g_n, and what curvature of the way adds to it.
+        `into_wall` (...) [m/s²] is g_n, with what a curved wall adds to it: see `Wall.into`.
         """
         return self.adhesion.force(climber) + climber.mass * into_wall
 
     def wheel_load(self, climber: Climber, into_wall: Any) -> Any:
-        """N_w (...) [N]: what the seal does not carry. f is that of the suction alone (§2.2)."""
+        """Load N_w (...) [N] on the wheels together: the normal force that the seal does not carry.
+
+        The seal carries its share of the suction, whatever the weight (§2.2).
+        """
         held_by_seal = 0.0
         if self.adhesion.has_seal:
             held_by_seal = (1 - climber.wheel_load_share) * self.adhesion.force(climber)
-        return clipped(self.hold(climber, into_wall) - held_by_seal, 0.0, float("inf"))
+        return clipped(self.normal_force(climber, into_wall) - held_by_seal, 0.0, float("inf"))
 
     def slip_margin(self, climber: Climber, into_wall: Any, drive: Any, lateral: Any) -> Any:
-        """μ_w N_w / √(drive² + lateral²) (...): below 1 a real climber slips; see `MAX_MARGIN`."""
+        """μ_w N_w / √(drive² + lateral²) (...): below 1 the wheels slip; at most `MAX_MARGIN`.
+
+        `drive` and `lateral` (...) [N] are what the wheels pass on, along and across the climber.
+        """
         traction = self.grip.wheel_friction_coefficient * self.wheel_load(climber, into_wall)
         return _margin(traction, sqrt(drive * drive + lateral * lateral))
 
     def tip_margin(self, climber: Climber, into_wall: Any, along_wall: Any) -> Any:
-        """Of the moments about the lower edge, holding to tipping (...): below 1 it tips."""
-        holding = self.hold(climber, into_wall) * self.grip.wheelbase / 2
+        """Holding moment by tipping moment about the lower edge (...): below 1 the climber tips.
+
+        `along_wall` (...) [m/s²] is gravity along the wall.
+        """
+        holding = self.normal_force(climber, into_wall) * self.grip.wheelbase / 2
         return _margin(holding, climber.mass * abs(along_wall) * self.grip.centre_height)
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """Margins that are worth a word; see `Attachment`."""
+    """Margins of slipping and tipping below which diagnostics warn; see `Attachment`."""
 
-    warn_margin: float = parameter(1.5, "", "below which margins warn", at_least=0, runtime=True)
+    warn_margin: float = parameter(1.5, "", "margin below which it warns", at_least=0, runtime=True)
     error_margin: float = parameter(
-        1.0, "", "below which they are errors", at_least=0, runtime=True
+        1.0, "", "margin below which it is an error", at_least=0, runtime=True
     )
 
     def __post_init__(self) -> None:
         check(self)
 
     def level(self, margin: float) -> int:
-        """0 for ample, 1 for a warning, 2 for an error."""
+        """Diagnostic level of a margin: 0 fine, 1 warning, 2 error."""
         return int(margin < self.warn_margin) + int(
             margin < min(self.error_margin, self.warn_margin)
         )
 
 
 def _margin(held: Any, demanded: Any) -> Any:
+    """`held` by `demanded` (>= 0), clipped to ± `MAX_MARGIN`."""
     within = abs(held) < MAX_MARGIN * demanded
     if everywhere(within):
         return held / demanded

@@ -1,7 +1,8 @@
 """The wheeled suction climber as M q̈ = Q + E(θ) τ under the no-slip row (11), (15), (17).
 
 q = (x, y, θ): the centre of mass in a frame fixed to the wall, x horizontal, y up, θ anticlockwise
-from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (right, left).
+from x. Arrays (..., 3) for q and its derivatives, (..., 2) for wheel torques (right, left). What
+takes a `Motion` or single torques works on components: floats, or arrays (N,) of many climbers.
 """
 
 import math
@@ -24,21 +25,28 @@ DEGREE = math.pi / 180  # [rad]
 class Climber:
     """Parameters of a two-wheel suction climber; the defaults are the paper's.
 
+    Where a value is wrong: too low a mass, inertia or friction, or too small a wheel, gives too
+    little torque, until the observer has learnt the rest; too high a pressure promises margins
+    that are not there; above the motors' true limit, torques are cut instead of saturated.
     Raises `ValueError` naming field, value and bound.
     """
 
-    mass: float = parameter(5.0, "kg", "mass m", above=0, plausible=(0.1, 300))
+    mass: float = parameter(
+        5.0, "kg", "mass m; too low: torques are too small", above=0, plausible=(0.1, 300)
+    )
     yaw_inertia: float = parameter(
         0.33, "kg m²", "inertia J about the centre of mass", above=0, plausible=(1e-4, 100)
     )
-    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0, plausible=(0.005, 0.5))
+    wheel_radius: float = parameter(
+        0.027, "m", "wheel radius r; too large: so are the torques", above=0, plausible=(0.005, 0.5)
+    )
     half_track: float = parameter(
         0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
     )
     seal_friction_coefficient: float = parameter(
         0.8,
         "",
-        "friction coefficient μ of the seal ring on the wall",
+        "friction coefficient μ of the seal on the wall; too high: it starts with a jerk",
         at_least=0,
         plausible=(0.01, 3),
     )
@@ -49,7 +57,7 @@ class Climber:
         2500.0, "Pa", "pressure difference P", at_least=0, runtime=True, plausible=(1000, 1e5)
     )
     suction_area: float = parameter(
-        0.06, "m²", "effective suction area S", at_least=0, plausible=(1e-4, 1)
+        0.06, "m²", "area S the pressure difference acts on", at_least=0, plausible=(1e-4, 1)
     )
     inclination: float = parameter(
         90.0,
@@ -60,12 +68,12 @@ class Climber:
         plausible=(3.2, 180),
     )
     max_wheel_torque: float = parameter(
-        20.0, "N m", "limit of each wheel's torque", above=0, plausible=(0.02, 300)
+        20.0, "N m", "limit of each wheel's torque, either way", above=0, plausible=(0.02, 300)
     )
     no_load_wheel_rate: float = parameter(
         0.0,
         "rad/s",
-        "wheel rate at which a motor has no torque left; 0: none falls",
+        "wheel rate at which a motor has no torque left; 0: torque does not fall with the rate",
         at_least=0,
         plausible=(1, 1000),
     )
@@ -98,12 +106,12 @@ class Climber:
 
     @cached_property
     def inertial(self) -> tuple[float, float, float, float]:
-        """m [kg], J [kg m²], f [N] and m g_t [N]: all that a motion asks for, in one."""
+        """m [kg], J [kg m²], f [N] and m g_t [N]: the numbers of (11) and (15)."""
         return self.mass, self.yaw_inertia, self.seal_friction, self.weight_along_wall
 
     @cached_property
     def leverage(self) -> tuple[float, float]:
-        """Mean of the wheels' torques by drive r/2 [m], and half their difference by turn r/2d."""
+        """r/2 [m] and r/2d: mean torque per drive force, half the difference per yaw moment."""
         return self.wheel_radius / 2, self.wheel_radius / 2 / self.half_track
 
     def applied_force(self, heading: Array, direction: Array | float) -> Array:
@@ -115,28 +123,28 @@ class Climber:
         return pack(friction * cos(heading), friction * sin(heading) - weight, 0 * heading)
 
     def wheel_force(self, heading: Array, torques: Array) -> Array:
-        """E(θ) τ: what the wheel torques (right, left) do to the climber, (..., 3) [N, N m]."""
-        drive, turn = self.drive_and_turn(torques)
-        return pack(drive * cos(heading), drive * sin(heading), turn)
+        """E(θ) τ of wheel torques (..., 2), in the wall's frame, (..., 3) [N, N, N m]."""
+        force, moment = self.force_and_moment(torques)
+        return pack(force * cos(heading), force * sin(heading), moment)
 
     def wrench(self, right: Any, left: Any) -> tuple[Any, Any]:
-        """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
+        """Drive force (τR + τL)/r [N] and yaw moment d (τR - τL)/r [N m] of two torques [N m]."""
         radius = self.wheel_radius
         return (right + left) / radius, self.half_track * (right - left) / radius
 
-    def torques(self, drive: Any, turn: Any) -> Torques:
-        """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N."""
+    def torques(self, force: Any, moment: Any) -> Torques:
+        """τR, τL = r (F ± N/d) / 2 [N m] of drive force F [N] and yaw moment N [N m]."""
         half = self.wheel_radius / 2
-        half_drive, half_turn = half * drive, half * turn / self.half_track
-        return Torques(half_drive + half_turn, half_drive - half_turn)
+        from_force, from_moment = half * force, half * moment / self.half_track
+        return Torques(from_force + from_moment, from_force - from_moment)
 
     def rim_rates(self, motion: Motion) -> tuple[Any, Any]:
         """Turning rates (v ± d ω) / r of the wheels, right and left [rad/s]."""
-        v, turning = motion.speed, self.half_track * motion.yaw_rate
-        return (v + turning) / self.wheel_radius, (v - turning) / self.wheel_radius
+        v, differential = motion.speed, self.half_track * motion.yaw_rate
+        return (v + differential) / self.wheel_radius, (v - differential) / self.wheel_radius
 
     def bounds(self, motion: Motion) -> tuple[Bounds, Bounds]:
-        """Lowest and highest torque of the right wheel, and of the left one.
+        """Lowest and highest torque [N m] of the right wheel, and of the left one.
 
         That of a DC motor falls in a straight line with the rate at which it drives its wheel, and
         not with the rate at which it brakes it.
@@ -146,10 +154,10 @@ class Climber:
             return (-limit, limit), (-limit, limit)
         no_load = select(no_load == 0, float("inf"), no_load)
         right, left = self.rim_rates(motion)
-        return _bounds(limit, right / no_load), _bounds(limit, left / no_load)
+        return _dc_motor_bounds(limit, right / no_load), _dc_motor_bounds(limit, left / no_load)
 
     def saturate(
-        self, drive: Any, turn: Any, right: Bounds, left: Bounds
+        self, force: Any, moment: Any, right: Bounds, left: Bounds
     ) -> tuple[Any, Any, Any, Any, bool]:
         """Saturate the wheel torques at their bounds [N m]; the moment is served first.
 
@@ -158,11 +166,12 @@ class Climber:
         """
         (right_low, right_high), (left_low, left_high) = right, left
         to_mean, to_twist = self.leverage
-        mean, twist = to_mean * drive, to_twist * turn  # τR,L = mean ± twist
-        one, other = mean + twist, mean - twist
-        fits = (right_low <= one) & (one <= right_high) & (left_low <= other) & (other <= left_high)
+        mean, twist = to_mean * force, to_twist * moment  # τR,L = mean ± twist
+        tau_r, tau_l = mean + twist, mean - twist
+        fits = (right_low <= tau_r) & (tau_r <= right_high)
+        fits = fits & (left_low <= tau_l) & (tau_l <= left_high)
         if fits is True or everywhere(fits):
-            return drive, turn, one, other, True
+            return force, moment, tau_r, tau_l, True
         twist = clipped(twist, (right_low - left_high) / 2, (right_high - left_low) / 2)
         lowest, highest = right_low - twist, right_high - twist
         lowest = lowest + clipped(left_low + twist - lowest, 0.0, float("inf"))
@@ -170,20 +179,20 @@ class Climber:
         mean = clipped(mean, lowest, highest)
         # once more, as sums are rounded: no torque is beyond its bound by as little as that
         return (
-            select(fits, drive, mean / to_mean),
-            select(fits, turn, twist / to_twist),
-            select(fits, one, clipped(mean + twist, right_low, right_high)),
-            select(fits, other, clipped(mean - twist, left_low, left_high)),
+            select(fits, force, mean / to_mean),
+            select(fits, moment, twist / to_twist),
+            select(fits, tau_r, clipped(mean + twist, right_low, right_high)),
+            select(fits, tau_l, clipped(mean - twist, left_low, left_high)),
             False,
         )
 
-    def drive_and_turn(self, torques: Array) -> tuple[Array, Array]:
-        """Force along the climber (τR + τL)/r [N] and moment about it d (τR - τL)/r [N m]."""
+    def force_and_moment(self, torques: Array) -> tuple[Array, Array]:
+        """Drive force (...) [N] and yaw moment (...) [N m] of torques (..., 2): see `wrench`."""
         return self.wrench(*unpack(torques))
 
-    def wheel_torques(self, drive: Array, turn: Array) -> Array:
-        """τR, τL = r (F ± N/d) / 2 of the drive force F and the moment N, (..., 2) [N m]."""
-        return pack(*self.torques(drive, turn))
+    def wheel_torques(self, force: Array, moment: Array) -> Array:
+        """Torques (right, left) (..., 2) [N m] of force and moment (...): see `torques`."""
+        return pack(*self.torques(force, moment))
 
     def wheel_rates(self, state: State) -> Array:
         """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
@@ -200,14 +209,14 @@ class Climber:
         so that the wheels' reaction takes just the lateral part away. Left are (11) and (15).
         """
         heading, v, omega = state.heading, state.forward_speed, state.yaw_rate
-        drive, turn = self.drive_and_turn(torques)
+        force, moment = self.force_and_moment(torques)
         cosine, sine = cos(heading), sin(heading)
-        force = drive - self.seal_friction * direction - self.weight_along_wall * sine
+        force = force - self.seal_friction * direction - self.weight_along_wall * sine
         v_1 = force / self.mass
         return pack(
             v_1 * cosine - v * omega * sine,
             v_1 * sine + v * omega * cosine,
-            turn / self.yaw_inertia,
+            moment / self.yaw_inertia,
         )
 
 
@@ -218,5 +227,6 @@ def no_slip(state: State) -> tuple[Array, Array]:
     return row, -state.yaw_rate * state.forward_speed
 
 
-def _bounds(limit: Any, part: Any) -> Bounds:
-    return -limit * clipped(1 + part, 0.0, 1.0), limit * clipped(1 - part, 0.0, 1.0)
+def _dc_motor_bounds(limit: Any, rate: Any) -> Bounds:
+    """Torques [N m] between which a motor can act; `rate` is its own by the no-load rate."""
+    return -limit * clipped(1 + rate, 0.0, 1.0), limit * clipped(1 - rate, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""All that is between a climber and its wall: its hold, the seal's friction, and what it runs on.
+"""The contact of climber and wall: adhesion and grip, friction of the seal, wheels or tracks.
 
 A new kind of locomotion is one class, a `Locomotion`, and one entry in `LOCOMOTION`, or an entry
 point `climber_uk.locomotion` of another package. Everything broadcasts.
@@ -17,12 +17,12 @@ class Locomotion(Protocol):
     """What the climber runs on."""
 
     def turning_resistance(self, load: Any) -> Any:
-        """Moment (...) [N m] against turning under `load` (...) [N]; at rest, up to that."""
+        """Moment (...) [N m] against yawing under `load` (...) [N]; at rest, at most that."""
 
 
 @dataclass(frozen=True)
 class Wheeled(Locomotion):
-    """Wheels on one axle: they turn about the vertical without resistance."""
+    """Wheels on one axle: yawing meets no resistance."""
 
     def turning_resistance(self, load: Any) -> Any:
         """See `Locomotion`."""
@@ -31,10 +31,12 @@ class Wheeled(Locomotion):
 
 @dataclass(frozen=True)
 class Tracked(Locomotion):
-    """Tracks that scrub sideways when they turn: μ_t N L / 4, the load spread evenly over L."""
+    """Tracks, which scrub sideways as the climber yaws: μ_t N L / 4, the load spread evenly."""
 
-    scrub_friction_coefficient: float = parameter(0.5, "", "μ_t, sideways", at_least=0)
-    length: float = parameter(0.3, "m", "L of the tracks on the wall", above=0)
+    scrub_friction_coefficient: float = parameter(
+        0.5, "", "μ_t of the tracks, sideways", at_least=0
+    )
+    length: float = parameter(0.3, "m", "length L of the tracks that is on the wall", above=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -49,7 +51,7 @@ LOCOMOTION = Variants[type[Locomotion]]({"wheeled": Wheeled, "tracked": Tracked}
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Attachment):
-    """How a climber is held, and what resists its motion."""
+    """Adhesion and grip, and with them what resists the motion: seal friction, scrubbing tracks."""
 
     friction: Friction = field(default_factory=Coulomb)
     locomotion: Locomotion = field(default_factory=Wheeled)

@@ -1,7 +1,8 @@
-"""Elementary functions of one number or of many: floats stay floats.
+"""Elementary functions of floats or arrays (N,), so that one formula serves one climber or many.
 
-numpy's functions turn a float into a numpy scalar, and arithmetic on those takes three times as
-long. So one formula serves a controller's tick and a batch of a million.
+Floats stay floats: numpy's functions turn a float into a numpy scalar, and arithmetic on those
+takes three times as long. Conditions are a bool, or an array (N,) of them: `select` and
+`everywhere` take the place of `if`.
 """
 
 import math
@@ -30,14 +31,14 @@ sign = _either(lambda x: math.copysign(1.0, x) if x else 0.0, np.sign)
 
 
 def with_sign_of(size: Any, of: Any) -> Any:
-    """`size` (>= 0) with the sign of `of`; of many that are all positive, as it is."""
+    """`size` (>= 0) with the sign of `of`; where all of an array are positive, `size` itself."""
     if isinstance(of, float):
         return math.copysign(size, of)
     return size if of.min(initial=np.inf) > 0 else np.copysign(size, of)
 
 
 def wrapped(angle: Any) -> Any:
-    """The same angle in [-π, π)."""
+    """The angle [rad] in [-π, π)."""
     if isinstance(angle, float):
         return angle if -3.0 < angle < 3.0 else (angle + math.pi) % TURN - math.pi
     if np.abs(angle).max(initial=0.0) < 3.0:
@@ -46,7 +47,7 @@ def wrapped(angle: Any) -> Any:
 
 
 def clipped(value: Any, lowest: Any, highest: Any) -> Any:
-    """`value` within its bounds; `highest` if they contradict each other."""
+    """`value` clipped to its bounds; `highest` if they contradict each other."""
     if isinstance(value, float):
         raised = lowest if value < lowest else value
         return highest if raised > highest else raised
@@ -63,7 +64,7 @@ def select(condition: Any, this: Any, that: Any) -> Any:
 
 
 def everywhere(condition: Any) -> Any:
-    """Whether `condition` holds for the one, or for all of many."""
+    """`condition` of a float, or whether all of an array's hold: a bool for `if`."""
     return condition if condition is True or condition is False else bool(condition.all())
 
 
@@ -73,47 +74,47 @@ def anywhere(condition: Any) -> Any:
 
 
 def either(condition: Any, these: tuple[Any, Any], those: tuple[Any, Any]) -> tuple[Any, Any]:
-    """`select` of two at once."""
+    """`select` of two numbers by one condition."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, these[0], those[0]), np.where(condition, these[1], those[1])
     return these if condition else those
 
 
-SMALL = 0.03  # [rad] of an angle whose sine and cosine are a few terms of their series
+SMALL_ANGLE = 0.03  # [rad] below which a few terms of the series give sine and cosine
 
 
 def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
-    """Heading, cosine and sine after a turn by `angle` [rad]."""
+    """Heading [rad], its cosine and its sine after a rotation by `angle` [rad]."""
     end = heading + angle
     if isinstance(end, float):
         return end, math.cos(end), math.sin(end)
-    return end, *_turned(heading, cosine, sine, angle)
+    return end, *_rotate(heading, cosine, sine, angle)
 
 
 def swept(
     heading: Any, cosine: Any, sine: Any, halfway: Any, angle: Any
 ) -> tuple[Any, Any, Any, Any, Any]:
-    """Cosine and sine after a turn by `halfway`; heading, cosine and sine after one by `angle`."""
+    """Cosine and sine after rotating by `halfway` [rad]; heading, cosine and sine after `angle`."""
     end = heading + angle
     if isinstance(end, float):
         middle = heading + halfway
         return math.cos(middle), math.sin(middle), end, math.cos(end), math.sin(end)
-    turned = _turned(heading, cosine, sine, angle)
-    return *_turned(heading, cosine, sine, halfway), end, *turned
+    direction = _rotate(heading, cosine, sine, angle)
+    return *_rotate(heading, cosine, sine, halfway), end, *direction
 
 
-def _turned(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[Array, Array]:
-    """Cosine and sine of many after a turn.
+def _rotate(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[Array, Array]:
+    """Cosines and sines (N,) after rotating by `angle` (N,) [rad].
 
     Of small angles the series takes half as long as numpy's cosine and sine; what it leaves
-    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each turn.
-    Each gets the same whatever the others are.
+    out is below 1e-16, and the length of (cosine, sine) wanders by that much in each rotation.
+    Each result depends on its own angle only, not on those beside it.
     """
     square = angle * angle
     largest = square.max(initial=0.0)
-    if largest < SMALL * SMALL:
+    if largest < SMALL_ANGLE * SMALL_ANGLE:
         return _by_series(cosine, sine, angle, square)
-    end, small = heading + angle, square < SMALL * SMALL
+    end, small = heading + angle, square < SMALL_ANGLE * SMALL_ANGLE
     if not small.any():
         return np.cos(end), np.sin(end)
     c, s = _by_series(cosine, sine, angle, square)
@@ -139,7 +140,7 @@ def _polynomial(x: Array, *coefficients: float) -> Array:
 
 
 def compose(f: Derivatives, inner: tuple[Any, Any, Any]) -> Derivatives:
-    """Derivatives by t of f(s(t)), of those of f by s, and ṡ, s̈, s⃛."""
+    """Derivatives by t of f(s(t)), orders 0 to 3, from those of f by s, and ṡ, s̈, s⃛."""
     s_1, s_2, s_3 = inner
     _, f_1, f_2, f_3 = f
     return (

@@ -20,16 +20,16 @@ from climber_uk.parameters.registry import Variants
 
 
 class Friction(Protocol):
-    """A law; f (...) is Coulomb's friction [N], `speed` (...) that of sliding, >= 0 [m/s]."""
+    """A friction law; f (...) is Coulomb's [N], `speed` (...) that of sliding, >= 0 [m/s]."""
 
     def stiction(self, f: Any) -> Any:
-        """What it holds at rest, at most (...) [N]; 0 if it holds nothing."""
+        """Most that friction holds at rest (...) [N]; 0 if it holds nothing."""
 
     def level(self, f: Any, speed: Any) -> Any:
         """Force (...) against steady sliding [N]."""
 
     def steepness(self, f: Any) -> Any:
-        """Most by which the force of sliding changes with its speed (...) [N s/m]."""
+        """Steepest slope of the force over the sliding speed (...) [N s/m]."""
 
     # What most laws need not say:
 
@@ -72,7 +72,7 @@ class Bristles(Friction, Protocol):
 
 @dataclass(frozen=True)
 class Coulomb(Friction):
-    """The same force at every speed."""
+    """Coulomb friction: the same force at every speed."""
 
     def stiction(self, f: Any) -> Any:
         """See `Friction`."""
@@ -89,9 +89,9 @@ class Coulomb(Friction):
 
 @dataclass(frozen=True)
 class Viscous(Friction):
-    """In proportion to the speed, as of a lubricated seal: it holds nothing."""
+    """Viscous friction, in proportion to the speed, as of a lubricated seal: no stiction."""
 
-    speed: float = parameter(0.1, "m/s", "at which it rubs as much as Coulomb's law", above=0)
+    speed: float = parameter(0.1, "m/s", "at which it equals Coulomb's friction", above=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -111,11 +111,11 @@ class Viscous(Friction):
 
 @dataclass(frozen=True)
 class Stribeck(Friction):
-    """More at rest than in motion, and more again the faster it goes."""
+    """Stribeck friction: highest at rest, lower in motion, and growing again with speed."""
 
-    ratio: float = parameter(1.5, "", "of the hold at rest to Coulomb's friction", at_least=1)
-    speed: float = parameter(0.02, "m/s", "v_s at which most of the surplus is gone", above=0)
-    viscous: float = parameter(0.0, "s/m", "κ: f more per speed", at_least=0)
+    ratio: float = parameter(1.5, "", "of stiction to Coulomb's friction", at_least=1)
+    speed: float = parameter(0.02, "m/s", "v_s, at which most of the surplus is gone", above=0)
+    viscous: float = parameter(0.0, "s/m", "κ, viscous part of f per speed", at_least=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -129,7 +129,7 @@ class Stribeck(Friction):
         return f * (self.gamma(speed) + self.viscous * speed)
 
     def gamma(self, speed: Any) -> Any:
-        """γ(v) (...)."""
+        """γ(v) (...), the level without its viscous part, by f."""
         part = speed / self.speed
         return 1 + (self.ratio - 1) * exp(-part * part)
 
@@ -147,9 +147,9 @@ class LuGre(Bristles, Stribeck):
     """Bristles that bend before they slide: hysteresis, pre-sliding, and no edge at rest."""
 
     deflection: float = parameter(
-        1e-3, "m", "of the bristles under Coulomb's friction: f / σ₀", above=0
+        1e-3, "m", "of the bristles under Coulomb's friction, f / σ₀; smaller is stiffer", above=0
     )
-    damping_time: float = parameter(5e-3, "s", "of the bristles: σ₁ / σ₀", at_least=0)
+    damping_time: float = parameter(5e-3, "s", "of the bristles, σ₁ / σ₀", at_least=0)
 
     def relaxation(self, speed: Any) -> Any:
         """σ₀ |v| / g(v): see `Bristles`."""

@@ -1,4 +1,4 @@
-"""Many climbers in the place of one: arrays (N,) where there are floats."""
+"""Tuples and dataclasses of many climbers: arrays (N,) where one climber has floats."""
 
 import dataclasses
 from collections.abc import Callable
@@ -9,7 +9,10 @@ import numpy as np
 
 
 def part(of: Any, index: Any) -> Any:
-    """Those of many that `index` picks, of arrays within tuples and dataclasses, too."""
+    """`of` with `[index]` of every array in it; goes into tuples and dataclasses.
+
+    What holds no array comes back as the object that it is.
+    """
     if isinstance(of, np.ndarray):
         return of[index]
     if isinstance(of, tuple):
@@ -27,9 +30,10 @@ def part(of: Any, index: Any) -> Any:
 
 
 def amended(condition: Any, regular: Any, exceptional: Callable[..., Any], *arguments: Any) -> Any:
-    """`regular` but, where `condition` holds, `exceptional` of the `arguments` instead.
+    """`exceptional(*arguments)` where `condition` holds, else `regular`: named tuples of numbers.
 
-    Both are named tuples of numbers; what is exceptional is computed for those only that need it.
+    `condition` is a bool or an array (N,) of them. `exceptional` is computed only for the climbers
+    where it holds, from their elements of the arguments; `regular` is returned if there are none.
     """
     if not isinstance(condition, np.ndarray):
         return exceptional(*arguments) if condition else regular
@@ -38,15 +42,15 @@ def amended(condition: Any, regular: Any, exceptional: Callable[..., Any], *argu
         return regular
     instead = exceptional(*(part(argument, which) for argument in arguments))
     whole = []
-    for one, other in zip(regular, instead, strict=True):
-        one = np.array(np.broadcast_to(one, condition.shape))
-        one[which] = other
-        whole.append(one)
+    for numbers, replaced in zip(regular, instead, strict=True):
+        numbers = np.array(np.broadcast_to(numbers, condition.shape))
+        numbers[which] = replaced
+        whole.append(numbers)
     return type(regular)(*whole)
 
 
 def chosen(condition: Any, this: Any, that: Any) -> Any:
-    """Tuple or dataclass with the numbers of `this` where `condition` holds, else of `that`."""
+    """`select` for every number of two tuples, or two dataclasses, of one class."""
     if not isinstance(condition, np.ndarray):
         return this if condition else that
     if isinstance(this, tuple):

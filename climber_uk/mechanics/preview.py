@@ -18,14 +18,14 @@ from climber_uk.mechanics.quantities import ReferencePoint, across, along
 from climber_uk.mechanics.reference import Reference
 
 MOST_SIDEWAYS = 0.1  # [rad] between heading and velocity, forwards or backwards
-REST = 0.005  # [m/s] sideways, below which a heading has no direction to agree with
+REST_SPEED = 0.005  # [m/s] sideways, below which any heading passes
 
 
 @dataclass(frozen=True)
 class Preview:
-    """Points of a reference; raises `ValueError` unless there are two, in the order of time.
+    """Points of a reference in the wall's frame, [m], [rad], [s]; headings may be modulo 2π.
 
-    Headings may be given modulo 2π.
+    Raises `ValueError` unless there are two at least, in the order of time, and all are finite.
     """
 
     times: Stamps  # (n,) [ns]
@@ -50,7 +50,7 @@ class Preview:
         forwards = np.abs(along(heading, self.velocity))
         sideways = np.abs(across(heading, self.velocity))
         angle = np.arctan2(sideways, forwards)
-        is_wrong = (angle > MOST_SIDEWAYS) & (sideways > REST)
+        is_wrong = (angle > MOST_SIDEWAYS) & (sideways > REST_SPEED)
         if is_wrong.any():
             i = int(np.argmax(is_wrong))
             raise ValueError(
@@ -82,22 +82,22 @@ class Preview:
         return None if target is None else Reference.of(target)
 
     def target(self, time: int) -> ReferencePoint | None:
-        """The same in components."""
+        """The same in components, for every tick of a controller."""
         times, coefficients = self._pieces
         if not times[0] <= time <= times[-1]:
             return None
         i = bisect_right(times, time, 1, len(times) - 1) - 1
         t = float(time - times[i]) * 1e-9
-        along_x, along_y, turning = coefficients[i]
-        x, v_x, a_x, j_x = _derivatives(along_x, t)
-        y, v_y, a_y, j_y = _derivatives(along_y, t)
-        heading, omega, omega_1, _ = _derivatives(turning, t)
+        of_x, of_y, of_heading = coefficients[i]
+        x, v_x, a_x, j_x = _derivatives(of_x, t)
+        y, v_y, a_y, j_y = _derivatives(of_y, t)
+        heading, omega, omega_1, _ = _derivatives(of_heading, t)
         return ReferencePoint(x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y)
 
     def fastest(self, begin: int, end: int) -> tuple[float, float]:
-        """Fastest speed [m/s] and yaw rate [rad/s] at its points from `begin` to `end` [ns].
+        """Fastest speed [m/s] and yaw rate [rad/s], >= 0, at the points from `begin` to `end` [ns].
 
-        Of the nearest one, if there is none.
+        Where no point lies between these, that of the nearest one.
         """
         first = min(int(np.searchsorted(self.times, begin)), len(self.times) - 1)
         last = max(int(np.searchsorted(self.times, end, "right")), first + 1)
@@ -105,7 +105,7 @@ class Preview:
         return float(np.hypot(v_x, v_y).max()), float(np.abs(yaw_rate).max())
 
     def last(self, points: int) -> "Preview":
-        """The same, with its last `points` at most."""
+        """Preview of the last `points` points, or of all if there are fewer."""
         if len(self.times) <= points:
             return self
         return Preview(
@@ -125,7 +125,7 @@ class Preview:
         return bool(np.abs(offset).max() <= tolerance)
 
     def continued(self, newer: "Preview", since: int) -> "Preview":
-        """`newer`, and before it what this one has from `since` [ns] on."""
+        """Preview of this one's points from `since` [ns] on, then all of `newer`."""
         old = slice(*np.searchsorted(self.times, [since, newer.times[0]]))
         return Preview(
             times=np.concatenate([self.times[old], newer.times]),
@@ -157,7 +157,7 @@ def _derivatives(coefficients: list[float], t: float) -> tuple[float, float, flo
 
 
 def joined(previews: Iterable[Preview]) -> Preview:
-    """All points of some previews; where two have a point at the same time, the later one's."""
+    """Preview of all points of several; at the same time the point of the later preview counts."""
     points = {
         int(time): (preview, i) for preview in previews for i, time in enumerate(preview.times)
     }

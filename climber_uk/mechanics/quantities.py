@@ -1,8 +1,8 @@
-"""What is told of a climber: in components for every tick, and as vectors (..., 3).
+"""The quantities of a climber's motion: in components for every tick, and as vectors (..., 3).
 
 Arithmetic on a float, or on N numbers that lie side by side, takes a fraction of what it takes on
 vectors. So the equations of every tick stand on the components here, floats of one climber or
-arrays (N,) of many; `State` has the same as vectors. Time derivatives end in _1 and _2.
+arrays (N,) of many; `State` has the same as vectors. Time derivatives end in _1 and _2 (§1.3).
 """
 
 from dataclasses import dataclass
@@ -16,15 +16,18 @@ Bounds = tuple[Any, Any]  # lowest and highest torque of a wheel [N m]
 
 
 class DesiredAcceleration(NamedTuple):
-    """What a constraint set asks of a climber."""
+    """Accelerations that a constraint set asks for, and the speed it wants."""
 
     forward: Any  # v̇ [m/s²]
     yaw: Any  # θ̈ [rad/s²]
-    speed: Any  # wanted speed [m/s]: friction is that of its sign
+    speed: Any  # wanted [m/s]: friction is fed forward with its sign
 
 
 class Motion(NamedTuple):
-    """Where a climber is, and how it rolls without side slip (17), in the wall's frame."""
+    """Pose in the wall's frame, forward speed and yaw rate of a climber without side slip (17).
+
+    `cosine` and `sine` are those of `heading`: make one by `at`, and never replace `heading` alone.
+    """
 
     x: Any  # [m]
     y: Any  # [m]
@@ -34,9 +37,14 @@ class Motion(NamedTuple):
     speed: Any  # v, forward [m/s]
     yaw_rate: Any  # ω [rad/s]
 
+    @classmethod
+    def at(cls, x: Any, y: Any, heading: Any, speed: Any, yaw_rate: Any) -> "Motion":
+        """Motion at a pose in the wall's frame [m, rad], with speed [m/s] and yaw rate [rad/s]."""
+        return cls(x, y, heading, cos(heading), sin(heading), speed, yaw_rate)
+
 
 class ReferencePoint(NamedTuple):
-    """Where a climber should be and how it should move, in the wall's frame."""
+    """The `Reference` at one time, in components, in the wall's frame."""
 
     x: Any  # [m]
     y: Any  # [m]
@@ -52,14 +60,14 @@ class ReferencePoint(NamedTuple):
 
 
 class Wrench(NamedTuple):
-    """What pushes a climber forward, and what turns it."""
+    """Force and moment on a climber, in its body's frame."""
 
-    drive: Any  # [N]
-    turn: Any  # [N m]
+    force: Any  # along the climber [N]
+    moment: Any  # about its vertical [N m]
 
 
 class Torques(NamedTuple):
-    """Of the wheels [N m]."""
+    """Torques of the two wheels [N m], positive forwards; in numbers the right one is first."""
 
     right: Any
     left: Any
@@ -67,7 +75,7 @@ class Torques(NamedTuple):
 
 @dataclass(frozen=True)
 class State:
-    """Where the climber is and how it moves, both in the wall's frame."""
+    """Pose and velocity of a climber, or of many (...), both in the wall's frame."""
 
     pose: Array  # (..., 3) x [m], y [m], θ [rad]
     velocity: Array  # (..., 3) ẋ [m/s], ẏ [m/s], θ̇ [rad/s]
@@ -80,7 +88,7 @@ class State:
 
     @classmethod
     def moving(cls, motion: Motion) -> "State":
-        """State of a climber in `motion`."""
+        """State of a climber in `motion`, which has no side slip."""
         return cls(
             pack(motion.x, motion.y, motion.heading),
             pack(motion.speed * motion.cosine, motion.speed * motion.sine, motion.yaw_rate),
@@ -88,7 +96,7 @@ class State:
 
     @cached_property
     def motion(self) -> Motion:
-        """The same in components, without the side slip."""
+        """The same in components, without its side slip."""
         x, y, heading = unpack(self.pose)
         v_x, v_y, yaw_rate = unpack(self.velocity)
         cosine, sine = cos(heading), sin(heading)

@@ -1,4 +1,4 @@
-"""What a climber is to do at a time, whoever planned it: pose, velocity, acceleration and jerk."""
+"""The reference of a climber: the pose it should have, with velocity, acceleration and jerk."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +10,7 @@ from climber_uk.mechanics.quantities import ReferencePoint, across, along
 
 @dataclass(frozen=True)
 class Reference:
-    """Where the climber should be and how it should move at one time (or many), wall's frame."""
+    """Desired pose and its derivatives at one time, or at many (...), in the wall's frame."""
 
     pose: Array  # (..., 3) x [m], y [m], θ [rad]
     velocity: Array  # (..., 3) ẋ [m/s], ẏ [m/s], θ̇ [rad/s]
@@ -19,12 +19,12 @@ class Reference:
 
     @classmethod
     def of(cls, target: ReferencePoint) -> "Reference":
-        """Reference of a target."""
+        """Reference of the same in components."""
         return cls(pack(*target[:3]), pack(*target[3:6]), pack(*target[6:9]), pack(*target[9:]))
 
     @cached_property
     def target(self) -> ReferencePoint:
-        """The same in components."""
+        """The same in components: floats, or arrays (...)."""
         vectors = self.pose, self.velocity, self.acceleration, self.jerk
         return ReferencePoint(*(part for vector in vectors for part in unpack(vector)))
 
@@ -38,28 +38,29 @@ class Reference:
         """ω_d (...) [rad/s]."""
         return unpack(self.velocity)[2]
 
-    # The speed along the heading, negative in reverse gear, and its rates:
+    # The speed along the heading, negative in reverse gear, and its derivatives:
 
     @cached_property
     def speed(self) -> Array:
-        """v_d (...) [m/s]."""
+        """Forward speed v_d (...) [m/s]."""
         return along(self.heading, self.velocity)
 
     @cached_property
-    def speed_rate(self) -> Array:
-        """v̇_d (...) [m/s²]."""
+    def forward_acceleration(self) -> Array:
+        """Forward acceleration v̇_d (...) [m/s²]."""
         return along(self.heading, self.acceleration)
 
     @cached_property
-    def speed_second_rate(self) -> Array:
-        """v̈_d = p⃛·t + ω² v_d (...) [m/s³]."""
+    def forward_jerk(self) -> Array:
+        """Second derivative of the forward speed, v̈_d = p⃛·t + ω² v_d (...) [m/s³]."""
         return along(self.heading, self.jerk) + self.yaw_rate**2 * self.speed
 
 
 def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Array]:
-    """Actual minus desired pose along-track [m], cross-track [m] and in heading [rad], each (...).
+    """Errors along the track [m], across it [m] and of the heading [rad], each (...).
 
-    Along and across are those of the reference's heading; the heading error is in [-π, π).
+    Actual minus desired `pose` (..., 3), in the reference's frame: ahead and to the left are
+    positive; the heading error is in [-π, π).
     """
     heading, offset = reference.heading, pose - reference.pose
     return along(heading, offset), across(heading, offset), wrapped(unpack(offset)[2])

@@ -17,13 +17,13 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 
-DEGREE = 5
+QUINTIC = 5
 MOMENT = 0.62448  # most of Σ N_i(s) |ξ_i - s| / h, halfway between two knots
 # shares of the tolerance: points nearer than NEAR to one that is kept are left out, and may have
 # been near to one that is left out itself; the rest, but for the turn of a reversal, is rounding
 NEAR = 1 / 6
 ROUNDING = 0.6
-LONG = 12  # [h] of a leg that has rare knots in its middle
+LONG_LEG = 12  # [h] from which on a leg has few knots in its middle
 REACH = 4  # [h] around a corner in which no knots are left out
 
 
@@ -67,7 +67,7 @@ def rounded(points: Array, tolerance: float, reversal_angle: float) -> Rounded:
 
 
 def _thinned(points: Array, near: float, closed: bool) -> Array:
-    """Points (m, 2) at least `near` from the one before, but for the end, which is as it was."""
+    """Points (m, 2) of which each is at least `near` [m] from the one before; both ends stay."""
     first, *others = points.tolist()
     kept, end = [first], first if closed else others[-1]
     for point in others:
@@ -79,7 +79,7 @@ def _thinned(points: Array, near: float, closed: bool) -> Array:
 
 
 def _reversals(corners: Array, angle: float, closed: bool) -> Any:
-    """Numbers (k,) of the corners at which the way turns back."""
+    """Indices (k,) of the corners at which the polyline turns back within `angle` [rad]."""
     legs = np.diff(corners, axis=0)
     unit = legs / np.hypot(*legs.T)[:, None]
     cosine = np.sum(unit * np.roll(unit, 1, axis=0), axis=1)  # at the beginning of each leg
@@ -88,8 +88,8 @@ def _reversals(corners: Array, angle: float, closed: bool) -> Any:
 
 
 def _breaks(s: Array, back: Array, closed: bool, spacing: float) -> Array:
-    """Places (m,) of knots, at most `spacing` apart but far from corners on long legs."""
-    is_long = np.diff(s) > LONG * spacing
+    """Knots (m,) [m], at most `spacing` [m] apart, but for the middle of long legs."""
+    is_long = np.diff(s) > LONG_LEG * spacing
     is_fixed = np.append(is_long, True) | np.append(True, is_long)
     is_fixed[back] = True
     fixed, is_long = s[is_fixed], is_long[np.flatnonzero(is_fixed)[:-1]]
@@ -110,24 +110,26 @@ def _breaks(s: Array, back: Array, closed: bool, spacing: float) -> Array:
 
 
 def _periodic(s: Array, corners: Array, breaks: Array, _: Array) -> Any:
+    """Closed spline through the polyline's control points, without an end."""
     from scipy.interpolate import BSpline  # slow to import: for waypoints only
 
-    steps = np.pad(np.diff(breaks), DEGREE, "wrap")
-    knots = np.concatenate([[0.0], np.cumsum(steps)]) - steps[:DEGREE].sum()
-    knots[DEGREE:-DEGREE] = breaks
-    return BSpline(knots, _at(s, corners, _means(knots) % s[-1]), DEGREE, extrapolate="periodic")
+    steps = np.pad(np.diff(breaks), QUINTIC, "wrap")
+    knots = np.concatenate([[0.0], np.cumsum(steps)]) - steps[:QUINTIC].sum()
+    knots[QUINTIC:-QUINTIC] = breaks
+    control = _along(s, corners, _means(knots) % s[-1])
+    return BSpline(knots, control, QUINTIC, extrapolate="periodic")
 
 
 def _clamped(s: Array, corners: Array, breaks: Array, reversals: Array) -> Any:
-    """Spline that meets the polyline at both ends and where it reverses."""
+    """Spline that meets the polyline at both its ends and where it turns back."""
     from scipy.interpolate import BSpline
 
-    times = np.where(np.isin(breaks, reversals), DEGREE, 1)
-    times[[0, -1]] = DEGREE + 1
+    times = np.where(np.isin(breaks, reversals), QUINTIC, 1)
+    times[[0, -1]] = QUINTIC + 1
     knots = np.repeat(breaks, times)
-    control = _at(s, corners, _means(knots))
+    control = _along(s, corners, _means(knots))
     # one tangent on both sides of a reversal: halfway between those of its legs
-    tips = np.searchsorted(knots, reversals, "right") - DEGREE - 1
+    tips = np.searchsorted(knots, reversals, "right") - QUINTIC - 1
     before, after = np.where(tips > 0, tips, len(control) - 1) - 1, tips + 1
     come, go = control[tips] - control[before], control[after] - control[tips]
     come_size, go_size = np.hypot(*come.T)[:, None], np.hypot(*go.T)[:, None]
@@ -135,13 +137,14 @@ def _clamped(s: Array, corners: Array, breaks: Array, reversals: Array) -> Any:
     heading /= np.hypot(*heading.T)[:, None]
     control[before] = control[tips] - come_size * heading
     control[after] = control[tips] - go_size * heading
-    return BSpline(knots, control, DEGREE)
+    return BSpline(knots, control, QUINTIC)
 
 
 def _means(knots: Array) -> Array:
-    """Mean of the inner knots of each basis function."""
-    return np.lib.stride_tricks.sliding_window_view(knots[1:-1], DEGREE).mean(axis=1)
+    """Means (n,) [m] of the inner knots of each basis function: where its control point is."""
+    return np.lib.stride_tricks.sliding_window_view(knots[1:-1], QUINTIC).mean(axis=1)
 
 
-def _at(s: Array, corners: Array, places: Array) -> Array:
+def _along(s: Array, corners: Array, places: Array) -> Array:
+    """Points (n, 2) [m] of the polyline at distances (n,) [m] along it."""
     return np.stack([np.interp(places, s, x) for x in corners.T], axis=1)

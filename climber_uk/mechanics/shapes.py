@@ -30,10 +30,10 @@ class Shape(Protocol):
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """p, p', p'', p''' at s (...), each (..., 2); p' is never zero."""
 
-    # What most shapes need not say:
+    # Defaults, which hold for most shapes:
 
     def at_rate(self, rate: float) -> "Shape":
-        """Return the same path for a law of this `rate`: slow where the shape has limits."""
+        """The path for a law of this `rate`: its parameter is stretched where it must be slow."""
         return self
 
     @property
@@ -76,7 +76,7 @@ class Ellipse(Shape):
 class Circle(Shape):
     """p = r (cos s, sin s): anticlockwise."""
 
-    radius: float = parameter(1.0, "m", "radius", above=0)
+    radius: float = parameter(1.0, "m", "radius r of the circle", above=0)
 
     closed: ClassVar[bool] = True
     length: ClassVar[float] = 2 * math.pi
@@ -117,10 +117,10 @@ class Lemniscate(Shape):
 
 @dataclass(frozen=True)
 class Line(Shape):
-    """p = s (cos α, sin α): straight on."""
+    """p = s (cos α, sin α): a straight line from the origin."""
 
-    length: float = parameter(1.0, "m", "length", above=0)
-    direction: float = parameter(0.0, "rad", "angle α from x")
+    length: float = parameter(1.0, "m", "length of the line", above=0)
+    direction: float = parameter(0.0, "rad", "angle α of the line, anticlockwise from x")
 
     closed: ClassVar[bool] = False
 
@@ -138,9 +138,9 @@ class Line(Shape):
 class SineWave(Shape):
     """p = (s, A sin(2π s/λ)): along x, swinging in y."""
 
-    length: float = parameter(2.0, "m", "extent along x", above=0)
-    amplitude: float = parameter(0.2, "m", "amplitude A")
-    wavelength: float = parameter(1.0, "m", "wavelength λ", above=0)
+    length: float = parameter(2.0, "m", "extent of the path along x", above=0)
+    amplitude: float = parameter(0.2, "m", "amplitude A along y")
+    wavelength: float = parameter(1.0, "m", "wavelength λ along x", above=0)
 
     closed: ClassVar[bool] = False
 

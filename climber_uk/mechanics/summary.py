@@ -1,4 +1,4 @@
-"""What a trajectory asks of a climber, in numbers: how long, how fast, how tight."""
+"""A trajectory's extremes: length, duration, fastest speeds, smallest radius."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from climber_uk.mechanics.shapes import Shape
 from climber_uk.mechanics.trajectory import Trajectory
 
 SAMPLES = 4001  # in time
-LONG = 500.0  # [m] of a path that a climber hardly has
+LONG_PATH = 500.0  # [m] from which on a path is probably given in mm
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Summary:
     remarks: tuple[str, ...] = ()  # what looks like a mistake, each worth a warning
 
     def __str__(self) -> str:
-        """Return one line."""
+        """Return one line for a log."""
         said = f"{self.length:.4g} m, {'closed' if self.closed else 'open'}, "
         said += "without end" if math.isinf(self.duration) else f"{self.duration:.4g} s"
         said += f", at most {self.fastest_speed:.3g} m/s and {self.fastest_yaw_rate:.3g} rad/s"
@@ -42,7 +42,7 @@ class Summary:
 
 
 def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
-    """Extremes of any trajectory; with `half_track` [m] those of its wheels as well."""
+    """Extremes of `trajectory`; with `half_track` [m] the fastest wheel speed as well."""
 
     def curvature(s: Array) -> Array:
         _, p_1, p_2, _ = path.derivatives(s)
@@ -77,7 +77,7 @@ def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
 
 def _remarks(trajectory: Trajectory, length: float) -> tuple[str, ...]:
     remarks = []
-    if length > LONG:
+    if length > LONG_PATH:
         remarks.append(f"the path is {length:.4g} m long: are its sizes in mm rather than in m?")
     laps = getattr(trajectory.law, "laps", 1)
     if laps > 1 and not trajectory.course.closed:
@@ -86,7 +86,7 @@ def _remarks(trajectory: Trajectory, length: float) -> tuple[str, ...]:
 
 
 def _times(trajectory: Trajectory) -> Array:
-    """Times [s] until all repeats itself, evenly spaced in time and in the path's parameter."""
+    """Times (n,) [s] up to the law's horizon, even in time and in the path parameter together."""
     path, law = trajectory.course, trajectory.law
     times = np.linspace(0.0, law.horizon(path), 4 * SAMPLES)
     progress = np.maximum.accumulate(law.progress(times, path)[0])
@@ -98,7 +98,7 @@ def _times(trajectory: Trajectory) -> Array:
 
 
 def _length(path: Shape) -> float:
-    """Length [m] by Simpson's rule between stations."""
+    """Length of a path [m], by Simpson's rule between its stations."""
     s = path.stations
     middle, step = (s[:-1] + s[1:]) / 2, np.diff(s)
     ends, halfway = (_size(path.derivatives(at)[1]) for at in (s, middle))
@@ -119,8 +119,10 @@ def _highest(f: Callable[[Array], Array], x: Array) -> tuple[float, float]:
 
 
 def _size(vectors: Array) -> Array:
+    """Length (...) of vectors (..., 2)."""
     return np.hypot(vectors[..., 0], vectors[..., 1])
 
 
 def _cross(u: Array, v: Array) -> Array:
+    """Cross product (...) of vectors (..., 2)."""
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]

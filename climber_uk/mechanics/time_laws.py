@@ -18,17 +18,17 @@ from climber_uk.parameters.registry import Variants
 
 
 class TimeLaw(Protocol):
-    """Progress along a shape."""
+    """Progress s(t) along a shape."""
 
     @property
     def rate(self) -> float:
-        """Highest rate of the path parameter."""
+        """Highest ṡ, in the path parameter's unit a second."""
 
     def duration(self, shape: Shape) -> float:
         """Time after which the climber rests for good [s]; infinite if it never does."""
 
     def horizon(self, shape: Shape) -> float:
-        """Time by which all has been seen that the law does [s]: at most two rounds or one way."""
+        """Time [s] after which a law only repeats itself: at most two rounds, or once along."""
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """s, ṡ, s̈, s⃛ at `time` (...) [s], in the units of the shape's path parameter."""
@@ -46,7 +46,7 @@ def _rate() -> float:
 
 @dataclass(frozen=True)
 class ConstantRate(TimeLaw):
-    """s = rate · t: already moving at the start, and for ever."""
+    """s = rate · t: already moving at the start, and without an end."""
 
     rate: float = _rate()
     stops: ClassVar[bool] = False
@@ -78,7 +78,7 @@ class RestToRest(TimeLaw):
     """
 
     rate: float = _rate()
-    ramp_time: float = parameter(3.0, "s", "time from rest to the full rate", above=0)
+    ramp_time: float = parameter(3.0, "s", "rest to full rate; shorter takes more torque", above=0)
     laps: int = parameter(1, "", "rounds of a closed shape without a stop", at_least=1)
     runs: int = parameter(1, "", "runs from rest to rest; 0: without end", at_least=0)
     pause: float = parameter(1.0, "s", "rest between two runs", at_least=0)
@@ -106,13 +106,13 @@ class RestToRest(TimeLaw):
         if shape.closed:
             s, *rates = self._along(since, places, times)
             return s + run * places[-1], *rates
-        back = np.mod(run, 2)  # the way there, backwards
+        back = np.mod(run, 2)  # odd runs go back along the path
         sign = 1 - 2 * back
         s, s_1, s_2, s_3 = self._along(back * run_time + sign * since, places, times)
         return s, sign * s_1, s_2, sign * s_3
 
     def _legs(self, shape: Shape) -> tuple[Array, Array]:
-        """Where a run starts, reverses and ends (n,), and when it is there [s]."""
+        """Path parameters (n,) where a run rests, both ends included, and when it does (n,) [s]."""
         laps = self.laps if shape.closed else 1
         span = shape.length * laps
         places = np.array([0.0, span])
@@ -137,7 +137,7 @@ class RestToRest(TimeLaw):
 
 @dataclass(frozen=True)
 class Stopping(TimeLaw):
-    """Another law until `start`, from where its clock runs slower until all is at rest."""
+    """Another law until `start`; from there its clock slows down and stops in `ramp_time`."""
 
     law: TimeLaw
     start: float  # [s]

@@ -1,4 +1,4 @@
-"""What the climber shall do: a shape p(s) travelled by a time law s(t), from position to jerk.
+"""A trajectory: a shape p(s) travelled by a time law s(t), from position to jerk.
 
 ṗ = p' ṡ,   p̈ = p'' ṡ² + p' s̈,   p⃛ = p''' ṡ³ + 3 p'' ṡ s̈ + p' s⃛, and the heading along p'.
 """
@@ -54,11 +54,12 @@ class Trajectory:
         return self._travelled(self.law.progress(np.asarray(time, dtype=float), self.course))
 
     def path(self, points: int) -> Array:
-        """Poses (points, 3) evenly spaced in the path parameter, along the shape once."""
+        """Poses (points, 3) [m, rad], even in the path parameter, once along the shape."""
         s = np.linspace(0, self.course.length, points)
         return self._travelled((s, np.ones_like(s), 0 * s, 0 * s)).pose
 
     def _travelled(self, progress: Derivatives) -> Reference:
+        """Reference (...) of s and its derivatives by time (...), by the chain rule."""
         s, *rates = progress
         s_1, s_2, s_3 = (rate[..., None] for rate in rates)
         _, p_1, p_2, p_3 = path = self.course.derivatives(s)
@@ -67,13 +68,13 @@ class Trajectory:
         forwards = p_1 * np.asarray(self.course.gear(s))[..., None]
         heading = np.arctan2(forwards[..., 1:], forwards[..., :1]) + np.pi * self.reverse_gear
         square = np.sum(p_1**2, axis=-1, keepdims=True)
-        turning = _cross(p_1, p_2) / square  # dθ/ds
-        turning_rate = (
+        curvature = _cross(p_1, p_2) / square  # dθ/ds
+        curvature_1 = (  # by s
             _cross(p_1, p_3) / square
-            - 2 * turning * np.sum(p_1 * p_2, axis=-1, keepdims=True) / square
+            - 2 * curvature * np.sum(p_1 * p_2, axis=-1, keepdims=True) / square
         )
-        yaw_rate = turning * s_1
-        yaw_acceleration = turning_rate * s_1**2 + turning * s_2
+        yaw_rate = curvature * s_1
+        yaw_acceleration = curvature_1 * s_1**2 + curvature * s_2
         return Reference(
             pose=np.concatenate([position + self.origin, heading], axis=-1),
             velocity=np.concatenate([velocity, yaw_rate], axis=-1),
@@ -83,4 +84,5 @@ class Trajectory:
 
 
 def _cross(u: Array, v: Array) -> Array:
+    """Cross product (..., 1) of vectors (..., 2)."""
     return u[..., :1] * v[..., 1:] - u[..., 1:] * v[..., :1]

@@ -1,4 +1,4 @@
-"""The trajectory as parameters say, whoever reads them: a node, or a campaign."""
+"""The trajectory that parameters describe, for nodes and campaigns."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from climber_uk.parameters.declaration import check, parameter
 
 @dataclass(frozen=True)
 class TrajectoryParameters:
-    """What to follow."""
+    """The trajectory: a shape, a time law, and where they begin."""
 
     shape: str = parameter("ellipse", "", "shape of the path", choices=SHAPES)
     time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=TIME_LAWS)
@@ -24,15 +24,15 @@ class TrajectoryParameters:
         check(self)
 
 
-KINDS: list[tuple[type, str]] = [
+TYPES: list[tuple[type, str]] = [
     (TrajectoryParameters, ""),
     *((kind, f"{name}.") for name, kind in {**SHAPES, **TIME_LAWS}.items()),
 ]
-"""All that is read, with the prefix of its parameters."""
+"""Classes of parameters that `build_trajectory` reads, each with the prefix of its names."""
 
 
 def build_trajectory(read: Callable[..., Any]) -> Trajectory:
-    """Trajectory of what `read` gives for a class and a prefix; `ValueError` if there is none."""
+    """Trajectory whose parameters `read(class, prefix)` gives; `ValueError` if they make none."""
     plan = read(TrajectoryParameters)
     return Trajectory(
         shape=read(SHAPES[plan.shape], f"{plan.shape}."),

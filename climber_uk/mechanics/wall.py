@@ -19,15 +19,15 @@ from climber_uk.parameters.registry import Variants
 
 
 class Wall(Protocol):
-    """A wall; `inclination` [deg] is that at the origin: 0 floor, 90 vertical, 180 ceiling."""
+    """A wall's shape; `inclination` [deg] at the origin: 0 floor, 90 vertical, 180 ceiling."""
 
     flat: ClassVar[bool]
 
     def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
-        """Parts (s_x, s_y) of gravity along the wall at height `y` (...) [m], each (...)."""
+        """Components (s_x, s_y) of gravity along the wall, by g, at y (...) [m]; each (...)."""
 
     def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
-        """g_n (...) [m/s²] into the wall, with what the way's curvature adds at ẏ = `y_speed`."""
+        """g_n (...) [m/s²] into the wall, with the centripetal part at ẏ = `y_speed` [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Plane(Wall):
     """A flat wall; y points uphill unless it is tilted."""
 
     tilt: float = parameter(
-        0.0, "deg", "by which downhill is turned from -y, anticlockwise", at_least=-180, at_most=180
+        0.0, "deg", "angle from -y to downhill, anticlockwise", at_least=-180, at_most=180
     )
 
     flat: ClassVar[bool] = True
@@ -57,7 +57,7 @@ class Plane(Wall):
 class Cylinder(Wall):
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
-    radius: float = parameter(2.0, "m", "of the cylinder R: > 0 inside it, < 0 outside")
+    radius: float = parameter(2.0, "m", "radius R: > 0 inside the cylinder, < 0 on its outside")
 
     flat: ClassVar[bool] = False
 

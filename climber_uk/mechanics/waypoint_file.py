@@ -48,7 +48,7 @@ def _text(path: Path) -> str:
 
 @dataclass(frozen=True)
 class _Columns:
-    """Where x and y are among the cells of a line."""
+    """Number of cells in a line, and the indices of x and y among them."""
 
     number: int
     x: int = 0
@@ -88,7 +88,7 @@ def _split(row: str, separator: str | None) -> list[str]:
 def _columns(
     lines: list[Line], above: list[str], separator: str | None
 ) -> tuple[_Columns, list[Line]]:
-    """Columns as a header names them, which may be a comment, and the lines without it."""
+    """Columns, by a header (which may be a comment) if there is one, and the lines below it."""
     number, first = lines[0]
     if not any(_is_number(cell) for cell in first):
         return _named(f"line {number}", first), lines[1:]
@@ -105,6 +105,7 @@ def _columns(
 
 
 def _named(where: str, names: list[str]) -> _Columns:
+    """Columns of a header; `where` is what an error calls it."""
     found = [_name(name) for name in names]
     if found.count("x") != 1 or found.count("y") != 1:
         raise ValueError(f"{where}: want one column x and one y, found {', '.join(names)}")

@@ -18,7 +18,7 @@ STATIONS = 2001
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Straight from each point of a text file to the next, corners rounded within `tolerance`.
+    """A path straight from each point of a text file to the next, its corners rounded.
 
     The path parameter s is the distance [m] on straights. In bends it is stretched, so that at
     the law's rate the limits of yaw rate and acceleration hold. Where the points turn back, the
@@ -26,16 +26,16 @@ class Waypoints:
     nearer than a sixth of the tolerance to its first. Raises `ValueError` naming the file.
     """
 
-    file: str = parameter("", "", "text file with x and y of a point a line, in m", is_path=True)
+    file: str = parameter("", "", "text file with x and y [m], one point a line", is_path=True)
     tolerance: float = parameter(
-        0.02, "m", "how far the path may be from the lines between the points", above=0
+        0.02, "m", "most distance of the path from the straight lines between points", above=0
     )
-    max_yaw_rate: float = parameter(1.0, "rad/s", "yaw rate in bends, which are slow", above=0)
-    max_acceleration: float = parameter(0.5, "m/s²", "acceleration in and before bends", above=0)
+    max_yaw_rate: float = parameter(1.0, "rad/s", "most yaw rate; bends are slow for it", above=0)
+    max_acceleration: float = parameter(0.5, "m/s²", "most acceleration, also in bends", above=0)
     reversal_angle: float = parameter(
         0.35,
         "rad",
-        "a corner that turns back, within this angle of the way it came, is driven in reverse",
+        "a corner that goes back, within this angle of the way it came, is driven in reverse",
         at_least=0.01,
         at_most=1.0,
     )
@@ -101,7 +101,7 @@ class Waypoints:
 
 @dataclass(frozen=True)
 class SlowedPath:
-    """A rounded polyline, its parameter stretched in bends."""
+    """A rounded polyline whose parameter is stretched in bends, for one rate."""
 
     path: Rounded
     slowed: Slowed
@@ -118,7 +118,7 @@ class SlowedPath:
 
     @cached_property
     def _start(self) -> float:
-        """Parameter of `slowed` where this one is 0."""
+        """u of `slowed` where this path begins."""
         return float(self.slowed.parameter(self.path.start))
 
     def at_rate(self, _: float) -> "SlowedPath":
@@ -162,7 +162,7 @@ class SlowedPath:
         return compose(path, (by_s_1, by_s_2, by_s_3))  # type: ignore[arg-type]
 
     def _progress(self, s: Array) -> Derivatives:
-        """Place on the rounded polyline, with its derivatives by s."""
+        """Parameter of the rounded polyline, with its derivatives by this path's s."""
         s = s + self._start
         s = np.mod(s, self.length) if self.closed else np.clip(s, 0.0, self.length)
         return self.slowed.progress(s)

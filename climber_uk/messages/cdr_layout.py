@@ -1,4 +1,4 @@
-"""Where a serialised message has its numbers.
+"""The layout of a serialised message: the byte at which each number stands.
 
 CDR puts a field where the strings and lengths before it leave it. So all messages of one type that
 have the same strings and the same lengths have their numbers in the same places.
@@ -23,13 +23,16 @@ FORMATS = {
 
 @dataclass
 class Layout:
-    """Where a message, and others with the same strings and lengths, has its numbers."""
+    """Places of the numbers in a message, and in others with the same strings and lengths.
+
+    `walk` fills it; raises `ValueError` if `data` is no CDR, or ends too early.
+    """
 
     data: bytes
     store: Typestore
-    place: int = HEADER
+    place: int = HEADER  # of the next byte
     fields: dict[str, tuple[Any, int]] = field(default_factory=dict)  # format and place by path
-    # begins and ends of all else
+    # begin and end of all strings and lengths
     fixed: list[tuple[int, int]] = field(default_factory=lambda: [(0, HEADER)])
     strings: dict[str, str] = field(default_factory=dict)
     lengths: dict[str, int] = field(default_factory=dict)
@@ -56,7 +59,7 @@ class Layout:
         )
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool]:
-        """Which of some messages (n, size) have the same strings and lengths."""
+        """Which messages, as rows (n, size) of bytes, have the strings and lengths of the first."""
         fits = np.ones(len(rows), bool)
         if len(rows) > 1:
             places = np.concatenate([np.arange(*span) for span in self.fixed])
@@ -64,11 +67,12 @@ class Layout:
         return fits
 
     def walk(self, type_name: str, path: str = "") -> None:
-        """Find the fields of a type from here on."""
+        """Find the fields of a type, from `place` on; `path` is what their names begin with."""
         for name, description in self.store.fielddefs[type_name][1]:
             self._find(description, f"{path}.{name}" if path else name)
 
     def _find(self, description: Any, path: str) -> None:
+        """Find one field, of a `description` as rosbags has it, and go behind it."""
         kind, what = description
         self.parts += 1
         if self.parts > MOST_PARTS:
@@ -93,6 +97,7 @@ class Layout:
                 self._find(element, f"{path}.{i}")
 
     def _number(self, path: str, kind: str, length: int | None = None) -> None:
+        """Keep a number, or an array of `length` numbers, and go behind it."""
         if length == 0:
             return
         if kind not in FORMATS:
@@ -103,7 +108,7 @@ class Layout:
         self._go_to(start + int(code[2:]) * (1 if length is None else length))
 
     def _length(self) -> tuple[int, int]:
-        """Place behind a length, and the length."""
+        """Read a length; return the place behind it, and the length."""
         start = self._aligned(4)
         self._keep(start, 4)
         length = int(np.frombuffer(self.data, f"{self.order}u4", 1, start)[0])
@@ -112,6 +117,7 @@ class Layout:
         return self.place, length
 
     def _keep(self, start: int, size: int) -> None:
+        """Count bytes among those that other messages must have, too, and go behind them."""
         self.fixed.append((start, start + size))
         self._go_to(start + size)
 
@@ -121,4 +127,5 @@ class Layout:
         self.place = place
 
     def _aligned(self, size: int) -> int:
+        """Place of the next number of `size` bytes."""
         return self.place + (HEADER - self.place) % size

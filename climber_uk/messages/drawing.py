@@ -1,8 +1,8 @@
-"""What is to be seen of a climber, as markers in the wall's frame.
+"""Markers that draw a climber, in the wall's frame.
 
     p = (x, y) + R(θ) (forward, left)        z is off the wall, 0 at the centre of mass
 
-A viewer forgets each after `LIFETIME`, so that what is not drawn again is not seen for long.
+A viewer removes each after `LIFETIME` unless it is drawn again.
 """
 
 import math
@@ -26,13 +26,13 @@ OUTLINE = (-0.6, -1.2), (0.6, -1.2), (0.9, 0.0), (0.6, 1.2), (-0.6, 1.2), (-0.6,
 
 
 def colour_of(margin: float) -> Colour:
-    """Red up to 1, where it slips; yellow at 2; green from 3 on."""
+    """Colour of a margin: red up to 1, below which it slips; yellow at 2; green from 3 on."""
     ample = min(max(0.0, (margin - 1) / 2), 1.0)
     return min(2 - 2 * ample, 1.0), min(2 * ample, 1.0), 0.0, 1.0
 
 
 def place(pose: Array, forward: float, left: float, off_wall: float) -> Place:
-    """Where a point of the climber is whose pose (3,) is given."""
+    """Point (x, y, z) [m] that is `forward` and `left` [m] of a climber at `pose` (3,)."""
     x, y, heading = pose.tolist()
     cosine, sine = math.cos(heading), math.sin(heading)
     return x + forward * cosine - left * sine, y + forward * sine + left * cosine, off_wall
@@ -46,7 +46,7 @@ class Drawing:
         self.array = MarkerArray()
 
     def add(self, group: str, kind: int, size: Place, colour: Colour) -> Marker:
-        """One more marker of a group, at the origin."""
+        """Add a marker to a group, at the origin, and return it; `size` [m]."""
         name = self.prefix + group
         number = sum(marker.ns == name for marker in self.array.markers)
         marker = Marker(ns=name, id=number, type=kind, lifetime=LIFETIME)
@@ -60,7 +60,7 @@ class Drawing:
     def climber(
         self, group: str, pose: Array, half_track: float, wheel_radius: float, colour: Colour
     ) -> None:
-        """Draw a plate that is wider than wheels and all, on it the front and the wheels."""
+        """Draw a climber at `pose` (3,): a plate, with a front and two wheels."""
         plate, front = (1.2 * half_track, 2.4 * half_track, 0.01), (0.04, half_track, 0.06)
         wheel = 2 * wheel_radius, 0.02, 2 * wheel_radius
         self.box(group, pose, (0.0, 0.0, WALL), plate, colour)
@@ -69,12 +69,12 @@ class Drawing:
             self.box(group, pose, (0.0, left, AXLE), wheel, DARK)
 
     def outline(self, group: str, pose: Array, half_track: float, colour: Colour) -> None:
-        """Draw where that plate would be, with a tip at the front."""
+        """Draw the outline of a climber at `pose` (3,), with a tip at its front."""
         corners = [(half_track * forward, half_track * left) for forward, left in OUTLINE]
         self.line(group, [place(pose, *corner, OVER_PLATE) for corner in corners], colour)
 
     def box(self, group: str, pose: Array, centre: Place, size: Place, colour: Colour) -> None:
-        """Draw a part of a climber at `pose` (3,)."""
+        """Draw a box of `size` at `centre`, both in the frame of a climber at `pose` (3,) [m]."""
         marker = self.add(group, Marker.CUBE, size, colour)
         marker.pose.position = point(place(pose, *centre))
         marker.pose.orientation = writing.quaternion(float(pose[2]))
@@ -88,11 +88,11 @@ class Drawing:
         marker.points = [point(place(pose, *start)), point(place(pose, *end))]
 
     def line(self, group: str, places: Iterable[Place], colour: Colour) -> None:
-        """Draw a line through places."""
+        """Draw a line through points (x, y, z) [m]."""
         marker = self.add(group, Marker.LINE_STRIP, (0.02, 0.0, 0.0), colour)
         marker.points = [point(place) for place in places]
 
 
 def point(place: Place) -> Point:
-    """Message of a place."""
+    """Message of a point (x, y, z) [m]."""
     return Point(x=place[0], y=place[1], z=place[2])

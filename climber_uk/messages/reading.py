@@ -1,7 +1,7 @@
-"""Messages to data; no ROS needed: an object with a message's fields will do, whoever read it.
+"""Messages to data; no ROS needed: any object with the fields of a message is taken.
 
-Checked at this boundary, trusted inside: whatever is unfit raises `ValueError` with what and which
-value. Stamps are integers in nanoseconds.
+Everything is checked here, and trusted inside: `ValueError` names what is unfit, and its value.
+Stamps are integers in nanoseconds. Messages have wheels by name; arrays have (right, left).
 """
 
 import math
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import State, Torques
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from sensor_msgs.msg import FluidPressure, JointState
 
 
-LARGEST = 1e6  # in SI units, of whatever a climber or its wall can be said to do
-NORM_TOLERANCE = 0.01  # by which a quaternion's norm may be off 1, as tf2 takes it
-MOST_TILT = 0.1  # of a unit quaternion's hypot(x, y): 11.5° from a turn about z
+LARGEST = 1e6  # of any quantity of a climber, in SI units
+NORM_TOLERANCE = 0.01  # of a quaternion's norm, which is 1; the same as tf2's
+MOST_TILT = 0.1  # of a unit quaternion's hypot(x, y): 11.5° off a rotation about z
 
 
 def nanoseconds(time: "Time | Duration") -> int:
@@ -31,7 +31,7 @@ def nanoseconds(time: "Time | Duration") -> int:
 
 
 def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
-    """State of the climber: pose in `odom_frame`, and twist turned from the body into it."""
+    """State in `odom_frame`, the wall's; the twist is rotated into it from `base_frame`."""
     for name, frame, wanted in (
         ("frame_id", message.header.frame_id, odom_frame),
         ("child_frame_id", message.child_frame_id, base_frame),
@@ -49,20 +49,20 @@ def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
 
 
 def wheel_torques(message: "JointState", left_joint: str, right_joint: str) -> Array:
-    """Torques (2,) right, left [N m]."""
+    """Torques (2,) (right, left) [N m]."""
     if sorted(message.name) != sorted([left_joint, right_joint]):
         raise ValueError(f"names {list(message.name)} must be {left_joint!r} and {right_joint!r}")
     if len(message.effort) != 2:
         raise ValueError(f"{len(message.effort)} efforts must be 2")
     efforts = dict(zip(message.name, message.effort, strict=True))
-    torques = np.array([efforts[right_joint], efforts[left_joint]])
+    torques = np.array(Torques(right=efforts[right_joint], left=efforts[left_joint]))
     if not np.isfinite(torques).all():
         raise ValueError(f"efforts {list(message.effort)} must be finite")
     return torques
 
 
 def pressure(message: "FluidPressure") -> float:
-    """Pressure difference [Pa]."""
+    """Pressure difference of the suction [Pa], from 0 on."""
     pressure = float(message.fluid_pressure)
     if not 0 <= pressure <= LARGEST:
         raise ValueError(f"fluid_pressure={pressure} must be from 0 to {LARGEST:g} [Pa]")
@@ -70,7 +70,7 @@ def pressure(message: "FluidPressure") -> float:
 
 
 def wrench(message: "WrenchStamped", odom_frame: str, base_frame: str) -> tuple[Array, bool]:
-    """Planar wrench (3,) x, y [N], about z [N m], and whether it is one in `base_frame`."""
+    """Planar wrench (3,) x, y [N], about z [N m]; and whether its frame is `base_frame`."""
     frame = message.header.frame_id
     if frame not in (odom_frame, base_frame):
         raise ValueError(f"frame_id={frame!r} must be {odom_frame!r} or {base_frame!r}")
@@ -81,21 +81,21 @@ def wrench(message: "WrenchStamped", odom_frame: str, base_frame: str) -> tuple[
 
 
 def parameters(message: "ParameterEvent") -> dict[str, bool | int | float | str]:
-    """Values by name of all that are one truth, number or text."""
+    """Values, by name, of all parameters that are a bool, a number or a string."""
     kinds = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value"}
-    told = [(told.name, told.value) for told in message.new_parameters]
-    return {name: getattr(value, kinds[value.type]) for name, value in told if value.type in kinds}
+    pairs = [(changed.name, changed.value) for changed in message.new_parameters]
+    return {name: getattr(value, kinds[value.type]) for name, value in pairs if value.type in kinds}
 
 
 def check_size(**vectors: "Array | list[list[float]]") -> None:
-    """Raise `ValueError` naming what is not finite, or above `LARGEST`."""
+    """Raise `ValueError` naming the vector that is not finite, or beyond ± `LARGEST`."""
     for name, vector in vectors.items():
         if not (np.abs(vector) <= LARGEST).all():
             raise ValueError(f"{name} {vector} is not finite, or above {LARGEST:g} in SI units")
 
 
 def heading_of(orientation: "Quaternion") -> float:
-    """Heading, in (-π, π]; climbers turn about z only, so x and y must be (nearly) zero."""
+    """Heading in [-π, π] [rad]; `ValueError` unless it is a unit quaternion (nearly) about z."""
     x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
     norm, tilted = math.hypot(x, y, z, w), math.hypot(x, y)
     if not (abs(norm - 1) <= NORM_TOLERANCE and tilted < MOST_TILT * norm):

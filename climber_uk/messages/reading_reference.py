@@ -1,4 +1,4 @@
-"""The reference's messages to data; see `reading`."""
+"""Messages of the reference to data, as `reading`; apart, as not every node reads them."""
 
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def preview(message: "MultiDOFJointTrajectory", odom_frame: str) -> Preview:
-    """Preview of the one joint of a trajectory."""
+    """Preview of a trajectory of one joint, in `odom_frame`; `ValueError` if it is unfit."""
     if message.header.frame_id != odom_frame:
         raise ValueError(f"frame_id={message.header.frame_id!r} must be {odom_frame!r}")
     poses, velocities, accelerations = [], [], []

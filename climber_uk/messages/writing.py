@@ -1,4 +1,7 @@
-"""Data to messages: pure functions. Stamps are integers in nanoseconds."""
+"""Data to messages: pure functions. Stamps are integers in nanoseconds.
+
+Arrays of two wheels are (right, left), messages have (left, right): `left_right` swaps them.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,13 +32,13 @@ from climber_uk.mechanics.quantities import State
 if TYPE_CHECKING:
     from climber_uk.mechanics.reference import Reference
 
-EXACT = np.diag([1e-12] * 6).ravel()
-EXACT.setflags(write=False)  # messages share it
+ROUNDING_COVARIANCE = np.diag([1e-12] * 6).ravel()
+ROUNDING_COVARIANCE.setflags(write=False)  # messages share it
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
 def time(nanoseconds: int) -> Time:
-    """Stamp of `nanoseconds`."""
+    """Message of a stamp [ns]."""
     return Time(sec=nanoseconds // SECOND, nanosec=nanoseconds % SECOND)
 
 
@@ -50,12 +53,12 @@ def odometry(state: State, stamp: int, odom_frame: str, base_frame: str) -> Odom
     message.twist.twist.linear.x = float(state.forward_speed)
     message.twist.twist.linear.y = float(state.side_slip)
     message.twist.twist.angular.z = float(state.velocity[2])
-    message.pose.covariance = message.twist.covariance = EXACT
+    message.pose.covariance = message.twist.covariance = ROUNDING_COVARIANCE
     return message
 
 
 def transform(odometry: Odometry) -> TransformStamped:
-    """The same pose as a transform."""
+    """Transform of an odometry's pose."""
     message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
     position = odometry.pose.pose.position
     message.transform.translation = Vector3(x=position.x, y=position.y)
@@ -64,15 +67,21 @@ def transform(odometry: Odometry) -> TransformStamped:
 
 
 def wheel_torques(torques: Array, stamp: int, left_joint: str, right_joint: str) -> JointState:
-    """Message of torques (2,) right, left; `stamp` is that of the odometry they answer."""
+    """Message of torques (2,) (right, left) [N m]; `stamp` is that of the odometry they answer."""
     message = JointState(name=[left_joint, right_joint])
-    message.effort = [float(torques[1]), float(torques[0])]
+    message.effort = left_right(torques)
     message.header.stamp = time(stamp)
     return message
 
 
+def left_right(pair: Array) -> list[float]:
+    """Numbers of the wheels in the order of messages, from an array (2,) (right, left)."""
+    right, left = map(float, pair)
+    return [left, right]
+
+
 def reference_point(reference: "Reference", time: float) -> MultiDOFJointTrajectoryPoint:
-    """Point of a trajectory: one reference, `time` [s] after its start."""
+    """Point of a trajectory message: a reference `time` [s] after the trajectory's start."""
     x, y, heading = reference.pose.tolist()
     point = MultiDOFJointTrajectoryPoint()
     point.transforms = [Transform(translation=Vector3(x=x, y=y), rotation=quaternion(heading))]
@@ -86,7 +95,7 @@ def reference_point(reference: "Reference", time: float) -> MultiDOFJointTraject
 def reference(
     points: Iterable[MultiDOFJointTrajectoryPoint], start: int, odom_frame: str, base_frame: str
 ) -> MultiDOFJointTrajectory:
-    """Preview message of some points of the trajectory that started at `start` [ns]."""
+    """Preview message: points of a trajectory that started at `start` [ns]."""
     message = MultiDOFJointTrajectory(joint_names=[base_frame], points=list(points))
     message.header.stamp = time(start)
     message.header.frame_id = odom_frame
@@ -94,14 +103,14 @@ def reference(
 
 
 def time_reference(reference: int, stamp: int, source: str) -> TimeReference:
-    """Time of a reference [ns] that is followed, or waits, at `stamp` [ns]."""
+    """Time of the reference [ns] that is followed at `stamp` [ns]; `source` is the mode."""
     message = TimeReference(time_ref=time(reference), source=source)
     message.header.stamp = time(stamp)
     return message
 
 
 def path(poses: Array, stamp: int, odom_frame: str) -> Path:
-    """Path through poses (n, 3)."""
+    """Path message through poses (n, 3) [m, rad]."""
     path = Path()
     path.header.stamp = time(stamp)
     path.header.frame_id = odom_frame
@@ -114,7 +123,7 @@ def path(poses: Array, stamp: int, odom_frame: str) -> Path:
 
 
 def vector(vector: Iterable[Array | float], stamp: int, frame: str) -> Vector3Stamped:
-    """Three numbers with a stamp."""
+    """Message of three numbers with a stamp [ns] and a frame."""
     x, y, z = (float(component) for component in vector)
     message = Vector3Stamped(vector=Vector3(x=x, y=y, z=z))
     message.header.stamp = time(stamp)
@@ -123,7 +132,7 @@ def vector(vector: Iterable[Array | float], stamp: int, frame: str) -> Vector3St
 
 
 def wrench(planar: Sequence[float] | Array, stamp: int, frame: str) -> WrenchStamped:
-    """Wrench of (force.x, force.y, torque.z)."""
+    """Message of a planar wrench (3,): x, y [N], about z [N m]."""
     message = WrenchStamped()
     message.wrench.force.x, message.wrench.force.y = float(planar[0]), float(planar[1])
     message.wrench.torque.z = float(planar[2])
@@ -135,7 +144,7 @@ def wrench(planar: Sequence[float] | Array, stamp: int, frame: str) -> WrenchSta
 def diagnostics(
     name: str, level: bytes, trouble: str, values: Mapping[str, object], stamp: int
 ) -> DiagnosticArray:
-    """One status."""
+    """Diagnostics message of one status; an empty `trouble` reads ok."""
     status = DiagnosticStatus(
         name=name,
         level=level,
@@ -148,7 +157,7 @@ def diagnostics(
 
 
 def parameters(values: Mapping[str, object], node: str, stamp: int) -> ParameterEvent:
-    """All parameters of a node, as they are."""
+    """Message of parameters of a node, by name, with their values."""
     named = [Parameter(name, value=value) for name, value in values.items()]
     message = ParameterEvent(stamp=time(stamp), node=node)
     message.new_parameters = [parameter.to_parameter_msg() for parameter in named]
@@ -156,7 +165,7 @@ def parameters(values: Mapping[str, object], node: str, stamp: int) -> Parameter
 
 
 def quaternion(heading: float) -> Quaternion:
-    """Turn about z."""
+    """Quaternion of a rotation about z by `heading` [rad]."""
     return Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
 
 

@@ -1,6 +1,6 @@
-"""Draws a climber for RViz and Foxglove: where it is and should be, its way, torques and force.
+"""Draws a climber for RViz and Foxglove: pose and trace, reference, torques and force.
 
-All is drawn in the wall's frame, at the pose that odometry tells: no /tf is needed.
+All is drawn in the wall's frame, at the pose of the odometry: no /tf is needed.
 """
 
 from collections import deque
@@ -25,13 +25,13 @@ from climber_uk.ros.running import BEST_EFFORT, PUBLISH_PERIOD, RELIABLE, Climbe
 T = TypeVar("T")
 REFERENCE, TORQUES = "reference", "wheel_torques"
 FORCE, MARGINS = "uk_torque_controller/constraint_force", "uk_torque_controller/margins"
-SEEN = {
+TOPICS = {
     REFERENCE: MultiDOFJointTrajectory,
     TORQUES: JointState,
     FORCE: WrenchStamped,
     MARGINS: Vector3Stamped,
 }
-AGE = SECOND  # [ns] of what is no longer drawn
+AGE = SECOND  # [ns] of a message, above which it is not drawn
 ABOVE = 0.05  # [m] off the wall: arrows hide nothing there, and nothing hides them
 ORANGE, BLUE = (1.0, 0.6, 0.1, 1.0), (0.2, 0.6, 1.0, 1.0)
 GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
@@ -39,23 +39,23 @@ GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
 
 @dataclass(frozen=True)
 class MarkerOptions:
-    """How large it is drawn."""
+    """Sizes in the drawing."""
 
     half_track: float = parameter(
         0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
     )
     wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0, plausible=(0.005, 0.5))
-    torque_scale: float = parameter(0.3, "m/(N m)", "length of a torque's arrow", above=0)
-    force_scale: float = parameter(0.005, "m/N", "length of a force's arrow", above=0)
-    way_spacing: float = parameter(0.05, "m", "between two points of the way", above=0)
-    way_points: int = parameter(400, "", "of the way that are kept", above=0)
+    torque_scale: float = parameter(0.3, "m/(N m)", "length of an arrow by its torque", above=0)
+    force_scale: float = parameter(0.005, "m/N", "length of an arrow by its force", above=0)
+    way_spacing: float = parameter(0.05, "m", "distance between two points of the trace", above=0)
+    way_points: int = parameter(400, "", "points of the trace that are kept", above=0)
 
     def __post_init__(self) -> None:
         check(self)
 
 
 class Markers(ClimberNode):
-    """Keeps the latest message of each topic, and draws them with odometry, 20 times a second."""
+    """Keeps the latest message of each topic; draws all at an odometry, 20 times a second."""
 
     def __init__(self) -> None:
         super().__init__("markers")
@@ -63,74 +63,72 @@ class Markers(ClimberNode):
         self.parameters.refuse_unknown()
         self.options = self.parameters.read(MarkerOptions)
         self.latest: dict[str, Any] = {}
-        self.way: deque[Place] = deque(maxlen=self.options.way_points)
-        self.is_due, self.last = Throttle(PUBLISH_PERIOD), 0
+        self.trace: deque[Place] = deque(maxlen=self.options.way_points)
+        self.is_due, self.last_stamp = Throttle(PUBLISH_PERIOD), 0
         self.markers = self.publisher(MarkerArray, "markers", RELIABLE)
         self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
-        for topic, kind in SEEN.items():
+        for topic, kind in TOPICS.items():
             self.subscription(kind, topic, partial(self.latest.__setitem__, topic), BEST_EFFORT)
 
     def summary(self) -> str:
-        """What is drawn."""
+        """Size of the climber that is drawn, for the log."""
         radius, half_track = self.options.wheel_radius, self.options.half_track
         return f"wheels of radius {radius:g} m, {2 * half_track:g} m apart"
 
     def on_odometry(self, message: Odometry) -> None:
-        """Draw, if it is time to."""
+        """Draw, if a `PUBLISH_PERIOD` has passed."""
         stamp = reading.nanoseconds(message.header.stamp)
         if not self.is_due(stamp):
             return
         odom_frame, base_frame = self.names.odom_frame, self.names.base_frame
-        state = self.understood("odom", message, lambda m: reading.state(m, odom_frame, base_frame))
+        state = self.read("odom", message, lambda m: reading.state(m, odom_frame, base_frame))
         if state is not None:
-            if stamp < self.last:
-                self.way.clear()
-            self.last = stamp
+            if stamp < self.last_stamp:
+                self.trace.clear()
+            self.last_stamp = stamp
             self.markers.publish(self.drawing(stamp, state.pose).array)
 
-    def understood(self, topic: str, message: Any, read: Callable[[Any], T]) -> T | None:
-        """What a message says; None, and a word about it, if it is not fit."""
+    def read(self, topic: str, message: Any, convert: Callable[[Any], T]) -> T | None:
+        """Data that `convert` makes of a message; None, and a report, if it is unfit."""
         try:
-            meaning = read(message)
+            data = convert(message)
         except ValueError as error:
-            self.say(topic, "refused", str(error))
+            self.report(topic, "refused", str(error))
             return None
-        self.say(topic, "")
-        return meaning
+        self.report(topic, "")
+        return data
 
-    def fresh(self, topic: str, stamp: int, read: Callable[[Any], T]) -> T | None:
-        """What the latest message of a topic says, unless it is of another time than `stamp`."""
+    def read_latest(self, topic: str, stamp: int, convert: Callable[[Any], T]) -> T | None:
+        """Data of a topic's latest message; None if it is more than `AGE` from `stamp` [ns]."""
         message = self.latest.get(topic)
         if message is None or abs(stamp - reading.nanoseconds(message.header.stamp)) > AGE:
             return None
-        return self.understood(topic, message, read)
+        return self.read(topic, message, convert)
 
     def drawing(self, stamp: int, pose: Array) -> Drawing:
-        """All that is known at a time [ns], of a climber at `pose` (3,)."""
+        """Drawing at `stamp` [ns] of a climber at `pose` (3,)."""
         prefix = self.get_namespace().strip("/")
         drawing = Drawing(stamp, self.names.odom_frame, f"{prefix}/" if prefix else "")
-        margin = self.fresh(MARGINS, stamp, lambda message: float(message.vector.x))
+        margin = self.read_latest(MARGINS, stamp, lambda message: float(message.vector.x))
         colour = GREY if margin is None else colour_of(margin)
         drawing.climber("climber", pose, self.options.half_track, self.options.wheel_radius, colour)
-        self.draw_way(drawing, place(pose, 0.0, 0.0, WALL))
+        self.draw_trace(drawing, place(pose, 0.0, 0.0, WALL))
         self.draw_reference(drawing, stamp)
         self.draw_arrows(drawing, stamp, pose)
         return drawing
 
-    def draw_way(self, drawing: Drawing, here: Place) -> None:
-        """Draw the way to `here`."""
-        if not self.way or dist(here, self.way[-1]) >= self.options.way_spacing:
-            self.way.append(here)
-        drawing.line("way", [*self.way, here], GREY)
+    def draw_trace(self, drawing: Drawing, here: Place) -> None:
+        """Draw the trace of the climber up to `here`."""
+        if not self.trace or dist(here, self.trace[-1]) >= self.options.way_spacing:
+            self.trace.append(here)
+        drawing.line("way", [*self.trace, here], GREY)
 
     def draw_reference(self, drawing: Drawing, stamp: int) -> None:
-        """Draw an outline of the climber where it should be."""
+        """Draw the outline of a climber at the reference's pose."""
         message, odom_frame = self.latest.get(REFERENCE), self.names.odom_frame
         if message is None:
             return
-        preview = self.understood(
-            REFERENCE, message, lambda m: reading_reference.preview(m, odom_frame)
-        )
+        preview = self.read(REFERENCE, message, lambda m: reading_reference.preview(m, odom_frame))
         desired = preview.at(stamp) if preview is not None else None
         if desired is not None:
             drawing.outline(REFERENCE, desired.pose, self.options.half_track, VIOLET)
@@ -139,13 +137,13 @@ class Markers(ClimberNode):
         """Draw torques at the wheels, and drive and lateral force at the centre."""
         names, options = self.names, self.options
         left, right = names.left_wheel_joint, names.right_wheel_joint
-        torques = self.fresh(TORQUES, stamp, lambda m: reading.wheel_torques(m, left, right))
+        torques = self.read_latest(TORQUES, stamp, lambda m: reading.wheel_torques(m, left, right))
         if torques is not None:
             for side, torque in zip((-1, 1), torques.tolist(), strict=True):
                 start = (0.0, side * options.half_track, ABOVE)
                 drawing.arrow(TORQUES, pose, start, (torque * options.torque_scale, 0.0), ORANGE)
         frames = names.odom_frame, names.base_frame
-        force = self.fresh(FORCE, stamp, lambda message: reading.wrench(message, *frames))
+        force = self.read_latest(FORCE, stamp, lambda message: reading.wrench(message, *frames))
         if force is not None:
             drive, lateral, _ = (force[0] * options.force_scale).tolist()
             drawing.arrow("constraint_force", pose, (0.0, 0.0, ABOVE), (drive, lateral), BLUE)

@@ -1,4 +1,4 @@
-"""A climber on its wall in a robot's place: wheel torques in, odometry out."""
+"""Simulates a climber on its wall, in place of a robot: wheel torques in, odometry out."""
 
 from collections.abc import Sequence
 
@@ -19,13 +19,13 @@ from climber_uk.simulation.command_buffer import CommandBuffer
 from climber_uk.simulation.inputs import FellOff, NotFinite
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
-from climber_uk.simulation.simulated_robot import NONE, Physics, Push, SimulatedRobot
+from climber_uk.simulation.simulated_robot import UNPUSHED, Physics, Push, SimulatedRobot
 
-HEARD = "odom", "joint_states", "wheel_torques", "reference"  # of plant, controller and planner
+AWAITED = "odom", "joint_states", "wheel_torques", "reference"  # that `wait_for` subscribes
 
 
 class PlantSimulator(ClimberNode):
-    """A climber in a time of its own, or that it shares with others of the same process.
+    """The node of one climber; its `time` may be shared with others of the same process.
 
     A run that starts in motion starts when the first torque other than zero arrives.
     """
@@ -50,12 +50,12 @@ class PlantSimulator(ClimberNode):
         self.time.publish([self])
 
     def on_parameters(self) -> None:
-        """Take up what was changed: the pump's pressure, a magnet's gap, levels of alarm."""
+        """Take up changed parameters: the pump's pressure, a magnet's gap, levels of alarm."""
         self.robot.take(plant_parts.parts(self.parameters))
         self.margins.alarm = self.parameters.read(Alarm)
 
     def summary(self) -> str:
-        """What is simulated, in which time."""
+        """Climber, physics and clock, for the log."""
         climber, physics = self.robot.plant.climber, self.parameters.read(Physics)
         pull = self.robot.plant.contact.adhesion.force(climber)
         rate = 1 / self.options.control_period
@@ -68,12 +68,12 @@ class PlantSimulator(ClimberNode):
     # Commands
 
     def place_at_start(self) -> None:
-        """Go back to the initial state, with no torque yet."""
+        """Go to the initial state, without torques."""
         start = self.options.initial_state
         self.robot = SimulatedRobot(
             plant_parts.parts(self.parameters), start, self.options.control_period
         )
-        self.held = bool(start.velocity.any())
+        self.waits = bool(start.velocity.any())  # for a torque, to start in motion
         self.origin = self.time.stamp  # of the first odometry [ns]
         timeout = 0.0 if self.options.simulated_time else self.options.command_timeout
         self.commands: CommandBuffer[Array] = CommandBuffer(round(timeout * SECOND))
@@ -81,24 +81,24 @@ class PlantSimulator(ClimberNode):
         self.fallen = self.answered = False
 
     def on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Start again from the initial state; time goes on."""
+        """Service ~/reset: start again from the initial state; time goes on."""
         late = self.parameters.read(Sensors).delay_in(self.options.control_period)
-        self.time.leave_out(self, periods=1 + late)  # no odometry has the stamp of one before
+        self.time.skip(self, periods=1 + late)  # no odometry has the stamp of one before
         self.place_at_start()
-        self.say("climber", "")
+        self.report("climber", "")
         self.time.publish(self.time.standing)
         response.success, response.message = True, f"at the start at {self.now}"
         return response
 
     def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """Stop time, or let it go on."""
+        """Service ~/pause: stop time, or let it run."""
         self.time.pause(bool(request.data))
         response.success = True
         response.message = f"{'paused' if request.data else 'going on'} at {self.now}"
         return response
 
     def on_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Go on by one control period, once the torque for it is there."""
+        """Service ~/step: in a pause, run for one control period once its torque has come."""
         response.success, response.message = False, "not paused"
         if self.fallen:
             response.message = "fallen: reset first"
@@ -108,101 +108,103 @@ class PlantSimulator(ClimberNode):
         return response
 
     def on_push(self, message: WrenchStamped) -> None:
-        """Push from the message's stamp on, or from now if it has none or is late."""
+        """Let a push act from the message's stamp on, or from now if that is 0 or past."""
         try:
             wrench = reading.wrench(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
-            self.say("push", "refused", str(error))
+            self.report("push", "refused", str(error))
             return
-        self.say("push", "")
+        self.report("push", "")
         begin = reading.nanoseconds(message.header.stamp) or self.time.stamp
         self.pushes.add(begin, Push(*wrench))
 
     def on_torques(self, message: JointState) -> None:
-        """Apply torques from now on or, in simulated time, for a step if they answer the last."""
+        """Let torques act from now on; in lock-step only if they answer the last odometry."""
         names = self.names
         try:
             torques = reading.wheel_torques(
                 message, names.left_wheel_joint, names.right_wheel_joint
             )
-            self.say("wheel_torques", "")
+            self.report("wheel_torques", "")
         except ValueError as error:
-            self.say("wheel_torques", "refused, zero torque instead", str(error))
+            self.report("wheel_torques", "refused, zero torque instead", str(error))
             torques = np.zeros(2)
         limit = self.robot.plant.climber.max_wheel_torque
         torques = np.clip(torques, -limit, limit)
-        self.held = self.held and not torques.any()
+        self.waits = self.waits and not torques.any()
         if not self.options.simulated_time:
             self.commands.add(self.get_clock().now().nanoseconds, torques)
         elif reading.nanoseconds(message.header.stamp) == self.asked and not self.answered:
             self.commands.add(self.time.stamp, torques)
             self.answered = True
-            self.say("lock-step", "")
-            self.time.go_on()
+            self.report("lock-step", "")
+            self.time.step_if_due()
 
     def command_at(self, time: int) -> Array:
-        """Torques that act at `time` [ns]: the last to arrive, unless they are too old."""
-        torques, stale = self.commands.at(time)
+        """Torques (2,) [N m] that act at `time` [ns]: the latest, or 0 if these are too old."""
+        torques, is_stale = self.commands.at(time)
         if not self.options.simulated_time:
-            self.say("torque command", "stale; zero torque instead" if stale else "")
+            self.report("torque command", "stale; zero torque instead" if is_stale else "")
         return np.zeros(2) if torques is None else torques
 
     # Time
 
     @property
     def asked(self) -> int:
-        """Stamp of the odometry that is published last [ns]."""
+        """Stamp of the latest odometry [ns], which a torque is to answer."""
         number, _ = self.robot.odometer.latest()
         return self.origin + number * self.time.period
 
     @property
     def now(self) -> str:
-        """Time, to be read."""
+        """Time, for messages."""
         return f"{self.time.stamp / SECOND:.3f} s"
 
     def is_heard_by(self, node: str) -> bool:
-        """Whether a node of that name has subscribed a topic of each node of the climber."""
+        """Whether a node of that name has subscribed all topics of `AWAITED`."""
         return all(
             node in (info.node_name for info in self.get_subscriptions_info_by_topic(topic))
-            for topic in map(self.resolve_topic_name, HEARD)
+            for topic in map(self.resolve_topic_name, AWAITED)
         )
 
     def advance(self) -> None:
-        """Go on by a control period; a climber that falls is heard of no more."""
+        """Advance by a control period and measure; a climber that falls is `fallen` then."""
         try:
-            for number in range(0 if self.held else self.options.steps):
+            for number in range(0 if self.waits else self.options.steps):
                 time = self.time.stamp + number * self.time.period // self.options.steps
                 push, _ = self.pushes.at(time)
-                self.robot.advance(self.command_at(time), push or NONE)
+                self.robot.advance(self.command_at(time), push or UNPUSHED)
         except (FellOff, NotFinite) as error:
             self.fallen = True
-            self.say("climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error))
+            self.report(
+                "climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error)
+            )
             return
         self.robot.measure()
 
     def no_answer(self) -> None:
-        """Report that nobody answers the last odometry."""
-        self.say("lock-step", f"no torque for the odometry of {self.asked / SECOND:.3f} s")
+        """Report that no torque answers the last odometry."""
+        self.report("lock-step", f"no torque for the odometry of {self.asked / SECOND:.3f} s")
 
-    # What it tells
+    # Outputs
 
     def publish_odometry(self) -> None:
-        """Publish what torques are to answer."""
+        """Publish the odometry, which a torque is to answer."""
         self.topics.publish_odometry(self.robot, self.asked)
 
     def publish_others(self) -> None:
-        """Publish all else that a robot would tell, and the margins."""
+        """Publish all other topics, and the margins."""
         self.topics.publish_others(self.robot, self.time.stamp)
         load = self.robot.plant.wheel_load(self.robot.state)
         self.margins.take(*self.robot.margins(), load, self.time.stamp)
 
     def diagnose(self) -> None:
-        """Publish troubles and values, and how near to slipping and tipping it has been."""
+        """Publish a status of troubles and values, and one of the lowest margins."""
         super().diagnose()
         self.margins.diagnose()
 
     def values(self) -> dict[str, object]:
-        """Tell diagnostics how it goes."""
+        """Values for diagnostics."""
         return {
             "time [s]": self.time.stamp / SECOND,
             "suction pressure [Pa]": self.robot.pressure,
@@ -211,8 +213,8 @@ class PlantSimulator(ClimberNode):
         }
 
 
-def in_one_time(climbers: Sequence[str] = ("",)) -> list[PlantSimulator]:
-    """Climbers of some namespaces, whose time is the first one's."""
+def with_one_clock(climbers: Sequence[str] = ("",)) -> list[PlantSimulator]:
+    """Nodes of climbers in some namespaces; all are stepped by the clock of the first."""
     first, *others = climbers
     leader = PlantSimulator(first)
     return [leader, *(PlantSimulator(namespace, leader.time) for namespace in others)]
@@ -225,4 +227,4 @@ def main() -> None:
         "metavar": "NAMESPACE",
         "help": "of each climber (default: one, in none)",
     }
-    run(in_one_time, __doc__, {"--climbers": climbers})
+    run(with_one_clock, __doc__, {"--climbers": climbers})

@@ -1,8 +1,8 @@
-"""Publishes where the climber should be: a short preview of a trajectory, again and again.
+"""Publishes the reference: a short preview of a trajectory, again and again.
 
-The trajectory's times never change their meaning. A controller tells on `reference_time` how far
-it has come, and the preview begins there, however long the controller waits. Where no controller
-tells, the clock leads.
+The trajectory's times never change their meaning. A controller publishes on `reference_time` how
+far it has come, and the preview begins there, however long the controller waits. Where no
+controller publishes it, the clock leads.
 """
 
 from collections import deque
@@ -17,26 +17,26 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
-from climber_uk.mechanics.trajectory_parameters import KINDS, TrajectoryParameters, build_trajectory
+from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
 
-STANDSTILL = 0.2  # [s] of wall-clock time after which a clock that does not go on stands still
-ODOMETRY_AGE = 1.0  # [s] of an odometry that is too old to start at
-CLOCK_STEP = SECOND // 5  # [ns] back, from which time has started anew
+STANDSTILL = 0.2  # [s] of wall-clock time without a change, after which a clock stands still
+ODOMETRY_AGE = 1.0  # [s] of an odometry, above which it does not start a trajectory
+CLOCK_STEP = SECOND // 5  # [ns] back, from which on a clock was reset
 
 
 @dataclass(frozen=True)
 class PublisherOptions:
-    """How it is told."""
+    """When a trajectory starts and stops, and how it is published."""
 
-    autostart: bool = parameter(True, "", "start at the first odometry, not at ~/start")
-    start_delay: float = parameter(0.0, "s", "from that odometry to the start", at_least=0)
-    preview: float = parameter(1.0, "s", "how far ahead is published", above=0)
-    point_period: float = parameter(0.05, "s", "time between two points of it", above=0)
+    autostart: bool = parameter(True, "", "start at the first odometry; false: only at ~/start")
+    start_delay: float = parameter(0.0, "s", "from that odometry's stamp to the start", at_least=0)
+    preview: float = parameter(1.0, "s", "how far ahead the reference is published", above=0)
+    point_period: float = parameter(0.05, "s", "time between two points of a preview", above=0)
     publish_period: float = parameter(0.1, "s", "time between two previews", above=0)
-    stop_time: float = parameter(1.0, "s", "from the full rate to rest at ~/stop", above=0)
+    stop_time: float = parameter(1.0, "s", "time from the full rate to rest after ~/stop", above=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -47,19 +47,19 @@ class PublisherOptions:
 
 
 class TrajectoryPublisher(ClimberNode):
-    """Starts a trajectory at the stamp of an odometry, and goes on as it is followed."""
+    """Starts a trajectory at an odometry's stamp, and publishes it as far as it is followed."""
 
     def __init__(self) -> None:
         super().__init__("trajectory_publisher")
-        for kind, prefix in [*KINDS, (PublisherOptions, "")]:
+        for kind, prefix in [*TYPES, (PublisherOptions, "")]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(PublisherOptions)
         self.build_trajectory = build_trajectory(self.parameters.read)
         self.trajectory = self.build_trajectory
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
-        self.followed: int | None = None  # [ns] stamp that a controller has come to
-        self.last_look = self.stood_at = 0  # [ns] what the clock said
+        self.followed: int | None = None  # [ns] how far a controller has come
+        self.last_look = self.stood_at = 0  # [ns] of the clock
         self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
         self.next_point = 0  # every point is computed once: previews agree to the last bit
 
@@ -76,19 +76,19 @@ class TrajectoryPublisher(ClimberNode):
             self.wait_for_odometry()
 
     def summary(self) -> str:
-        """Numbers of the trajectory."""
+        """Extremes of the trajectory, for the log."""
         found = summary(self.build_trajectory)
         self.parameters.remarks += found.remarks
         return f"{self.parameters.read(TrajectoryParameters).shape}, {found}"
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Start, or start again from the beginning, at the next odometry."""
+        """Service ~/start: start from the beginning, at the next odometry."""
         self.wait_for_odometry()
         response.success, response.message = True, "starts at the next odometry"
         return response
 
     def on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Come to rest on the path, from the end of what has been published on."""
+        """Service ~/stop: come to rest on the path, after the points that are published already."""
         if self.start is None:
             response.message = "not started"
             return response
@@ -100,7 +100,7 @@ class TrajectoryPublisher(ClimberNode):
         return response
 
     def wait_for_odometry(self) -> None:
-        """Start at the next odometry."""
+        """Subscribe the odometry, to start at the next one."""
         if self.odometry is None:
             self.odometry = self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
 
@@ -112,14 +112,14 @@ class TrajectoryPublisher(ClimberNode):
         try:
             reading.state(message, self.names.odom_frame, self.names.base_frame)
             if not self.reference.get_subscription_count():
-                self.say("start", "waits for a subscriber of reference", is_fault=False)
+                self.report("start", "waits for a subscriber of reference", is_fault=False)
                 return
             if now > 0 and abs(now - stamp) > ODOMETRY_AGE * SECOND:
                 raise ValueError("stamp is too far from the clock")
         except ValueError as error:
-            self.say("start", "odometry refused", str(error))
+            self.report("start", "odometry refused", str(error))
             return
-        self.say("start", "")
+        self.report("start", "")
         self.destroy_subscription(self.odometry)
         self.odometry = None
         self.trajectory, self.next_point = self.build_trajectory, 0
@@ -132,7 +132,7 @@ class TrajectoryPublisher(ClimberNode):
         self.publish_path(self.start)
 
     def on_reference_time(self, message: TimeReference) -> None:
-        """Take note of how far along this trajectory a controller has come."""
+        """Keep how far a controller has come, unless that is of another trajectory."""
         followed = reading.nanoseconds(message.time_ref)
         stamp, now = reading.nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
         is_of_now = stamp < now + ODOMETRY_AGE * SECOND
@@ -141,7 +141,7 @@ class TrajectoryPublisher(ClimberNode):
 
     @property
     def position(self) -> int:
-        """Stamp [ns] that the trajectory has come to: where it is followed, else the clock's."""
+        """Stamp [ns] that the trajectory has come to: the controller's, else the clock's."""
         assert self.start is not None
         if self.followed is not None:
             return self.followed
@@ -166,14 +166,14 @@ class TrajectoryPublisher(ClimberNode):
             self.publish_around(self.position)
 
     def publish_at_standstill(self) -> None:
-        """Publish again if time stands still: lock-step may wait for who missed the preview."""
+        """Publish again while time stands still: lock-step may wait for a preview that was lost."""
         now = self.get_clock().now().nanoseconds
         if now == self.stood_at:
             self.publish()
         self.stood_at = now
 
     def publish_around(self, position: int) -> None:
-        """Publish points from before the last preview to the end of the next one."""
+        """Publish the preview at `position` [ns], from a little before it to its end."""
         assert self.start is not None
         options, time = self.options, (position - self.start) / SECOND
         oldest = time - options.publish_period - 2 * options.point_period

@@ -1,6 +1,6 @@
 """Answers each odometry with the wheel torques that keep the climber on its reference.
 
-Inactive, it answers with its safe output: a climber that hangs on a wall must be held all the same.
+Inactive, it answers with its safe output: a climber on a wall needs torques at all times.
 """
 
 import math
@@ -38,16 +38,19 @@ from climber_uk.ros.running import (
     run,
 )
 
-LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points: to read one takes a quarter of a second
+LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points, which take a quarter of a second to read
 
 
 @dataclass(frozen=True)
 class NodeOptions:
-    """What is published."""
+    """Torques for effort controllers of ros2_control."""
 
-    effort_commands: bool = parameter(False, "", "publish effort_controller/commands as well")
+    effort_commands: bool = parameter(False, "", "publish torques on effort_controller/commands")
     effort_order: str = parameter(
-        "left_right", "", "order of the torques in them", choices=("left_right", "right_left")
+        "left_right",
+        "",
+        "order of these; wrong: the climber yaws away",
+        choices=("left_right", "right_left"),
     )
 
     def __post_init__(self) -> None:
@@ -55,7 +58,7 @@ class NodeOptions:
 
 
 class UkTorqueController(ManagedNode):
-    """Messages to and from a `Controller`, which decides."""
+    """Passes messages to a `Controller`, and its answers on."""
 
     def __init__(self) -> None:
         super().__init__("uk_torque_controller")
@@ -65,13 +68,13 @@ class UkTorqueController(ManagedNode):
         self.parameters.refuse_unknown("the paper's scenario, up to 20 N m a wheel")
         self.options = self.parameters.read(NodeOptions)
         self.margins = Margins(self, self.parameters.read(Alarm))
-        self.hold = self.hold_now()
+        self.attachment = self.read_attachment()
         self.pressure: float | None = None  # [Pa] as last measured
         self.controller = build_controller(self.parameters, self.pressure)
         self.answers = self.saturations = 0
-        self.is_due = Throttle(PUBLISH_PERIOD)  # to tell the disturbance
+        self.is_due = Throttle(PUBLISH_PERIOD)  # of the disturbance
         self.is_position_due = Throttle(PUBLISH_PERIOD)
-        self.told_mode = Mode.WAITING
+        self.last_mode = Mode.WAITING
 
         self.torques = self.publisher(JointState, "wheel_torques")
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
@@ -79,8 +82,8 @@ class UkTorqueController(ManagedNode):
         self.force = self.publisher(WrenchStamped, "~/constraint_force")
         self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
         self.reference_time = self.publisher(TimeReference, "reference_time")
-        self.told = self.publisher(ParameterEvent, "~/parameters", LATCHED)
-        self.tell_parameters()
+        self.parameter_values = self.publisher(ParameterEvent, "~/parameters", LATCHED)
+        self.publish_parameters()
         safety = self.controller.safety
         shortest = min(safety.odometry_timeout, safety.reference_timeout)
         # on the wall clock: one in simulated time would not notice that there is no clock
@@ -89,7 +92,7 @@ class UkTorqueController(ManagedNode):
         self.start_life()
 
     def summary(self) -> str:
-        """What is driven, how, and within which limits."""
+        """Climber, constraint set and safe output, for the log."""
         climber, choice = self.parameters.read(Climber), self.parameters.read(ConstraintChoice)
         law, adhesion = f"constraints {choice.constraints}", choice.adhesion
         law = law if choice.controller == UDWADIA_KALABA else f"controller {choice.controller}"
@@ -101,7 +104,7 @@ class UkTorqueController(ManagedNode):
         )
 
     def listen(self) -> list[Subscription]:
-        """Start from nothing with the safe output, and listen to all inputs."""
+        """Reset the controller to its safe output, and subscribe all inputs."""
         self.controller = build_controller(self.parameters, self.pressure)
         self.controller.enable(False)
         return [
@@ -118,8 +121,8 @@ class UkTorqueController(ManagedNode):
 
     # Parameters
 
-    def hold_now(self) -> Attachment:
-        """What the parameters say that holds the climber on its wall."""
+    def read_attachment(self) -> Attachment:
+        """Adhesion and grip by the present parameters, for the margins."""
         read = self.parameters.read
         name = read(ConstraintChoice).adhesion
         return Attachment(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
@@ -127,33 +130,33 @@ class UkTorqueController(ManagedNode):
     def on_parameters(self) -> None:
         """Take up changed parameters."""
         self.margins.alarm = self.parameters.read(Alarm)
-        self.hold = self.hold_now()
+        self.attachment = self.read_attachment()
         self.retune()
-        self.tell_parameters()
+        self.publish_parameters()
 
     def retune(self) -> None:
-        """Follow as the parameters, and the measured pressure, say now."""
+        """Give the controller the present parameters, and the measured pressure."""
         self.controller.sampled_controller.retune(*settings(self.parameters, self.pressure))
 
-    def tell_parameters(self) -> None:
-        """Publish all parameters: with them, a bag has all that an answer came from."""
+    def publish_parameters(self) -> None:
+        """Publish all parameters, so that a bag has all that the torques come from."""
         name, now = self.get_fully_qualified_name(), self.now()
-        self.told.publish(writing.parameters(self.parameters.values, name, now))
+        self.parameter_values.publish(writing.parameters(self.parameters.values, name, now))
 
     # Messages
 
     def on_odometry(self, message: Odometry) -> None:
-        """Answer an odometry."""
+        """Answer an odometry with torques, or a bad one with the safe output."""
         stamp = reading.nanoseconds(message.header.stamp)
         try:
             state = reading.state(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
-            self.tell(self.controller.on_bad_odometry(self.now(), str(error)))
+            self.publish(self.controller.on_bad_odometry(self.now(), str(error)))
             return
-        self.tell(self.controller.on_odometry(self.now(), stamp, state))
+        self.publish(self.controller.on_odometry(self.now(), stamp, state))
 
     def on_reference(self, serialized: bytes) -> None:
-        """Keep the reference; answer the odometry that waits for it."""
+        """Check and keep a reference; answer an odometry that waits for it."""
         try:
             if len(serialized) > LARGEST_REFERENCE:
                 raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
@@ -161,61 +164,63 @@ class UkTorqueController(ManagedNode):
             preview = reading_reference.preview(message, self.names.odom_frame)
             preview.check_heading()
         except ValueError as error:
-            self.say("reference", "refused", str(error))
+            self.report("reference", "refused", str(error))
             return
-        self.say("reference", "")
-        self.tell(self.controller.on_reference(self.now(), preview))
+        self.report("reference", "")
+        self.publish(self.controller.on_reference(self.now(), preview))
 
     def on_pressure(self, message: FluidPressure) -> None:
-        """Take the measured pressure difference into the model."""
+        """Give the controller the measured pressure difference."""
         try:
             pressure = reading.pressure(message)
         except ValueError as error:
-            self.say("suction_pressure", "refused", str(error))
+            self.report("suction_pressure", "refused", str(error))
             return
-        self.say("suction_pressure", "")
+        self.report("suction_pressure", "")
         if pressure != self.pressure:
             self.pressure = pressure
             self.retune()
 
     def look(self) -> None:
-        """Give the safe output if odometry or reference have stopped."""
+        """Publish the safe output if odometry or reference have stopped."""
         if self.inputs:
-            self.tell(self.controller.look(self.now()))
+            self.publish(self.controller.look(self.now()))
 
     def now(self) -> int:
         """Time of the node's clock [ns]; 0 while there is none."""
         now: int = self.get_clock().now().nanoseconds
         return now
 
-    def tell(self, answer: Answer | None) -> None:
-        """Say what has changed, and publish an answer if there is one."""
+    def publish(self, answer: Answer | None) -> None:
+        """Report what has changed, and publish an answer if there is one."""
         controller = self.controller
         mode = controller.mode
         if mode is not Mode.WAITING:  # a replay takes it for the mode of the next torque
             approaches = mode is Mode.APPROACHING
-            self.say("reference waits", mode.value if approaches else "", controller.detail, False)
+            self.report(
+                "reference waits", mode.value if approaches else "", controller.detail, False
+            )
             trouble = "" if approaches or mode is Mode.FOLLOWING else mode.value
-            self.say("safe output", trouble, controller.detail, mode.is_fault)
+            self.report("safe output", trouble, controller.detail, mode.is_fault)
         if answer is not None:
             self.publish_torques(answer)
-        self.tell_position()
+        self.publish_position()
         offset = controller.clock_offset
         differ = "odometry's differs from this node's" if offset else ""
         detail = f"by {offset:.3f} s; if that is latency, set transport_delay"
-        self.say("clock", differ, detail, is_fault=False)
+        self.report("clock", differ, detail, is_fault=False)
         if answer is not None:
             state = controller.state
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command, state)
             if state is not None:
-                self.take_margins(answer, state)
+                self.add_margins(answer, state)
 
-    def tell_position(self) -> None:
-        """Tell how far along the reference the climber is: its planner waits for it."""
+    def publish_position(self) -> None:
+        """Publish how far along the reference the climber is, which the planner waits for."""
         controller, stamp = self.controller, self.controller.stamp
         position = controller.active.position(stamp)
-        has_changed, self.told_mode = controller.mode is not self.told_mode, controller.mode
+        has_changed, self.last_mode = controller.mode is not self.last_mode, controller.mode
         if position is not None and (self.is_position_due(stamp) or has_changed):
             self.reference_time.publish(
                 writing.time_reference(position, stamp, controller.mode.name.lower())
@@ -232,24 +237,24 @@ class UkTorqueController(ManagedNode):
             self.efforts.publish(Float64MultiArray(data=ordered))
 
     def publish_causes(self, stamp: int, command: Command, state: State | None) -> None:
-        """Publish what an answer came from."""
+        """Publish constraint force, disturbance and tracking error behind an answer."""
         self.answers += 1
         self.saturations += int(command.missing.any())
         controller, base_frame = self.controller, self.names.base_frame
         self.force.publish(writing.wrench(command.constraint_force, stamp, base_frame))
         if self.is_due(stamp):
-            drive, turn = controller.sampled_controller.disturbance
-            self.disturbance.publish(writing.wrench((drive, 0.0, turn), stamp, base_frame))
+            force, moment = controller.sampled_controller.disturbance
+            self.disturbance.publish(writing.wrench((force, 0.0, moment), stamp, base_frame))
         followed = controller.preview
         desired = followed.at(controller.active.time_followed(stamp)) if followed else None
         if state is not None and desired is not None:
             error = tracking_error(state.pose, desired)
             self.error.publish(writing.vector(error, stamp, base_frame))
 
-    def take_margins(self, answer: Answer, state: State) -> None:
-        """Tell how near the torques bring the climber to slipping, and how near it is to tip."""
-        climber, hold = self.controller.sampled_controller.law.climber, self.hold
-        drive, _ = climber.drive_and_turn(answer.torques)
+    def add_margins(self, answer: Answer, state: State) -> None:
+        """Add the slip margin under an answer's torques, and the tip margin."""
+        climber, attachment = self.controller.sampled_controller.law.climber, self.attachment
+        drive, _ = climber.force_and_moment(answer.torques)
         if answer.command is not None:
             lateral = float(answer.command.constraint_force[1])
         else:
@@ -257,30 +262,30 @@ class UkTorqueController(ManagedNode):
         into_wall = climber.gravity_into_wall
         along_wall = climber.weight_along_wall / climber.mass
         self.margins.take(
-            hold.slip_margin(climber, into_wall, drive, lateral),
-            hold.tip_margin(climber, into_wall, along_wall),
-            hold.wheel_load(climber, into_wall),
+            attachment.slip_margin(climber, into_wall, drive, lateral),
+            attachment.tip_margin(climber, into_wall, along_wall),
+            attachment.wheel_load(climber, into_wall),
             answer.stamp,
         )
 
     def diagnose(self) -> None:
-        """Publish troubles and values, and how near to slipping and tipping it has been."""
-        self.tell_delay()
+        """Publish a status of troubles and values, and one of the lowest margins."""
+        self.report_delay()
         super().diagnose()
         self.margins.diagnose()
 
-    def tell_delay(self) -> None:
-        """Say where torques act much later than `transport_delay` says, or earlier."""
+    def report_delay(self) -> None:
+        """Report torques that act much later, or earlier, than `transport_delay` says."""
         sampled_controller = self.controller.sampled_controller
         late = sampled_controller.latency.is_far_off
         delay = sampled_controller.timing.transport_delay + sampled_controller.latency.delay
         hint = f"set transport_delay to {delay:.3f}, or see check_driver --move"
-        self.say("delay", "torques do not act when transport_delay says" * late, hint, False)
+        self.report("delay", "torques do not act when transport_delay says" * late, hint, False)
 
     def values(self) -> dict[str, object]:
-        """Tell diagnostics how it goes."""
+        """Values for diagnostics."""
         sampled_controller = self.controller.sampled_controller
-        drive, turn = sampled_controller.disturbance
+        force, moment = sampled_controller.disturbance
         return {
             "state": self.life,
             "mode": self.controller.mode.value,
@@ -291,8 +296,8 @@ class UkTorqueController(ManagedNode):
             "clock offset [s]": self.controller.clock_offset,
             "reference waits [s]": self.controller.active.waited,
             "delay learnt [s]": sampled_controller.latency.delay,
-            "disturbance of the drive [N]": drive,
-            "disturbance of the turn [N m]": turn,
+            "disturbance of the drive [N]": force,
+            "disturbance of the turn [N m]": moment,
             "suction pressure [Pa]": sampled_controller.law.climber.suction_pressure,
         }
 

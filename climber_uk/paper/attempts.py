@@ -1,6 +1,6 @@
-"""What was tried to come by the errors that the paper prints: 1.8e-3 m in x and 0.6 m in y.
+"""Attempts to reproduce the errors that the paper prints: 1.8e-3 m in x and 0.6 m in y.
 
-Each attempt is an integrator of the printed system, in one reading of it.
+Each is an integrator of the printed system, with one reading of it.
 """
 
 import itertools
@@ -25,7 +25,7 @@ from climber_uk.paper.printed import GAINS, PrintedSystem
 COLUMNS = ("attempt", "(26) x [m]", "(26) y [m]", "(30) x [m]", "(30) y [m]")
 # ode45 gives four points a step by default, three of them interpolated.
 INTERPOLATED = np.linspace(0, 20, 2001)
-PATIENCE = 10_000  # evaluations, a multiple of what any attempt needs that comes to an end
+MAX_EVALUATIONS = 10_000  # a multiple of what any attempt needs that ends
 
 Integrator = Callable[[Derivative], tuple[Array, Array]]
 
@@ -44,13 +44,13 @@ def _interpolated(derivative: Derivative) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Steps of fixed length by one of the simple methods."""
+    """Integrator with a fixed step."""
 
     method: Callable[[Derivative, float], tuple[Array, Array]]
     step: float  # [s]
 
     def __call__(self, derivative: Derivative) -> tuple[Array, Array]:
-        """Integrate."""
+        """Times (n,) and y (n, 6) of a derivative."""
         return self.method(derivative, self.step)
 
 
@@ -61,12 +61,12 @@ class FromYawRate:
     yaw_rate: float  # [rad/s]
 
     def __call__(self, derivative: Derivative) -> tuple[Array, Array]:
-        """Integrate."""
+        """Times (n,) and y (n, 6) of a derivative."""
         return dormand_prince(derivative, DEFAULT_TOLERANCE, np.array([*START[:5], self.yaw_rate]))
 
 
 def explicit_euler(derivative: Derivative, step: float) -> tuple[Array, Array]:
-    """Fixed steps along the derivative."""
+    """Times (n,) and y (n, 6) by Euler's method with a fixed step [s]."""
     times = np.arange(round(20 / step) + 1) * step
     y = [START]
     for time in times[:-1]:
@@ -74,12 +74,13 @@ def explicit_euler(derivative: Derivative, step: float) -> tuple[Array, Array]:
     return times, np.array(y)
 
 
-def _impatient(derivative: Derivative) -> Derivative:
+def _limited(derivative: Derivative) -> Derivative:
+    """`derivative`, which raises `RuntimeError` after `MAX_EVALUATIONS`."""
     calls = itertools.count(1)
 
     def limited(time: float, y: Array) -> Array:
-        if next(calls) > PATIENCE:
-            raise RuntimeError(f"stuck at {time:.3f} s: {PATIENCE} evaluations")
+        if next(calls) > MAX_EVALUATIONS:
+            raise RuntimeError(f"stuck at {time:.3f} s: {MAX_EVALUATIONS} evaluations")
         return derivative(time, y)
 
     return limited
@@ -107,7 +108,7 @@ def attempt(name: str) -> tuple[str, ...]:
     cells = [name]
     for derivative in (system.uncorrected, system.corrected):
         try:
-            times, y = integrate(_impatient(derivative))
+            times, y = integrate(_limited(derivative))
         except RuntimeError as why:
             cells += [str(why).split(":")[0], ""]
             continue

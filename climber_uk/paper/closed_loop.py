@@ -16,7 +16,7 @@ TIMEOUT = 100.0  # [s]
 
 
 def record() -> RecordedRun | str:
-    """The run, or why there is none."""
+    """The recorded run, or a message why there is none."""
     if importlib.util.find_spec("rclpy") is None:
         return "rclpy is not installed"
     run_demo = Path(sys.argv[0]).parent / "run_demo"
@@ -43,7 +43,7 @@ def record() -> RecordedRun | str:
 
 
 def find_config() -> Path | None:
-    """Path of the scenario: as installed, or in the source tree."""
+    """Path of the scenario's file, installed or in the source tree; None if there is none."""
     installed = [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]
     shares = [Path(prefix) / "share" / "climber_uk" for prefix in installed if prefix]
     candidates = [share / CONFIG for share in (*shares, Path(__file__).parents[2])]

@@ -44,7 +44,7 @@ class ConsistentSystem:
     hidden_rate: float = 0.0  # [1/s] λ
 
     def rows(self, state: State, reference: Reference) -> tuple[Array, Array]:
-        """A (..., 3, 3) and b (..., 3): forward, no-slip, hidden."""
+        """Rows A (..., 3, 3) and b (..., 3) of the constraints: forward, no-slip, hidden."""
         heading, v, omega = state.heading, state.forward_speed, state.yaw_rate
         K_d, K_p = 2 * self.natural_frequency, self.natural_frequency**2
         u = self._demand(state, reference)
@@ -63,7 +63,7 @@ class ConsistentSystem:
         return A, pack(v_1, slip_b, hidden_b)
 
     def velocity_rows(self, state: State, reference: Reference) -> tuple[Array, Array]:
-        """A (..., 3, 3) and b_q (..., 3) of (27): ẋ, ẏ, hidden."""
+        """Rows A (..., 3, 3) and b_q (..., 3) of (27), at velocity level: ẋ, ẏ, hidden."""
         v = state.forward_speed
         zero, one = 0 * v, 0 * v + 1
         A = np.stack([pack(one, zero, zero), pack(zero, one, zero), pack(zero, zero, v)], axis=-2)
@@ -89,7 +89,7 @@ class ConsistentSystem:
         return self.climber.wheel_torques(along(state.heading, Qc), unpack(Qc)[2])
 
     def reference_torques(self, time: Array | float) -> Array:
-        """τ(t) (..., 2): what keeps a climber on the path that is on it."""
+        """Torques τ(t) (..., 2) [N m] that keep a climber on the path once it is on it."""
         reference = self.path.at(time)
         return self.torques(time, State(reference.pose, reference.velocity))
 
@@ -115,9 +115,11 @@ class ConsistentSystem:
         return constrained_acceleration(self.climber.mass_matrix, self._applied(state), A, b)
 
     def _applied(self, state: State) -> Array:
+        """Q (..., 3) without the wheels, in the wall's frame [N, N m]."""
         return self.climber.applied_force(state.heading, np.sign(state.forward_speed))
 
     def _demand(self, state: State, reference: Reference) -> Array:
+        """u (..., 2) [m/s²]: the acceleration that path and gains demand."""
         e = (reference.pose - state.pose)[..., :2]
         e_1 = (reference.velocity - state.velocity)[..., :2]
         p_2 = reference.acceleration[..., :2]

@@ -1,4 +1,4 @@
-"""How far 1000 s of integration lead off the path: (26), (30), Baumgarte and projection.
+"""Drift off the path in 1000 s of integration: (26), (30), Baumgarte and projection.
 
 The rows are those of `ConsistentSystem`. They determine q̈ whatever M and Q are, here in closed
 form and on floats, which is a hundred times faster than the general solution that it equals.
@@ -18,7 +18,7 @@ from climber_uk.paper.motion import START
 
 SEMI_AXES = 10.0, 6.0  # [m] of (21)
 SAMPLE_TIME = 0.1  # [s] between the instants kept
-LOST = 100.0  # [m] off the path, after which a run is not followed
+LOST_DISTANCE = 100.0  # [m] off the path, at which a run ends
 
 Floats = tuple[float, ...]  # ẋ, ẏ, θ̇, ẍ, ÿ, θ̈
 # of sin t, cos t, x, y, θ, ẋ, ẏ, θ̇
@@ -28,17 +28,17 @@ Projection = Callable[[float, float, float], Floats]
 
 @dataclass(frozen=True)
 class Drift:
-    """A long integration, at n instants."""
+    """A long integration, with n instants that are kept."""
 
     time: Array  # (n,) [s]
-    error: Array  # (n,) [m] distance from where the climber should be
+    error: Array  # (n,) [m] distance from the path's point of that time
     side_slip: Array  # (n,) [m/s] of the integrated v
     evaluations: int
 
     @property
     def largest(self) -> float:
         """Largest error [m]; infinite for a run that got lost."""
-        return float(np.max(self.error)) if np.max(self.error) < LOST else math.inf
+        return float(np.max(self.error)) if np.max(self.error) < LOST_DISTANCE else math.inf
 
     def slip_at(self, time: float) -> float:
         """Side slip of v [m/s] at a time [s]."""
@@ -47,7 +47,7 @@ class Drift:
     def window(self, start: float, end: float) -> float:
         """Largest error [m] between two times [s]; infinite if the run got lost before."""
         inside = self.error[(self.time >= start) & (self.time <= end)]
-        return float(np.max(inside)) if inside.size and self.largest < LOST else math.inf
+        return float(np.max(inside)) if inside.size and self.largest < LOST_DISTANCE else math.inf
 
 
 def stabilised(natural_frequency: float, hidden_rate: float) -> Derivative:
@@ -77,7 +77,7 @@ uncorrected = stabilised(0.0, 0.0)
 
 
 def path_velocity(S: float, C: float, heading: float) -> Floats:
-    """The one q̇ that meets the velocity-level rows ẋ, ẏ and hidden."""
+    """The q̇ that meets the velocity-level rows ẋ, ẏ and hidden; S = sin t, C = cos t."""
     a, b = SEMI_AXES
     c, s = math.cos(heading), math.sin(heading)
     x_1, y_1 = a * C, -b * S
@@ -85,7 +85,7 @@ def path_velocity(S: float, C: float, heading: float) -> Floats:
 
 
 def forward_velocity(S: float, C: float, heading: float) -> Floats:
-    """The one q̇ that meets the forward, no-slip and hidden rows."""
+    """The q̇ that meets the forward, no-slip and hidden rows; S = sin t, C = cos t."""
     x_1, y_1, omega = path_velocity(S, C, heading)
     c, s = math.cos(heading), math.sin(heading)
     v = c * x_1 + s * y_1
@@ -109,8 +109,8 @@ def corrected_literally(
     """(30), all rows at v, as it stands."""
     a, b = SEMI_AXES
     c, s = math.cos(heading), math.sin(heading)
-    turning = (s * a * S - c * b * C) / (c * x_1 + s * y_1)
-    return a * C, -b * S, turning, *uncorrected(S, C, x, y, heading, x_1, y_1, omega)[3:]
+    yaw_rate = (s * a * S - c * b * C) / (c * x_1 + s * y_1)
+    return a * C, -b * S, yaw_rate, *uncorrected(S, C, x, y, heading, x_1, y_1, omega)[3:]
 
 
 # By name: how to integrate, and whether to project x, y and v after each step.
@@ -192,7 +192,7 @@ def dormand_prince(method: str, tolerance: float, duration: float) -> Drift:
         kept.append((time, *y.tolist()))
         a, b = SEMI_AXES
         off = math.hypot(y[0] - a * math.sin(time), y[1] - b * math.cos(time))
-        return 0 if off < LOST else -1
+        return 0 if off < LOST_DISTANCE else -1
 
     solver = ode(counted).set_integrator(
         "dopri5", rtol=tolerance, atol=tolerance, nsteps=100_000_000

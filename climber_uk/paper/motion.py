@@ -1,4 +1,4 @@
-"""Twenty seconds of the paper's climber: the motions that are drawn and compared."""
+"""Motions of the paper's climber over 20 s, and the integrators that make them."""
 
 import itertools
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from climber_uk.paper.printed import PrintedSystem
 from climber_uk.simulation.plant import Plant
 
 DURATION = 20.0  # [s]
-LOST = 100.0  # [m] from the origin, after which a motion is not followed
+LOST_RADIUS = 100.0  # [m] from the origin, at which a motion ends
 START = np.array([0.0, 6.0, 0.0, 10.0, 0.0, -0.6])  # (q, v) as printed
 
 # Relative and absolute tolerance
@@ -29,7 +29,7 @@ Derivative = Callable[[float, Array], Array]
 
 @dataclass(frozen=True)
 class PaperMotion:
-    """What a climber does at n instants."""
+    """Motion, torques and constraint residual of a climber at n instants."""
 
     time: Array  # (n,) [s]
     pose: Array  # (n, 3) x [m], y [m], θ [rad]
@@ -44,7 +44,7 @@ class PaperMotion:
 
     @property
     def side_slip(self) -> Array:
-        """Velocity to the left (n,) [m/s]."""
+        """Velocity across the heading, to the left (n,) [m/s]."""
         return State(self.pose, self.velocity).side_slip
 
     @property
@@ -66,7 +66,7 @@ def dormand_prince(
     """
 
     def distance_left(_: float, y: Array) -> float:
-        return LOST - float(np.hypot(abs(y[0]), abs(y[1])))
+        return LOST_RADIUS - float(np.hypot(abs(y[0]), abs(y[1])))
 
     distance_left.terminal = True  # type: ignore[attr-defined]
     relative, absolute = tolerance

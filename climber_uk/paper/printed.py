@@ -116,7 +116,7 @@ class PrintedSystem:
         return times(GAINS[self.gain](M), self.b(time) - a[..., :2])
 
     def torques(self, Qc: Array) -> Array:
-        """τ = d⁺ Qc (25), (..., 2) right and left: the third component is dropped."""
+        """τ = d⁺ Qc (25), (..., 2) (right, left) [N m]: the third component of Qc is dropped."""
         return times(np.linalg.pinv(d), Qc)
 
     def uncorrected(self, time: Array | float, y: Array) -> Array:
@@ -139,7 +139,7 @@ class PrintedSystem:
 
 
 def _pseudo_inverse(B: Array) -> Array:
-    """B⁺ of a B of full row rank, which A M^(-1/2) is; `np.linalg.pinv` takes thrice as long."""
+    """B⁺ of B with full row rank, as A M^(-1/2) has; `np.linalg.pinv` takes 3 times as long."""
     left, singular, right = np.linalg.svd(B, full_matrices=False)
     product: Array = transpose(right.conj()) / singular[..., None, :] @ transpose(left.conj())
     return product

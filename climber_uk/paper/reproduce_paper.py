@@ -34,7 +34,7 @@ DRIFT_COLUMNS = (
 
 
 def comparison(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
-    """Cells of the table, and what the climber does under the torques (25)."""
+    """Rows of the comparison's table, the climber under the torques (25) included, as text."""
     tight = f"tolerance {extent.tolerance[0]:g}"
     named = {
         "as printed": f"as printed, {tight}",
@@ -58,7 +58,7 @@ def comparison(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
 
 
 def drift_cells(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
-    """Cells of the drift study."""
+    """Rows of the drift study's table, as text."""
     integrators = {"step": "RK4 {:g} s", "variant": "RK4 {:g} s", "tolerance": "RK45 {:g}"}
     end = extent.drift_time
     cells = []
@@ -86,7 +86,7 @@ def write(
     extent: StudyExtent,
     directory: Path,
 ) -> list[Path]:
-    """Write all tables and figures; print the tables."""
+    """Write all tables and figures, and print the tables."""
     sets = {"as_printed": "as printed", "as_printed_euler": "euler", "consistent": "consistent"}
     drawn = [
         pool.submit(figures.draw, name, results[key, "(26)"], results[key, "(30)"], directory)
@@ -125,7 +125,7 @@ def main() -> None:
         check_writable(options.output)
     except OSError as error:
         sys.exit(f"reproduce_paper: {error}")
-    # matrices of 3 by 3 gain nothing from threads, which would only be in each other's way
+    # matrices of 3 by 3 gain nothing from threads
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         with workers(os.cpu_count()) as pool:

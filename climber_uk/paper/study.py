@@ -1,4 +1,4 @@
-"""What is computed of the paper: independent jobs, each for one process, and all at once."""
+"""The computations of the paper as independent jobs, which run in parallel processes."""
 
 import time
 from collections.abc import Callable
@@ -25,7 +25,7 @@ OFF_STEP, OFF_DURATION = 0.005, 20.0  # [s]
 
 @dataclass(frozen=True)
 class StudyExtent:
-    """How much is computed."""
+    """Extent of the computations: tolerances, steps and durations."""
 
     tolerance: tuple[float, float]
     step: float  # [s] under the torques (25)
@@ -57,13 +57,13 @@ QUICK = StudyExtent(
 
 
 def printed(corrected: bool, tolerance: tuple[float, float]) -> motion.PaperMotion:
-    """As printed, by Dormand and Prince."""
+    """Motion of the printed system, by Dormand and Prince."""
     derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
     return motion.printed_motion(PRINTED, corrected, *motion.dormand_prince(derivative, tolerance))
 
 
 def coarse(corrected: bool) -> motion.PaperMotion | str:
-    """As printed, at the default tolerance, or why not: rounding may lead such steps astray."""
+    """The same at the default tolerance, or a message why not: rounding may spoil such steps."""
     try:
         return printed(corrected, motion.DEFAULT_TOLERANCE)
     except RuntimeError as why:
@@ -71,7 +71,7 @@ def coarse(corrected: bool) -> motion.PaperMotion | str:
 
 
 def euler(corrected: bool) -> motion.PaperMotion:
-    """As printed, by semi-implicit Euler of 10 ms."""
+    """Motion of the printed system, by semi-implicit Euler steps of 10 ms."""
     derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
     return motion.printed_motion(
         PRINTED, corrected, *motion.semi_implicit_euler(derivative, step=0.01)
@@ -79,19 +79,19 @@ def euler(corrected: bool) -> motion.PaperMotion:
 
 
 def consistent(corrected: bool, tolerance: tuple[float, float]) -> motion.PaperMotion:
-    """Consistent, by Dormand and Prince."""
+    """Motion of the consistent system, by Dormand and Prince."""
     derivative = CONSISTENT.corrected if corrected else CONSISTENT.uncorrected
     times, y = motion.dormand_prince(derivative, tolerance)
     return motion.consistent_motion(CONSISTENT, corrected, times, y)
 
 
 def jobs(extent: StudyExtent) -> Jobs:
-    """Return what can be computed at once, by key, the longest first."""
+    """All jobs by key, the longest first."""
     return twenty_seconds(extent) | drifts(extent)
 
 
 def twenty_seconds(extent: StudyExtent) -> Jobs:
-    """Return what the comparison needs, and the attempts."""
+    """Jobs of the comparison over 20 s, and the attempts."""
     tight = extent.tolerance
     todo: Jobs = {}
     if extent.nodes:
@@ -109,7 +109,7 @@ def twenty_seconds(extent: StudyExtent) -> Jobs:
 
 
 def drifts(extent: StudyExtent) -> Jobs:
-    """Return what the drift study needs."""
+    """Jobs of the drift study."""
     todo: Jobs = {}
     for step in extent.drift_steps:
         for method in drift.COMPARED:
@@ -129,7 +129,7 @@ def drifts(extent: StudyExtent) -> Jobs:
 
 
 def compute(pool: ProcessPoolExecutor, todo: Jobs) -> Results:
-    """Results by key; tells as they come."""
+    """Results of jobs by key; prints each key as it is finished."""
     begin = time.monotonic()
     keys = {pool.submit(function, *arguments): key for key, (function, arguments) in todo.items()}
     results: Results = {}

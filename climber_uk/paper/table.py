@@ -42,12 +42,12 @@ class ComparisonRow:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """As text."""
+        """Numbers as text, in the order of `COLUMNS`."""
         return self.name, *("" if n is None else f"{n:.3g}" for n in self.numbers)
 
 
 def row(name: str, motion: PaperMotion | RecordedRun | str) -> ComparisonRow:
-    """Numbers of a motion, or why there is none."""
+    """Row of a motion, or of a message why there is none."""
     if isinstance(motion, str):
         return ComparisonRow(f"{name}: {motion}", (None,) * (len(COLUMNS) - 1))
     if isinstance(motion, RecordedRun):  # a bag holds no accelerations, and so no third component
@@ -62,7 +62,7 @@ def row(name: str, motion: PaperMotion | RecordedRun | str) -> ComparisonRow:
 
 
 def growth(time: Array, error: Array) -> float:
-    """Slope [m/s] of the straight line that fits the error's size best."""
+    """Growth of the error [m/s]: slope of the straight line fitted to its norm."""
     return float(np.polyfit(time, np.abs(error), 1)[0])
 
 

@@ -1,4 +1,4 @@
-"""Dataclass fields that know their unit, bounds and meaning, and are checked at construction."""
+"""Parameters as dataclass fields with unit, bounds and meaning, checked at construction."""
 
 import dataclasses
 import math
@@ -23,12 +23,12 @@ def parameter(
     runtime: bool = False,
     is_path: bool = False,
 ) -> Any:
-    """Declare a dataclass field together with all that a user may ask about it.
+    """Declare a dataclass field as a parameter, with its unit and description.
 
     `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
     range `plausible` is doubted, not refused; a name that it had `formerly` is still taken;
     `runtime` marks what a running node may change, `is_path` the name of a file, which in a
-    parameter file is relative to that. Pass the dataclass's instance to `check` in `__post_init__`.
+    parameter file is relative to that. Call `check(self)` in the dataclass's `__post_init__`.
     """
     return dataclasses.field(
         default=default,
@@ -48,16 +48,16 @@ def parameter(
 
 
 def check(instance: Any) -> None:
-    """Raise `ValueError` naming field, value and bound unless every `parameter` field holds."""
+    """Raise `ValueError` naming field, value and bound unless all `parameter` fields are valid."""
     for field in dataclasses.fields(instance):
         if field.metadata:
             check_value(field, getattr(instance, field.name))
 
 
 def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
-    """Raise `ValueError` if `value` is not one that `field`, made by `parameter`, allows.
+    """Raise `ValueError` unless `field`, made by `parameter`, allows `value`.
 
-    An array (N,) has one value for each of many climbers.
+    An array (N,) holds a value for each of many climbers; all must be allowed.
     """
     rule = field.metadata
     said = f"{field.name}={value!r} must be"

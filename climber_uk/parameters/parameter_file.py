@@ -1,6 +1,6 @@
-"""Parameters as a node would get them, from a parameter file or from name:=value; no ROS needed.
+"""Parameter files and `name:=value` arguments, read as a node would read them; no ROS needed.
 
-Files are read as rcl reads them: with numbers and truths of C, not those of YAML 1.2.
+As in rcl, numbers and truth values are those of C, not those of YAML 1.2.
 """
 
 import dataclasses
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 import yaml
 
 T = TypeVar("T")
-OWN = "ros__parameters"
+PARAMETERS = "ros__parameters"
 FILE = "file"  # last part of a parameter that names a file, relative to the parameter file
 PARSER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 TEXT, QUOTED = "tag:yaml.org,2002:str", ("'", '"')
@@ -33,7 +33,7 @@ LARGEST = 2**24  # [bytes] of a file
 
 @dataclass(frozen=True)
 class Values:
-    """Parameters by name; those that are not there have their defaults."""
+    """Values of parameters by name; those that are missing have their defaults."""
 
     by_name: Mapping[str, Any]
 
@@ -53,7 +53,7 @@ class Values:
 
 @dataclass(frozen=True)
 class Section:
-    """Values that a file gives the nodes of a name, in which * is one part and ** are any."""
+    """Values for the nodes of a name, in which * matches one part, ** any number of parts."""
 
     name: str
     values: dict[str, Any]
@@ -67,26 +67,28 @@ class Section:
         return self.name.endswith("*")
 
     def is_for(self, node: str) -> bool:
-        """Whether a node of this full name is meant."""
+        """Whether it is for a node of this full name."""
         parts = [part for part in self.name.split("/") if part]
         said = {"**": "(/[^/]+)*", "*": "/[^/]+"}
         return bool(re.fullmatch("".join(said.get(p, "/" + re.escape(p)) for p in parts), node))
 
 
 class GivenValue(NamedTuple):
-    """A value, and whether it is given to nodes of any name, and never to one by its name."""
+    """A value, and whether it is from a section for nodes of any name."""
 
     value: Any
     is_shared: bool
 
 
 def read_sections(path: Path) -> list[Section]:
-    """All that a parameter file has; `OSError`, or `ValueError` of one line, if it is none."""
+    """Sections of a parameter file; `OSError`, or `ValueError` of one line, if it is none."""
     found: dict[str, Section] = {}
     for keys, value in _entries(path):
-        if OWN not in keys:
-            raise ValueError(f"{path} is no parameter file: {'/'.join(keys)} is not in {OWN}")
-        own = keys.index(OWN)
+        if PARAMETERS not in keys:
+            raise ValueError(
+                f"{path} is no parameter file: {'/'.join(keys)} is not in {PARAMETERS}"
+            )
+        own = keys.index(PARAMETERS)
         name = "/".join(keys[:own])
         section = found.setdefault(name, Section(name, {}))
         parameter = ".".join(keys[own + 1 :])
@@ -99,10 +101,10 @@ def read_sections(path: Path) -> list[Section]:
 
 
 def read_file(path: Path, node: str) -> dict[str, Any]:
-    """Values that a parameter file has for a node, of two entries the later one's.
+    """Values of a parameter file for a node, by name; of two entries the later one counts.
 
-    `node` is the full name, which the file may give with wildcards; `ValueError` if it does not.
-    What names a file is as seen from the working directory, not from the parameter file.
+    `node` is the full name. Raises `ValueError` if the file has none for it. Values that name a
+    file are relative to the working directory, not to the parameter file.
     """
     sections = read_sections(path)
     found = given(sections, node)
@@ -122,7 +124,7 @@ def given(sections: Iterable[Section], node: str) -> dict[str, GivenValue]:
 
 
 def similar(name: str, known: Iterable[str]) -> str:
-    """Question whether another name was meant, in brackets; empty if none is like it."""
+    """' (did you mean …?)' with the most similar of `known`; empty if none is similar."""
     from difflib import get_close_matches  # only where something is wrong
 
     matches = get_close_matches(name, list(known), n=1)
@@ -130,13 +132,13 @@ def similar(name: str, known: Iterable[str]) -> str:
 
 
 def nothing_for(node: str, path: Path, sections: Iterable[Section]) -> str:
-    """Line that says so, and what else the file has."""
+    """Message that a file has no parameters for a node, and for which ones it has."""
     names = ", ".join(section.name for section in sections) or "no node"
     return f"{path} has no parameters for {node}, but for {names}"
 
 
 def read_argument(argument: str) -> tuple[str, Any]:
-    """Name and value of `name:=value`."""
+    """Name and value of an argument `name:=value`; `ValueError` if it is none."""
     name, separator, value = argument.partition(":=")
     if not (name and separator and value):
         raise ValueError(f"{argument!r} must be name:=value")
@@ -147,7 +149,7 @@ def read_argument(argument: str) -> tuple[str, Any]:
 
 
 def load(text: str) -> Any:
-    """What YAML says, its plain scalars as rcl takes them; raises `YAMLError`."""
+    """Content of a YAML text, its plain scalars as rcl takes them; raises `YAMLError`."""
     return yaml.load(text, _Loader)
 
 
@@ -181,6 +183,7 @@ _Loader.add_constructor(TEXT, _Loader.construct_yaml_str)
 
 
 def _value(text: str, style: str | None) -> bool | int | float | str:
+    """Value of a scalar: quoted ones are strings."""
     return text if style in QUOTED else scalar(text)
 
 
@@ -211,14 +214,14 @@ def _text(path: Path) -> str:
 
 
 class _Tables:
-    """Where an event of YAML is in its tables: as strict as rcl is, and without recursion."""
+    """Keys of the tables around YAML's events: as strict as rcl, and without recursion."""
 
     def __init__(self) -> None:
         self.keys: list[str] = []  # of the tables that are open; '' where a key is to come
         self.sequence: list[Any] | None = None  # that is open
 
     def take(self, event: yaml.Event) -> Iterator[Any]:
-        """Go on by an event; yield the value that it completes, whose keys are `keys`."""
+        """Take in an event; yield the value that it completes, if any, whose keys are `keys`."""
         if isinstance(event, yaml.ScalarEvent):
             yield from self._take_scalar(event)
         elif isinstance(event, yaml.MappingStartEvent):

@@ -1,4 +1,4 @@
-"""What the parameter files among the arguments of a process have for one of its nodes."""
+"""The parameter files among a process's arguments, for one of its nodes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class ParameterFiles:
-    """Parameters that files give a node; raises `OSError`, `ValueError` if one cannot be read."""
+    """Values that files give a node; raises `OSError` or `ValueError` if one cannot be read."""
 
     def __init__(self, arguments: Sequence[str], node: str) -> None:
         self.node, self.names = node, list[str]()
@@ -28,28 +28,28 @@ class ParameterFiles:
                 self.idle.append(parameter_file.nothing_for(node, path, sections))
 
     def is_shared(self, name: str) -> bool:
-        """Whether a parameter is there only because nodes of any name are given it."""
+        """Whether a parameter is given by a section for nodes of any name."""
         return name in self.given and self.given[name].is_shared
 
     def has_nothing_of(self, names: Iterable[str]) -> bool:
-        """Whether there are files, and none of these parameters in them."""
+        """Whether there are files, but none of these parameters in them."""
         return bool(self.names) and not self.given.keys() & set(names)
 
     @property
     def emptiness(self) -> str:
-        """Line that says that files have nothing that a node needs."""
+        """Message that the files have no parameter that the node needs."""
         if self.idle:
             return self.idle[0]
         has = ", ".join(self.given)
         return f"{', '.join(self.names)} has no parameters for {self.node} but {has}"
 
     def named(self, names: Iterable[str]) -> str:
-        """Where the values of some parameters come from, to be read."""
+        """Files (or 'command line') that give some parameters, for the log."""
         return ", ".join(dict.fromkeys(self.sources.get(n, "command line") for n in names))
 
 
 def paths(arguments: Sequence[str]) -> Iterator[Path]:
-    """Parameter files among arguments; those of ROS stand between `--ros-args` and `--`."""
+    """Parameter files among arguments: each after --params-file, from `--ros-args` to `--`."""
     is_for_ros = False
     for word, after in pairwise([*arguments, ""]):
         is_for_ros = (is_for_ros or word == "--ros-args") and word != "--"

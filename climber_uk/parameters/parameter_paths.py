@@ -1,4 +1,4 @@
-"""Paths in parameter files: relative to the file that names them, wherever a node is started."""
+"""Paths in parameter files: relative to the parameter file, not to the working directory."""
 
 import itertools
 from collections.abc import Sequence
@@ -6,10 +6,10 @@ from pathlib import Path
 
 
 def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
-    """`path`, the value of parameter `name` of `node`, as seen from the working directory.
+    """`path`, the value of parameter `name` of `node`, relative to the working directory.
 
-    It is relative to the last of the `arguments`' parameter files that gives the parameter;
-    what does not come from a file, but from the command line, stays as it is.
+    It was relative to the last of the `arguments`' parameter files that gives the parameter;
+    a path from the command line stays as it is.
     """
     given = Path(path).expanduser()
     if given.is_absolute():

@@ -1,4 +1,4 @@
-"""Numbers that can hardly be meant: those of a physical parameter in another unit than its own."""
+"""Doubt about implausible values: most are in another unit than the parameter's."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ OTHER_UNITS = {
     "N m": {"N mm": 1e-3},
     "Pa": {"kPa": 1e3, "mbar": 1e2, "bar": 1e5},
 }
-"""Units that a number may have been in by mistake, in the one that is meant."""
+"""Units that a number may be in by mistake, each in the unit that is meant."""
 
 USUAL = {
     "m": (0.0, 1000.0),
@@ -30,13 +30,13 @@ USUAL = {
     "rad/s": (0.0, 1000.0),
     "Pa": (0.0, 1.2e5),
 }
-"""Lowest and highest size of what has these units, where a parameter does not know better."""
+"""Lowest and highest size by unit, for parameters without `plausible`."""
 
 
 def doubt(field: "dataclasses.Field[Any]", value: Any) -> str:
-    """Why `value` can hardly be meant for a field made by `parameter`; empty if it can.
+    """Message that `value` is implausible for a field made by `parameter`; empty if it is not.
 
-    0 can: it switches off.
+    0 is plausible: it switches off.
     """
     unit = field.metadata["unit"]
     low, high = field.metadata["plausible"] or USUAL.get(unit, (0.0, math.inf))

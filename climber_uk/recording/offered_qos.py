@@ -1,4 +1,4 @@
-"""What publishers offer, what serves them all, and how a bag's metadata tell it."""
+"""QoS: what publishers offer, a request that fits them all, and its form in a bag's metadata."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ QUEUE_DEPTH = 5000  # messages of one topic that may wait: seconds, even at 1 kH
 
 
 def request_for(offers: Sequence[QoSProfile]) -> QoSProfile:
-    """The strictest request that all offers serve; without any: a reliable one."""
+    """The strictest request that all offers can serve; a reliable one if there are none."""
     reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
     latched = all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
     return QoSProfile(
@@ -30,12 +30,12 @@ def request_for(offers: Sequence[QoSProfile]) -> QoSProfile:
 
 
 def is_compatible(offer: QoSProfile, request: QoSProfile) -> bool:
-    """Whether messages pass between two profiles."""
+    """Whether a publisher's offer can serve a subscription's request."""
     return bool(qos_check_compatible(offer, request)[0] != QoSCompatibility.ERROR)
 
 
 def to_metadata(qos: QoSProfile) -> Qos:
-    """Return a profile as metadata.yaml holds it."""
+    """Profile in the form of metadata.yaml."""
 
     def to_parts(duration: Duration) -> dict[str, int]:
         return dict(zip(("sec", "nsec"), divmod(duration.nanoseconds, 10**9), strict=True))

@@ -38,31 +38,31 @@ from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.signals import ignore_end, on_end
 
-FLUSH_PERIOD = 0.5  # [s] a recorder that is killed loses what it received within this time
+FLUSH_PERIOD = 0.5  # [s] of messages that a killed recorder loses
 DISCOVERY_PERIOD = 0.2  # [s]
 TAKE_PERIOD = 0.01  # [s]
-GRACE = 0.1  # [s] for what was on its way when the stop came
-REPAIR = 3.5  # [s] in which what was lost is sent again: Fast DDS offers it every 3 s
+GRACE = 0.1  # [s] after a stop, for messages on their way
+REPAIR = 3.5  # [s] in which lost messages are sent again: Fast DDS offers them every 3 s
 A_FEW = 5  # messages of a topic that is not published all the time
 RCLPY = {"3": "humble", "4": "iron", "7": "jazzy", "9": "kilted"}  # distributions by its version
 
 
 @dataclass
 class RecordedTopic:
-    """A topic that is recorded, as one of the types that it may have."""
+    """A topic that is recorded, with one of the types that publishers may give it."""
 
     subscription: Subscription
     type_name: str
-    lost: int = 0  # messages, as the middleware tells
-    overflowed: bool = False  # so many waited at once that others may have been dropped
-    heard: int = 0  # [ns] log time at which the latest message was published
+    lost: int = 0  # messages, by the middleware's count
+    overflowed: bool = False  # the queue was full, so that others may be lost
+    published: int = 0  # [ns] log time at which the latest message was published
 
 
 class BagRecorder(Node):
     """Subscribes topics as they appear and records what arrives, without decoding it.
 
     It takes what has arrived a hundred times a second and is not spun: an executor that is woken
-    by every message takes several times the CPU, and that from those who are recorded.
+    by every message takes several times the CPU, at the expense of the nodes that are recorded.
     """
 
     def __init__(self, options: Namespace) -> None:
@@ -70,14 +70,14 @@ class BagRecorder(Node):
         self.wanted = {self.resolve_topic_name(name) for name in options.topics}
         self.unwanted = {self.resolve_topic_name(name) for name in options.exclude}
         self.recorded: dict[str, RecordedTopic] = {}
-        self.refused: set[tuple[str, str]] = set()  # topics with types that were said not to be
+        self.refused: set[tuple[str, str]] = set()  # topics with types that are not recorded
         self.bag = BagWriter(options.output, options.storage, running_distro())
         self.clock = LogClock()
         self.stopped = 0  # [ns] steady clock when asked to stop; 0: not yet
         self.stop_time = 0  # [ns] log time of that
 
     def run(self) -> None:
-        """Record until asked to stop, and then what had been sent or had arrived by then."""
+        """Record until `stop` is called, and then what had been published by that time."""
         next_discovery = next_flush = 0.0
         is_behind = True  # whether messages from before the stop still come in
         while not self.stop_time or is_behind:
@@ -86,18 +86,18 @@ class BagRecorder(Node):
                 self.discover()
                 next_discovery = now + DISCOVERY_PERIOD
             if now >= next_flush:
-                self.tell_losses()
+                self.report_losses()
                 self.bag.flush()
                 next_flush = now + FLUSH_PERIOD
             was_asked = bool(self.stopped)
             time.sleep(GRACE if was_asked else TAKE_PERIOD)
-            self.look_at_the_clock()
+            self.update_clock()
             oldest = self.take()
             is_behind = not was_asked or oldest <= self.stop_time or self.misses_some()
-        self.tell_losses()
+        self.report_losses()
 
     def discover(self) -> None:
-        """Record new topics, and follow what the publishers of the recorded ones offer."""
+        """Subscribe new topics, and adapt the subscriptions to their publishers' offers."""
         for name, types in self.get_topic_names_and_types():
             if not self.is_wanted(name):
                 continue
@@ -110,17 +110,17 @@ class BagRecorder(Node):
                     self.adapt(name, offers)
 
     def is_wanted(self, name: str) -> bool:
-        """Whether to record a topic: one of those asked for, else any that is not hidden."""
+        """Whether to record a topic: one of `--topics`, or without these any that is not hidden."""
         hidden = "/_" in name
         return name not in self.unwanted and (name in self.wanted if self.wanted else not hidden)
 
     def offers(self, name: str, type_name: str) -> list[QoSProfile]:
-        """The profiles that the publishers of a topic's messages of one type offer."""
+        """QoS profiles that a topic's publishers of one type offer."""
         publishers = self.get_publishers_info_by_topic(name)
         return [end.qos_profile for end in publishers if end.topic_type == type_name]
 
     def choose_type(self, name: str, types: Sequence[str]) -> None:
-        """Subscribe a topic, even if nobody publishes it yet, with the type that most publish."""
+        """Subscribe a topic, also without publishers, with the type that most publishers have."""
         known = [type_name for type_name in types if find_message_class(type_name)]
         if not known:
             self.get_logger().warning(f"not recording {name}: unknown type {', '.join(types)}")
@@ -134,7 +134,7 @@ class BagRecorder(Node):
             self.subscribe(name, chosen, request_for(offers[chosen]))
 
     def refuse_others(self, name: str, types: Sequence[str]) -> None:
-        """Say once which types are not recorded: a topic in a bag has one."""
+        """Warn once of each type that is not recorded: a topic in a bag has one type."""
         recorded = self.recorded[name].type_name
         for type_name in set(types) - {recorded}:
             if (name, type_name) not in self.refused:
@@ -144,7 +144,7 @@ class BagRecorder(Node):
                 )
 
     def subscribe(self, name: str, type_name: str, request: QoSProfile) -> None:
-        """Subscribe a topic, in place of its present subscription."""
+        """Subscribe a topic, replacing its present subscription."""
         present = self.recorded.get(name)
         if present is not None:
             self.count_losses(name)
@@ -167,8 +167,8 @@ class BagRecorder(Node):
     def adapt(self, name: str, offers: Sequence[QoSProfile]) -> None:
         """Subscribe a topic again if one of its publishers cannot serve the subscription.
 
-        Likewise if all could serve a stricter one, which brings what a latching publisher sent
-        before. Once messages have arrived it would bring some of them twice, so then not.
+        Also if all can serve a stricter one, which brings what a latching publisher sent before;
+        but not once messages have arrived, as some would come twice.
         """
         recorded, request = self.recorded[name], request_for(offers)
         present = recorded.subscription.qos_profile
@@ -177,14 +177,14 @@ class BagRecorder(Node):
             self.subscribe(name, recorded.type_name, request)
 
     def introduce(self, name: str) -> None:
-        """Enter a topic into the bag, once its publishers' offers are known."""
+        """Add a topic to the bag, with its publishers' offers, unless it is in it."""
         if name not in self.bag:
             type_name = self.recorded[name].type_name
             offers = [to_metadata(qos) for qos in self.offers(name, type_name)]
             self.bag.add_topic(name, type_name, offers)
 
-    def look_at_the_clock(self) -> None:
-        """Notice that the system clock was set, and that recording is to stop."""
+    def update_clock(self) -> None:
+        """Warn if the system clock was set back, and find the log time of a stop."""
         step = self.clock.look()
         if step < 0:
             self.get_logger().warning(
@@ -194,7 +194,7 @@ class BagRecorder(Node):
             self.stop_time = self.clock.at(self.stopped)
 
     def take(self) -> int:
-        """Record all that has arrived; return the oldest of its log times [ns]."""
+        """Record all messages that have arrived; return the oldest of their log times [ns]."""
         oldest = NEVER
         for name, recorded in self.recorded.items():
             handle, taken_now = recorded.subscription.handle, 0
@@ -208,8 +208,8 @@ class BagRecorder(Node):
                     log_time = received + shift
                     published = (info["source_timestamp"] or received) + shift
                     oldest = min(oldest, log_time)
-                    recorded.heard = published
-                    # else a bag would end with answers to what is no longer in it
+                    recorded.published = published
+                    # else a bag would end with answers to messages that are not in it
                     if not self.stop_time or min(log_time, published) <= self.stop_time:
                         self.introduce(name)
                         self.bag.write(name, log_time, published, data)
@@ -217,16 +217,16 @@ class BagRecorder(Node):
         return oldest
 
     def misses_some(self) -> bool:
-        """Whether a topic may still bring messages from before the stop.
+        """Whether messages from before the stop may still come.
 
-        Reliable ones come in order: while one is sent again, those after it wait. So a topic that
-        was published shortly before the stop is complete once it brings what is later than that.
-        What is latched, or was published a few times only, may not be published again.
+        Reliable messages come in order: while one is sent again, those after it wait. So a topic
+        that was published shortly before the stop is complete once a message from after it has
+        come. Topics that are latched, or had a few messages only, are not waited for.
         """
         if self.clock.at(time.monotonic_ns()) > self.stop_time + REPAIR * 1e9:
             return False
         return any(
-            self.stop_time - REPAIR * 1e9 < recorded.heard <= self.stop_time
+            self.stop_time - REPAIR * 1e9 < recorded.published <= self.stop_time
             and recorded.subscription.qos_profile.reliability == ReliabilityPolicy.RELIABLE
             and recorded.subscription.qos_profile.durability == DurabilityPolicy.VOLATILE
             and self.bag.count(name) > A_FEW
@@ -235,17 +235,17 @@ class BagRecorder(Node):
         )
 
     def count_losses(self, name: str) -> int:
-        """Take what the middleware tells of lost messages of a topic; return how many are new."""
+        """Add the middleware's count of a topic's lost messages; return how many are new."""
         recorded, new = self.recorded[name], 0
         for handler in recorded.subscription.event_handlers:
-            handler._ready_to_take_data = True  # nobody waits for it: see `take`
-            if told := handler.take_data():
-                new += told.total_count_change
+            handler._ready_to_take_data = True  # no executor sets it: see `take`
+            if status := handler.take_data():
+                new += status.total_count_change
         recorded.lost += new
         return new
 
-    def tell_losses(self) -> None:
-        """Say of which topics messages are lost: at first in the log, how many in the metadata."""
+    def report_losses(self) -> None:
+        """Warn of topics that lose messages, and write the counts into the bag's metadata."""
         for name, recorded in self.recorded.items():
             is_first = not recorded.lost
             new = self.count_losses(name)
@@ -257,12 +257,12 @@ class BagRecorder(Node):
                 self.bag.custom_data[f"queue full on {name}"] = "more may be lost"
 
     def stop(self, *_: object) -> None:
-        """Finish when all that had been sent by the first call is recorded."""
+        """Signal handler: finish once all is recorded that was published before the first call."""
         self.stopped = self.stopped or time.monotonic_ns()
 
 
 def running_distro() -> str:
-    """The distribution of ROS that runs: as its set-up says, else by the version of rclpy."""
+    """Name of the ROS distribution: ROS_DISTRO, else by the version of rclpy."""
     with suppress(PackageNotFoundError):
         major = version("rclpy").split(".")[0]
         return os.environ.get("ROS_DISTRO") or RCLPY.get(major, "unknown")
@@ -270,7 +270,7 @@ def running_distro() -> str:
 
 
 def find_message_class(type_name: str) -> type[Any] | None:
-    """Import a message type; None if it is not installed or a bag could not describe it."""
+    """Class of a message type; None if it is not installed, or no definition is known for a bag."""
     package, kind, name = type_name.split("/")
     try:
         message_class = getattr(import_module(f"{package}.{kind}"), name)
@@ -280,7 +280,7 @@ def find_message_class(type_name: str) -> type[Any] | None:
 
 
 def parse(arguments: Sequence[str]) -> Namespace:
-    """Return the options of the command line."""
+    """Options of the command line."""
     parser = Parser("record_bag", "Record topics into a rosbag2 directory.")
     default = Path(datetime.now().strftime("climber_bag_%Y_%m_%d-%H_%M_%S"))
     parser.add_argument("--output", "-o", type=Path, default=default, help="a new directory")
@@ -291,7 +291,7 @@ def parse(arguments: Sequence[str]) -> Namespace:
 
 
 def topic_name(name: str) -> str:
-    """Return a name that may be one of a topic."""
+    """`name` if it is valid for a topic, for `argparse`; raises `ArgumentTypeError`."""
     try:
         validate_topic_name(name)
     except InvalidTopicNameException:
@@ -300,7 +300,7 @@ def topic_name(name: str) -> str:
 
 
 def record(options: Namespace) -> None:
-    """Record until a signal comes."""
+    """Record until a signal to end."""
     recorder = BagRecorder(options)
     # Our own handlers: those of rclpy would cut off what has arrived and is not yet recorded, and
     # KeyboardInterrupt, a second one too, might come in the middle of a write.

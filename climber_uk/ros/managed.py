@@ -1,4 +1,4 @@
-"""A managed node: configured and activated by itself, or by whoever manages the others."""
+"""A managed (lifecycle) node that configures and activates itself, unless a manager is to."""
 
 from dataclasses import dataclass
 
@@ -16,18 +16,18 @@ ACTIVE, INACTIVE = "active", "inactive"
 
 @dataclass(frozen=True)
 class Life:
-    """How a managed node starts."""
+    """The start of a managed node."""
 
-    autostart: bool = parameter(True, "", "become active at the start, without a manager")
+    autostart: bool = parameter(True, "", "become active by itself, without a lifecycle manager")
 
     def __post_init__(self) -> None:
         check(self)
 
 
 class ManagedNode(LifecycleNodeMixin, ClimberNode):
-    """Unconfigured it hears nothing; what it does inactive and active is told to `act`.
+    """A lifecycle node: subscribes when configured (`listen`), and gets its state by `act`.
 
-    `~/enable` does what activating and deactivating do.
+    The service `~/enable` activates (true) and deactivates (false).
     """
 
     def __init__(self, name: str) -> None:
@@ -37,9 +37,9 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         self.failure = ""  # why it could not be configured
 
     def start_life(self) -> None:
-        """Offer the services of a managed node, and become active unless another is to say so.
+        """Offer the lifecycle services and, with `autostart`, configure and activate.
 
-        Raises `ValueError` if it cannot listen.
+        Raises `ValueError` if it cannot be configured.
         """
         LifecycleNodeMixin.__init__(self)
         # private, as is `_state_machine`: there is no other way between a request and the mixin
@@ -52,40 +52,40 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
             self.trigger_activate()
 
     def listen(self) -> list[Subscription]:
-        """Start from nothing, inactive; return all that is subscribed."""
+        """Become inactive and subscribe; return the subscriptions. `ValueError` if it cannot."""
         raise NotImplementedError
 
     def act(self, active: bool) -> None:
-        """Begin what an active node does, or an inactive one."""
+        """Take up the behaviour of an active node, or of an inactive one."""
         raise NotImplementedError
 
     @property
     def life(self) -> str:
-        """State: unconfigured, inactive, active or finalized."""
+        """Lifecycle state: unconfigured, inactive, active or finalized."""
         return str(self._state_machine.current_state[1])
 
     def on_change_state(
         self, request: ChangeState.Request, response: ChangeState.Response
     ) -> ChangeState.Response:
-        """Change the state, if it has the transition that is asked for.
+        """Service ~/change_state: make a transition that there is from this state.
 
-        The mixin of rclpy would raise, and end the node, if it has not.
+        For one that there is not, rclpy's own callback raises, which would end the node.
         """
-        asked = request.transition
+        requested = request.transition
         there = {label: number for number, label, *_ in self._state_machine.available_transitions}
-        if asked.label in there if asked.label else asked.id in there.values():
+        if requested.label in there if requested.label else requested.id in there.values():
             response = self._change_state(request, response)
             if not response.success:
                 self.get_logger().error(f"still {self.life}: {self.failure}")
             return response
-        wanted = repr(asked.label) if asked.label else f"of id {asked.id}"
+        wanted = repr(requested.label) if requested.label else f"of id {requested.id}"
         has = ", ".join(f"{label} ({number})" for label, number in there.items()) or "none"
         self.get_logger().warning(f"no transition {wanted}: {self.life}, from where it has {has}")
         response.success = False
         return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to listen."""
+        """Transition: subscribe; fails with a `ValueError` of `listen`."""
         try:
             self.inputs = self.listen()
         except ValueError as error:
@@ -94,27 +94,27 @@ class ManagedNode(LifecycleNodeMixin, ClimberNode):
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Be active."""
+        """Transition: behave as an active node."""
         self.act(True)
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Be inactive."""
+        """Transition: behave as an inactive node."""
         self.act(False)
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Hear nothing any more."""
+        """Transition: end the subscriptions."""
         while self.inputs:
             self.destroy_subscription(self.inputs.pop())
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Hear nothing any more, for good."""
+        """Transition: end the subscriptions, for good."""
         return self.on_cleanup(state)
 
     def on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """Become active or inactive; what is active already, and may have given up, begins anew."""
+        """Service ~/enable: activate or deactivate; repeated, it begins that state anew."""
         wanted = ACTIVE if request.data else INACTIVE
         try:
             if self.life == wanted:

@@ -1,4 +1,4 @@
-"""How near a climber is to slipping and tipping, on ~/margins and in diagnostics."""
+"""Slip and tip margin of a climber (§7), on ~/margins and in diagnostics."""
 
 from geometry_msgs.msg import Vector3Stamped
 
@@ -6,21 +6,21 @@ from climber_uk.mechanics.adhesion import MAX_MARGIN, Alarm
 from climber_uk.messages import writing
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 
-LEVELS = writing.OK, writing.WARN, writing.ERROR
+STATUS_LEVELS = writing.OK, writing.WARN, writing.ERROR
 
 
 class Margins:
-    """Tells the lowest margins since the last time, on a topic of their own and in diagnostics."""
+    """Publishes the lowest margins since the last message, on ~/margins and /diagnostics."""
 
     def __init__(self, node: ClimberNode, alarm: Alarm) -> None:
         self.node, self.alarm = node, alarm
         self.publisher = node.publisher(Vector3Stamped, "~/margins")
         self.is_due = Throttle(PUBLISH_PERIOD)
         self.last = self.lowest = self.unpublished = MAX_MARGIN, MAX_MARGIN  # slip, tip
-        self.told = 0  # level of alarm
+        self.level = 0  # of the alarm, as published last
 
     def take(self, slip: float, tip: float, load: float, stamp: int) -> None:
-        """Take in slip margin, tip margin and the wheels' load [N]; diagnose if they worsen."""
+        """Add slip and tip margin, and the wheels' load [N], of a time `stamp` [ns]."""
         self.last = slip, tip
         self.lowest = min(slip, self.lowest[0]), min(tip, self.lowest[1])
         self.unpublished = min(slip, self.unpublished[0]), min(tip, self.unpublished[1])
@@ -28,13 +28,13 @@ class Margins:
             frame = self.node.names.base_frame
             self.publisher.publish(writing.vector((*self.unpublished, load), stamp, frame))
             self.unpublished = MAX_MARGIN, MAX_MARGIN
-        if self.alarm.level(min(self.last)) > self.told:
+        if self.alarm.level(min(self.last)) > self.level:
             self.node.diagnose()
 
     def diagnose(self) -> None:
-        """Publish the lowest margins since the last time."""
+        """Publish a status of the lowest margins since the last one."""
         slip, tip = self.lowest
-        self.told, self.lowest = self.alarm.level(min(slip, tip)), self.last
+        self.level, self.lowest = self.alarm.level(min(slip, tip)), self.last
         said = f"lowest: slip margin {slip:.2f}, tip margin {tip:.2f}"
         values = {"slip margin": slip, "tip margin": tip}
-        self.node.publish_status("margins", LEVELS[self.told], said, values)
+        self.node.publish_status("margins", STATUS_LEVELS[self.level], said, values)

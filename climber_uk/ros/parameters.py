@@ -28,8 +28,8 @@ QOS = "qos_overrides."
 class NodeParameters:
     """The parameters of a node, kept as the dataclasses that they fill.
 
-    Every one is read-only but those declared with `runtime=True`: these are checked when they
-    are set, all of a request or none, and `on_change` is called with nothing left half set.
+    All are read-only but those declared with `runtime=True`. A request to set some is checked,
+    and done wholly or not at all; then `on_change` is called.
     """
 
     def __init__(
@@ -38,12 +38,12 @@ class NodeParameters:
         self._node = node
         self._arguments = arguments
         self._on_change = on_change
-        self.remarks: list[str] = []  # what is not refused, but can hardly be meant
-        self.origin = ""  # of those that are given, to be read
+        self.remarks: list[str] = []  # warnings for the log: renamed, doubtful or idle values
+        self.origin = ""  # of the values that are given, for the log
         self._kept: dict[tuple[str, type], Any] = {}
         self._fields: dict[str, tuple[str, type, Field]] = {}
         node.add_pre_set_parameters_callback(self._as_declared)
-        node.add_on_set_parameters_callback(self._change)
+        node.add_on_set_parameters_callback(self._set)
 
     @property
     def declared(self) -> list[tuple[str, type, Field]]:
@@ -52,7 +52,7 @@ class NodeParameters:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Every parameter as it is now, by its name."""
+        """Present value of every parameter, by its name."""
         return {
             name: getattr(self.read(kind, prefix), field.name)
             for name, (prefix, kind, field) in self._fields.items()
@@ -95,7 +95,7 @@ class NodeParameters:
         return overrides[name].value
 
     def read(self, kind: type[T], prefix: str = "") -> T:
-        """Instance of `kind`, of fields declared before, as it is now.
+        """Present values of the fields of `kind`, which were declared with `prefix`.
 
         Raises `ValueError` naming parameter, value and bound.
         """
@@ -114,10 +114,10 @@ class NodeParameters:
         return kept
 
     def refuse_unknown(self, defaults: str = "") -> None:
-        """Raise `ValueError` if a parameter was given that no one declared: it is misspelt.
+        """Raise `ValueError` if a parameter was given that is not declared: it is misspelt.
 
         One that is given to nodes of any name is only remarked on. So is a file that has nothing
-        for this node, unless that leaves it with `defaults`, which nobody is to get by accident.
+        for this node, unless `defaults` names what it would then run with, which must be asked for.
         """
         node, given = self._node, self._node._parameter_overrides
         files = ParameterFiles(self._arguments, node.get_fully_qualified_name())
@@ -138,12 +138,13 @@ class NodeParameters:
             self.origin = f"{count} parameters given ({files.named(ours)})"
 
     def like(self, name: str) -> str:
-        """Question whether another of this node's parameters was meant."""
+        """' (did you mean …?)' with the nearest parameter of this node; empty if none is near."""
         from climber_uk.parameters.parameter_file import similar  # only where something is wrong
 
         return similar(name, self._node._parameters)
 
     def _as_declared(self, changes: list[Parameter]) -> list[Parameter]:
+        """Changes with integers made floats where a float is declared."""
         return [
             _as_float(change, self._fields[change.name][2])
             if change.name in self._fields
@@ -151,7 +152,8 @@ class NodeParameters:
             for change in changes
         ]
 
-    def _change(self, changes: list[Parameter]) -> SetParametersResult:
+    def _set(self, changes: list[Parameter]) -> SetParametersResult:
+        """Set parameters while the node runs: all of a request, or none."""
         kept = dict(self._kept)
         try:
             for change in changes:
@@ -170,7 +172,7 @@ class NodeParameters:
 
 
 def _as_float(given: Parameter, field: Field) -> Parameter:
-    """The same, of an integer as a float where one is wanted and has the same value."""
+    """`given`, its integer made a float where the field is one and the value stays the same."""
     value = given.value
     if isinstance(field.default, float) and type(value) is int and float(value) == value:
         return Parameter(given.name, value=float(value))
@@ -178,6 +180,7 @@ def _as_float(given: Parameter, field: Field) -> Parameter:
 
 
 def _descriptor(field: Field) -> ParameterDescriptor:
+    """Descriptor with what `parameter` says of a field: description, unit, bounds, choices."""
     rule = field.metadata
     unit = f" [{rule['unit']}]" if rule["unit"] else ""
     descriptor = ParameterDescriptor(

@@ -1,4 +1,4 @@
-"""What a simulated climber is made of, as the parameters of its node say."""
+"""The parts of a simulated robot, made from its node's parameters."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ def declare(parameters: NodeParameters) -> None:
 
 
 def parts(parameters: NodeParameters) -> Parts:
-    """What the parameters say now; raises as `NodeParameters.read` does."""
+    """Parts by the present parameters; raises as `NodeParameters.read` does."""
     read = parameters.read
     physics, sensors, step = read(Physics), read(Sensors), read(SimulationOptions).integration_step
     chosen: dict[str, Any] = {}

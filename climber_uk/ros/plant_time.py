@@ -1,4 +1,4 @@
-"""The time of all climbers that one process simulates: the wall clock's, or their own, lock-step.
+"""The clock of the climbers that a process simulates: the wall clock, or simulated lock-step time.
 
 Stamps and times are integers in nanoseconds.
 """
@@ -14,10 +14,10 @@ from climber_uk.ros.running import WALL_CLOCK, ClimberNode, Throttle
 from climber_uk.simulation.options import SimulationOptions
 
 ASK_AGAIN = 0.2  # [s] of wall-clock time, for a torque that does not come
-FALLEN_BEHIND = 1.0  # [s] from which lost wall-clock time is not made up for
-LOOK_PERIOD = 0.1  # [s] of the wall clock, to look for the one that is waited for
-LOOKS = 10  # that must have found it: all who publish have to have found it, too
-CATCH_UP = 0.1  # [s] of the wall clock that simulated time may make up for
+FALLEN_BEHIND = 1.0  # [s] behind the wall clock, from which the rest is skipped
+LOOK_PERIOD = 0.1  # [s] of the wall clock, between two looks for the node `wait_for`
+LOOKS = 10  # in a row that must find it: other publishers have to find it, too
+MAX_LAG = 0.1  # [s] behind its pace that simulated time makes up for
 TICK = SECOND // 100  # [ns] of simulated time between two messages on /clock, at least
 SHARED = (
     "simulated_time",
@@ -28,31 +28,31 @@ SHARED = (
 
 
 class Simulated(Protocol):
-    """A climber that lives in this time."""
+    """A climber that a `PlantTime` steps."""
 
     options: SimulationOptions
     origin: int  # stamp of its first odometry
-    fallen: bool  # it takes no further part
-    answered: bool  # its last odometry, by a torque
+    fallen: bool  # then it is not stepped any more
+    answered: bool  # whether a torque has answered its last odometry
 
     def is_heard_by(self, node: str) -> bool:
-        """Whether a node of that name has subscribed what there is to hear."""
+        """Whether a node of that name has subscribed the climber's topics."""
 
     def advance(self) -> None:
-        """Go on by a control period."""
+        """Advance by a control period."""
 
     def publish_odometry(self) -> None:
-        """Publish what torques are to answer."""
+        """Publish the odometry, which a torque is to answer."""
 
     def publish_others(self) -> None:
-        """Publish what nobody waits for."""
+        """Publish all other topics."""
 
     def no_answer(self) -> None:
-        """Report that nobody answers."""
+        """Report that no torque answers the odometry."""
 
 
 class PlantTime:
-    """Steps its climbers together; in lock-step when each of them has its torque."""
+    """Steps its climbers together: by the wall clock, or once each has its torque: lock-step."""
 
     def __init__(self, node: ClimberNode, options: SimulationOptions) -> None:
         self.options, self.clock, self.log = options, node.get_clock(), node.get_logger()
@@ -66,18 +66,18 @@ class PlantTime:
         self.waits, self.looks = bool(options.wait_for), 0
         if self.waits:
             self.log.info(f"time does not run until {options.wait_for} listens")
-            node.create_timer(LOOK_PERIOD, self.look_out, clock=WALL_CLOCK)
+            node.create_timer(LOOK_PERIOD, self.check_listener, clock=WALL_CLOCK)
         if options.simulated_time:
             self.topic = node.publisher(ClockMessage, "/clock")
             node.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
             if options.real_time_factor > 0:
-                node.create_timer(self.pace / SECOND, self.go_on, clock=WALL_CLOCK)
+                node.create_timer(self.pace / SECOND, self.step_if_due, clock=WALL_CLOCK)
         else:
-            node.create_timer(options.control_period, self.keep_up)
+            node.create_timer(options.control_period, self.follow_clock)
 
     @property
     def pace(self) -> float:
-        """Of the wall clock for a control period [ns]."""
+        """Wall-clock time for a control period [ns], by `real_time_factor`."""
         return self.period / self.options.real_time_factor
 
     @property
@@ -86,45 +86,45 @@ class PlantTime:
         return [climber for climber in self.climbers if not climber.fallen]
 
     def join(self, climber: Simulated) -> None:
-        """Take in a climber; `ValueError` if it would have another time."""
+        """Add a climber; `ValueError` if an option of `SHARED` differs from the first one's."""
         for name in SHARED:
             theirs, ours = getattr(climber.options, name), getattr(self.options, name)
             if theirs != ours:
                 raise ValueError(f"{name}={theirs} must be {ours}, as the first climber has it")
         self.climbers.append(climber)
 
-    def look_out(self) -> None:
-        """Begin, once the one that is waited for listens."""
+    def check_listener(self) -> None:
+        """Let time run once the node `wait_for` has subscribed the climbers' topics."""
         node = self.options.wait_for
         listens = all(climber.is_heard_by(node) for climber in self.climbers)
         self.looks = self.looks + 1 if listens else 0
         if self.waits and self.looks > LOOKS:
             self.log.info(f"{node} listens")
             self.waits = False
-            self.catch_up()
+            self.skip_missed()
             self.publish(self.standing)
 
     def pause(self, paused: bool) -> None:
-        """Stop time, or let it go on."""
+        """Stop time, or let it run."""
         if self.paused and not paused:
-            self.catch_up()
+            self.skip_missed()
         self.paused, self.granted = paused, False
-        self.go_on()
+        self.step_if_due()
 
     def grant(self) -> None:
-        """Go on by one control period in a pause, once every torque for it is there."""
+        """Run for one control period in a pause, once every torque for it has come."""
         self.granted = True
-        self.catch_up()
-        self.go_on()
+        self.skip_missed()
+        self.step_if_due()
 
-    def leave_out(self, climber: Simulated, periods: int) -> None:
-        """Let some periods pass for all but one, whose next odometry shall have a later stamp."""
+    def skip(self, climber: Simulated, periods: int) -> None:
+        """Advance all climbers but one by some periods; its next odometry has a later stamp."""
         for _ in range(periods):
             self.advance([other for other in self.standing if other is not climber])
-        self.catch_up()
+        self.skip_missed()
 
     def ask_again(self) -> None:
-        """Publish the odometry once more to whom missed it; report who does not answer."""
+        """Publish unanswered odometry again, as it may be lost; in the end report it."""
         waited = WALL_CLOCK.now().nanoseconds - self.stepped_at
         if self.waits:
             return
@@ -136,8 +136,8 @@ class PlantTime:
             for climber in silent:
                 climber.no_answer()
 
-    def go_on(self) -> None:
-        """Step if nothing speaks against it: no answer yet, a pause, the pace of time."""
+    def step_if_due(self) -> None:
+        """Step unless a torque is missing, time is paused, or it is too early."""
         if not self.standing or (self.paused and not self.granted):
             return
         if self.options.simulated_time:
@@ -147,25 +147,25 @@ class PlantTime:
                 now = WALL_CLOCK.now().nanoseconds
                 if now < self.due:
                     return
-                late = now - self.due > CATCH_UP * SECOND
+                late = now - self.due > MAX_LAG * SECOND
                 self.due = (now if late else self.due) + self.pace
         elif not self.granted:
             return
         self.step()
 
-    def keep_up(self) -> None:
+    def follow_clock(self) -> None:
         """Step until the clock's time is reached."""
         now = self.clock.now().nanoseconds
         if self.paused or self.waits or not self.standing:
             return
         if now - self.stamp > FALLEN_BEHIND * SECOND:
             self.log.warning(f"{(now - self.stamp) * 1e-9:.1f} s behind: left out")
-            self.catch_up()
+            self.skip_missed()
         while self.stamp + self.period <= now and self.standing:
             self.step()
 
-    def catch_up(self) -> None:
-        """Leave out what has passed on the wall clock, but for the last period."""
+    def skip_missed(self) -> None:
+        """Skip what has passed on the wall clock, but for the last period."""
         if not self.options.simulated_time:
             missed = max(0, self.clock.now().nanoseconds - self.period - self.stamp)
             self.stamp += missed
@@ -173,13 +173,13 @@ class PlantTime:
                 climber.origin += missed
 
     def step(self) -> None:
-        """Advance all by a control period and publish; who falls is heard of no more."""
+        """Advance all by a control period and publish; those that fall publish no more."""
         self.granted = False
         self.advance(self.standing)
         self.publish(self.standing)
 
     def advance(self, climbers: Sequence[Simulated]) -> None:
-        """Let a control period pass for some climbers."""
+        """Advance some climbers, and the time, by a control period."""
         for climber in climbers:
             climber.advance()
             climber.answered = False
@@ -187,7 +187,7 @@ class PlantTime:
         self.stepped_at = WALL_CLOCK.now().nanoseconds
 
     def publish(self, climbers: Sequence[Simulated]) -> None:
-        """Publish what is waited for first, and after it the time and what nobody waits for."""
+        """Publish odometry first, which torques wait for, then time and all other topics."""
         if self.waits:
             return
         for climber in climbers:
@@ -198,6 +198,6 @@ class PlantTime:
             climber.publish_others()
 
     def publish_time(self) -> None:
-        """Publish the simulated time: not each step, as to receive it is dear for many nodes."""
+        """Publish /clock if time is simulated."""
         if self.topic is not None:
             self.topic.publish(ClockMessage(clock=writing.time(self.stamp)))

@@ -1,4 +1,4 @@
-"""The topics on which a simulated climber tells what a robot would tell, and the truth."""
+"""The topics that a simulated climber publishes: a robot's, and the true state."""
 
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, JointState
@@ -14,7 +14,7 @@ except ImportError:  # it comes with a ROS installation, not with the wheels
 
 
 class PlantTopics:
-    """The publishers of a node."""
+    """Publishers of a simulated climber, in its node's namespace."""
 
     def __init__(self, node: ClimberNode) -> None:
         self.names, self.is_due = node.names, Throttle(PUBLISH_PERIOD)
@@ -25,22 +25,22 @@ class PlantTopics:
         self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
 
     def publish_odometry(self, robot: SimulatedRobot, measured_at: int) -> None:
-        """Publish what the sensors tell, measured at a time [ns]."""
+        """Publish the odometry that is due, with the stamp `measured_at` [ns]."""
         names = self.names
         _, measured = robot.odometer.latest()
         message = writing.odometry(measured, measured_at, names.odom_frame, names.base_frame)
         self.odometry.publish(message)
 
     def publish_others(self, robot: SimulatedRobot, now: int) -> None:
-        """Publish how things are now [ns]."""
+        """Publish true state, joints and transform at `now` [ns]; now and then the pressure."""
         names, stamp = self.names, writing.time(now)
         truth = writing.odometry(robot.state, now, names.odom_frame, names.base_frame)
         self.truth.publish(truth)
         joints = writing.wheel_torques(
             robot.torques, now, names.left_wheel_joint, names.right_wheel_joint
         )
-        joints.position = robot.angles[::-1].tolist()
-        joints.velocity = robot.rates[::-1].tolist()
+        joints.position = writing.left_right(robot.angles)
+        joints.velocity = writing.left_right(robot.rates)
         self.joints.publish(joints)
         if self.transform is not None:
             self.transform.publish(TFMessage(transforms=[writing.transform(truth)]))

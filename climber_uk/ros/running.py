@@ -1,4 +1,4 @@
-"""What every node of this package shares: how it starts, talks and ends."""
+"""The base class of all nodes, and how a process runs nodes from start to end."""
 
 import gc
 import math
@@ -35,33 +35,31 @@ from climber_uk.ros.transport import use_udp
 from climber_uk.system.signals import ignore_end, on_end
 
 RELIABLE = QoSProfile(depth=10)
-# what is kept for those who are behind: a recorder that the machine held up for half a second
+# kept for slow subscribers: a recorder may be held up for half a second
 SENT = QoSProfile(depth=1000)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 LONGEST_END = 4  # [s] from a signal to the end of the process, whatever hangs
-PUBLISH_PERIOD = (
-    SECOND // 20
-)  # [ns] from one message to the next of what need not be told each time
+PUBLISH_PERIOD = SECOND // 20  # [ns] of topics that need not be published every time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
-LINES, LINES_PERIOD = 6, 10.0  # [s]: of the log, on one subject
+LINES, LINES_PERIOD = 6, 10.0  # most lines of the log on one subject, in so many [s]
 EPILOG = (
     "Parameters, which docs/parameters.md lists, come after --ros-args: --params-file FILE, or -p "
     "NAME:=VALUE."
 )
-LATE = {"--params-file", "-p", "--param", "-r", "--remap"}
+ROS_OPTIONS = {"--params-file", "-p", "--param", "-r", "--remap"}
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Ration:
-    """Allows a few of many: `number` in each `period` [s] of the wall clock."""
+    """Rate limit: allows `number` calls in each `period` [s] of the wall clock."""
 
     def __init__(self, number: int, period: float) -> None:
         self.period, self.times = period, deque([-math.inf] * number)
         self.refused = 0  # since the last one that was allowed
 
     def __call__(self) -> bool:
-        """Whether one more is allowed."""
+        """Whether one more is allowed now."""
         now = WALL_CLOCK.now().nanoseconds / SECOND
         if now - self.times[0] < self.period:
             self.refused += 1
@@ -72,13 +70,13 @@ class Ration:
 
 
 class Throttle:
-    """Says of the first stamp in each `period` [ns] that it is."""
+    """Throttle: true for the first stamp of each `period` [ns]."""
 
     def __init__(self, period: int) -> None:
         self.period, self.number = period, -1
 
     def __call__(self, stamp: int) -> bool:
-        """Whether no stamp of its period came right before."""
+        """Whether `stamp` [ns] is of another period than the one before it."""
         before, self.number = self.number, stamp // self.period
         return before != self.number
 
@@ -104,21 +102,21 @@ class ClimberNode(Node):
         self._diagnostics: Publisher | None = None
 
     def on_parameters(self) -> None:
-        """Take up changed parameters."""
+        """Called when parameters have changed."""
 
     def summary(self) -> str:
-        """What this node is made for, in a few numbers."""
+        """What this node does, in a few numbers, for the log."""
         return ""
 
     def introduce(self) -> None:
-        """Log in a line what this node is, and what can hardly be meant of its parameters."""
+        """Log in a line where the parameters are from, and the summary; warn of doubtful ones."""
         about = self.summary()
         self.get_logger().info(self.parameters.origin + (about and f"; {about}"))
         for remark in [*self.parameters.remarks, *self._idle_overrides()]:
             self.get_logger().warning(remark)
 
     def _idle_overrides(self) -> list[str]:
-        """Lines about overrides of a QoS that nothing of this node has, or had until now."""
+        """Lines about `qos_overrides` that no publisher or subscription of this node has used."""
         given = [name for name in self._parameter_overrides if name.startswith(QOS)]
         idle = [name for name in given if not self.has_parameter(name)]
         return [f"{name} overrides nothing{self.parameters.like(name)}" for name in idle]
@@ -140,17 +138,17 @@ class ClimberNode(Node):
         return self._overridden(create)
 
     def _overridden(self, create: partial[Any]) -> Any:
-        """What `create` makes; `ValueError` if a parameter has its QoS wrong."""
+        """What `create` makes; `ValueError` if parameters have its QoS wrong."""
         try:
             return create(qos_overriding_options=QoSOverridingOptions.with_default_policies())
         except (ParameterException, RuntimeError) as error:
             raise ValueError(f"qos_overrides of {create.args[1]}: {error}") from None
 
-    def say(self, subject: str, trouble: str, detail: str = "", is_fault: bool = True) -> None:
-        """Log a trouble, or that it is over (''), once each time the trouble changes.
+    def report(self, subject: str, trouble: str, detail: str = "", is_fault: bool = True) -> None:
+        """Log a trouble of a subject, or that it is over (''), when it changes.
 
         In diagnostics it is an error if `is_fault`, else a warning. Of troubles that come and go
-        too fast to be read, most are counted only.
+        faster than `LINES` in `LINES_PERIOD`, most are only counted.
         """
         if trouble == self._troubles.get(subject, ("", True))[0]:
             return
@@ -175,19 +173,19 @@ class ClimberNode(Node):
         """
         self._values, self._alone_on = values, alone_on
         self._diagnostics = self.publisher(DiagnosticArray, "/diagnostics")
-        self.create_timer(1.0, self.look_around, clock=WALL_CLOCK)
+        self.create_timer(1.0, self.check_publishers, clock=WALL_CLOCK)
 
-    def look_around(self) -> None:
-        """Say where others publish what only one should, and how it goes."""
+    def check_publishers(self) -> None:
+        """Report topics that have more publishers than one, and publish diagnostics."""
         for topic in self._alone_on:
             is_crowded = self.count_publishers(topic) > 1
-            self.say(
+            self.report(
                 f"publishers of {topic}", "more than one" if is_crowded else "", is_fault=False
             )
         self.diagnose()
 
     def diagnose(self) -> None:
-        """Publish troubles and values."""
+        """Publish a status with all troubles and values, if diagnostics have started."""
         troubles = {about: said for about, said in self._troubles.items() if said[0]}
         level = DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK
         if any(is_fault for _, is_fault in troubles.values()):
@@ -212,7 +210,7 @@ def run(
 ) -> None:
     """Spin nodes until a signal to end; exit with one line if they cannot start.
 
-    `make_nodes` gets the command line's `options`, of `argparse`, that are there.
+    `make_nodes` gets those of `options`, rules of `argparse` by name, that the command line has.
 
     rclpy's own signal handling takes the publishers away from under a running callback. Here the
     callback is finished first. The executor is the one that takes half the CPU; its `spin` never
@@ -227,7 +225,7 @@ def run(
 
     on_end(stop)
     try:
-        ParameterFiles(sys.argv, "")  # rcl would not say where a file is wrong
+        ParameterFiles(sys.argv, "")  # raises with the line that is wrong, unlike rcl
         chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})
         use_udp()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -254,12 +252,12 @@ def run(
 def parse(
     words: Sequence[str], about: str | None, options: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """What the words of a command line that are not for ROS choose among `options`."""
+    """Values of `options` by name, from the words of a command line that are not for ROS."""
     if not words:
         return {}
     from climber_uk.system.command_line import Parser  # most starts have nothing to parse
 
-    if LATE.intersection(words):
+    if ROS_OPTIONS.intersection(words):
         raise ValueError(f"{words[0]} must come after --ros-args")
     parser = Parser(Path(sys.argv[0]).name, about, EPILOG)
     for name, rules in options.items():
@@ -268,7 +266,7 @@ def parse(
 
 
 def in_a_line(error: Exception) -> str:
-    """What an error says, without rcl's lines of code."""
+    """Message of an error in one line, without rcl's file names."""
     if isinstance(error, UnknownROSArgsError):
         return f"not known after --ros-args: {str(error).strip('[]')}"
     return re.sub(r", at /[^, ]*:\d+", "", " ".join(str(error).split()))

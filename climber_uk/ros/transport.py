@@ -1,4 +1,4 @@
-"""Processes talk by UDP: over shared memory one that is killed can stop the others for seconds.
+"""UDP between processes: over shared memory one that is killed can stop the others for seconds.
 
 docs/hardware.md, "Middleware", has the figures, and how to choose something else.
 """
@@ -13,10 +13,10 @@ RANGE, ONLY_LOCAL = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
 
 
 def use_udp(environment: MutableMapping[str, str] = os.environ) -> None:
-    """Have Fast DDS use UDP only, in this process and its children, unless told something else.
+    """Have Fast DDS use UDP only, here and in child processes, unless the environment chooses.
 
-    To be called before `rclpy.init`. Within LOCALHOST rmw_fastrtps adds shared memory whatever
-    Fast DDS is told, so there a profile takes the place of that range.
+    To be called before `rclpy.init`. Within LOCALHOST rmw_fastrtps adds shared memory in any
+    case, so there a profile takes the place of that range.
     """
     middleware = environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     if environment.keys() & {TRANSPORTS, PROFILES} or "fastrtps" not in middleware:

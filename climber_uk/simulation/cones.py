@@ -1,4 +1,4 @@
-"""Friction on cones of known size: the impulses that oppose every sliding as far as they may.
+"""Friction impulses on cones of known size, each against the sliding of its contact.
 
     ν⁺ = ν + M⁻¹ Σ Hᵢᵀ λᵢ,   |λᵢ| <= Lᵢ,   λᵢ = -Lᵢ sᵢ/|sᵢ| where sᵢ = Hᵢ ν⁺ is not 0
 
@@ -12,9 +12,9 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 
-MAX_SWEEPS = 5000  # a few will do, but for contacts that only just hold each other
+MAX_SWEEPS = 5000  # a few suffice, unless contacts only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
-SMALLEST = 1e-90  # [N s] an impulse that might as well be none; its cube is still a number
+SMALLEST = 1e-90  # [N s] of an impulse, below which it counts as 0: its cube still is a number
 
 
 class Cone(NamedTuple):
@@ -27,7 +27,10 @@ class Cone(NamedTuple):
 def solve_friction_impulses(
     velocity: Array, lightness: Array, cones: list[Cone]
 ) -> tuple[Array, list[bool]]:
-    """ν⁺ (n,) of ν (n,) and the diagonal (n,) of M⁻¹, and whether each contact holds."""
+    """ν⁺ (n,) from ν = `velocity` (n,) and `lightness`, the diagonal (n,) of M⁻¹.
+
+    And for each cone whether its contact sticks.
+    """
     velocity = velocity.copy()
     impulses: list[Array] = [np.zeros(len(cone.rows)) for cone in cones]
     per_impulse = [lightness[:, None] * cone.rows.T for cone in cones]  # M⁻¹ Hᵀ
@@ -52,10 +55,11 @@ def solve_friction_impulses(
 
 
 def impulse_against(sliding: Array, yielding: Array, limit: float) -> Array:
-    """Impulse λ (k,) with |λ| <= `limit` that stops `sliding` (k,), or opposes what remains.
+    """Impulse λ (k,), |λ| <= `limit`, that stops a contact's `sliding` s (k,) or opposes the rest.
 
-    Remains s + W λ with W = diag(yielding). λ = -s / (W + κ), with κ >= 0 such that |λ| is the
-    limit, by Newton's method on 1/|λ|, which comes up to κ from below.
+    The rest is s + W λ with W = diag(yielding), and `yielding` (k,) is speed per impulse.
+    λ = -s / (W + κ), with κ >= 0 such that |λ| is the limit, by Newton's method on 1/|λ|, which
+    comes up to κ from below.
     """
     if limit < SMALLEST:
         return 0.0 * sliding

@@ -1,4 +1,4 @@
-"""Motors between a torque that is commanded and the torque at the wheel.
+"""Motors: from the commanded torques to the torques at the wheels.
 
 τ̇ = (τ_commanded - τ) / T,   within the motor's torque-speed curve (`Climber.torque_bounds`)
 """
@@ -17,11 +17,11 @@ from climber_uk.parameters.declaration import check, parameter
 
 @dataclass(frozen=True)
 class Motors:
-    """How far motors do as they are told; the limits themselves are the climber's."""
+    """Lag and resolution of the motors; their limits are parameters of `Climber`."""
 
-    torque_lag: float = parameter(0.0, "s", "T of the motors' current control", at_least=0)
+    torque_lag: float = parameter(0.0, "s", "time constant T of the motors; 0: at once", at_least=0)
     torque_resolution: float = parameter(
-        0.0, "N m", "step in which torques are set; 0: any torque", at_least=0
+        0.0, "N m", "step in which torques are set; 0: continuous", at_least=0
     )
 
     def __post_init__(self) -> None:
@@ -30,15 +30,16 @@ class Motors:
     def torques(
         self, climber: Climber, wheels: State, before: Array, commanded: Array, time: float
     ) -> Array:
-        """Torques (2,) right, left, after `time` [s], of `commanded` (2,) and those `before` (2,).
+        """Torques (2,) (right, left) [N m] `time` [s] after they were `before` (2,).
 
-        `wheels` is the state of a climber that rolls as its wheels turn.
+        `commanded` (2,) is constant meanwhile; `wheels` is the state of a climber that rolls as
+        its wheels rotate, by which the motors' limits are computed.
         """
-        wanted = commanded
+        torques = commanded
         if self.torque_resolution > 0:
-            wanted = self.torque_resolution * np.round(wanted / self.torque_resolution)
+            torques = self.torque_resolution * np.round(torques / self.torque_resolution)
         if self.torque_lag > 0:
-            wanted = wanted + (before - wanted) * math.exp(-time / self.torque_lag)
-        right, left = wanted.tolist()
+            torques = torques + (before - torques) * math.exp(-time / self.torque_lag)
+        right, left = torques.tolist()
         right_bounds, left_bounds = climber.torque_bounds(wheels)
         return np.array([clipped(right, *right_bounds), clipped(left, *left_bounds)])

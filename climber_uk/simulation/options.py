@@ -1,4 +1,4 @@
-"""How a simulation runs: its time, its start, and what of it is worth a word."""
+"""Options of a simulation: its clock, its steps, its timeouts and its initial state."""
 
 from dataclasses import dataclass
 
@@ -10,35 +10,37 @@ from climber_uk.parameters.declaration import check, parameter
 
 @dataclass(frozen=True)
 class SimulationOptions:
-    """How time passes, and where the climber starts."""
+    """Clock, steps, timeouts and initial state of a simulation."""
 
     simulated_time: bool = parameter(
-        False, "", "publish /clock and step when a torque answers the odometry: lock-step"
+        False, "", "publish /clock, and step when the odometry is answered: lock-step"
     )
     real_time_factor: float = parameter(
-        0.0, "", "most of simulated time to the wall clock's; 0: as answers come", at_least=0
+        0.0, "", "fastest simulated time by wall-clock time; 0: no limit", at_least=0
     )
     control_period: float = parameter(
-        0.005, "s", "between two odometry messages", above=0, plausible=(5e-4, 0.5)
+        0.005, "s", "from one odometry to the next", above=0, plausible=(5e-4, 0.5)
     )
     integration_step: float = parameter(
-        0.0025, "s", "of the integrator", above=0, plausible=(1e-5, 0.5)
+        0.0025, "s", "step of the integrator", above=0, plausible=(1e-5, 0.5)
     )
     command_timeout: float = parameter(
-        0.1, "s", "age at which a torque is dropped", above=0, plausible=(0.002, 5)
+        0.1, "s", "age of a torque after which wheels get none", above=0, plausible=(0.002, 5)
     )
     push_timeout: float = parameter(
-        0.5, "s", "age at which a push ends; 0: with the next one", at_least=0
+        0.5, "s", "age at which a push ends; 0: only with the next one", at_least=0
     )
-    lockstep_timeout: float = parameter(5.0, "s", "wall-clock wait that is reported", above=0)
+    lockstep_timeout: float = parameter(
+        5.0, "s", "wall-clock wait for a torque, then a warning", above=0
+    )
     wait_for: str = parameter(
-        "", "", "node, as a recorder, that must have subscribed all before time runs; none if empty"
+        "", "", "node, as a recorder, for whose subscriptions time waits; empty: none"
     )
-    initial_x: float = parameter(0.0, "m", "x at the start")
-    initial_y: float = parameter(0.0, "m", "y at the start")
-    initial_heading: float = parameter(0.0, "rad", "heading at the start")
-    initial_speed: float = parameter(0.0, "m/s", "forward speed at the start")
-    initial_yaw_rate: float = parameter(0.0, "rad/s", "yaw rate at the start")
+    initial_x: float = parameter(0.0, "m", "x of the initial pose")
+    initial_y: float = parameter(0.0, "m", "y of the initial pose")
+    initial_heading: float = parameter(0.0, "rad", "initial heading")
+    initial_speed: float = parameter(0.0, "m/s", "initial forward speed")
+    initial_yaw_rate: float = parameter(0.0, "rad/s", "initial yaw rate")
 
     def __post_init__(self) -> None:
         check(self)
@@ -57,6 +59,6 @@ class SimulationOptions:
 
     @property
     def initial_state(self) -> State:
-        """Where the climber starts; it does not slip."""
+        """Initial state, without side slip."""
         pose = np.array([self.initial_x, self.initial_y, self.initial_heading])
         return State.rolling(pose, self.initial_speed, self.initial_yaw_rate)

@@ -1,7 +1,7 @@
-"""The climber on its wall: state and wheel torques in, state out, in steps of fixed length.
+"""The climber on its wall: state and wheel torques in, state out, in steps of fixed length (§11).
 
-Smooth motion is integrated by Runge-Kutta (`body`), sticking and sliding of the seal are exact
-(`rolling`), and what may stick and slip in several directions at once is implicit (`sliding`).
+Smooth motion is integrated by Runge-Kutta (`rigid_body`), sticking and sliding of the seal are
+exact (`rolling`), and contacts that stick and slip in several directions are implicit (`sliding`).
 """
 
 import math
@@ -21,12 +21,12 @@ from climber_uk.simulation.rolling import NoSlipStepper
 from climber_uk.simulation.sliding import ContactStepper
 
 CONTACT, UPRIGHT = Contact(), Plane()
-SIDEWAYS = 1e-9  # of the speed, and of 1 m/s: more than rounding makes of rolling
+SIDEWAYS = 1e-9  # of the speed, and of 1 m/s: side slip that is more than rounding
 
 
 @dataclass(frozen=True)
 class Plant:
-    """A climber, its contacts and its wall; one climber at a time.
+    """A climber with its contacts and its wall; keeps no state, and takes one climber at a time.
 
     Raises `ValueError` if `step` is not positive, or a wheel has more inertia than the climber.
     """
@@ -41,13 +41,13 @@ class Plant:
         if not self.step > 0:
             raise ValueError(f"step={self.step!r} must be > 0 [s]")
         if self.slip:
-            _ = self._sliding  # it may have something to refuse
+            _ = self._sliding  # raises if wheels are too heavy
 
     def advance(self, state: State, torques: Array, steps: int, push: Array = NO_PUSH) -> State:
         """State after `steps` steps under constant wheel torques (2,) (right, left) [N m].
 
         `push` (3,) acts on the centre of mass, in the wall's frame [N, N, N m]. Raises `FellOff`
-        where nothing holds the climber on its wall, `NotFinite` where numbers end.
+        where the climber comes off its wall, `NotFinite` where the state is not finite.
         """
         given = Inputs.of(self.climber, torques, push)
         try:
@@ -61,28 +61,28 @@ class Plant:
     def _advance(self, state: State, given: Inputs, steps: int) -> State:
         y = np.concatenate([state.pose, state.velocity])
         if self._is_plain:
-            one_step, held = self._rolling.exact_step, self._is_held_everywhere
+            step, attached = self._rolling.exact_step, self._is_attached_everywhere
             for _ in range(steps):
-                if not held:
-                    self._check_hold_at(y)
-                y = one_step(y, given)
+                if not attached:
+                    self._check_attached_at(y)
+                y = step(y, given)
             return State(y[:3], y[3:])
         more = PlantState.of(state)
         y, slip = np.concatenate([y, more.deflection]), more.slip
         for _ in range(steps):
-            self._check_hold(y)
+            self._check_attached(y)
             y, slip = self._step(y, slip, given)
         return PlantState(y[:3], y[3:6], y[6:], slip)
 
     def wheel_rates(self, state: State) -> Array:
-        """Turning rates (2,) of the wheels (right, left), slipping or not [rad/s]."""
+        """Rates (2,) of the wheels (right, left) [rad/s], their slip included."""
         rates = self.climber.wheel_rates(state)
         if isinstance(state, PlantState):
             rates = rates + state.slip / self.climber.wheel_radius
         return rates
 
     def as_wheels_tell(self, state: State) -> State:
-        """State of a climber that rolls as its wheels turn, whether or not they slip."""
+        """State that odometry from the wheels would show: rolling as they rotate."""
         if not (isinstance(state, PlantState) and state.slip.any()):
             return state
         climber = self.climber
@@ -91,18 +91,18 @@ class Plant:
         return State.rolling(state.pose, (right + left) / 2, yaw_rate)
 
     def wheel_load(self, state: State) -> float:
-        """N_w [N]."""
+        """Load N_w on the wheels [N]."""
         return self._load(np.concatenate([state.pose, state.velocity]))
 
     def margins(self, state: State, torques: Array, push: Array = NO_PUSH) -> tuple[float, float]:
-        """Slip and tip margin (§7): of the drive force and the no-slip row's lateral reaction."""
+        """Slip and tip margin (§7) under wheel torques (2,) [N m] and a push (3,) [N, N, N m]."""
         climber, given = self.climber, Inputs.of(self.climber, torques, push)
         y = np.concatenate([state.pose, state.velocity])
         into = self._body.into_wall(y)
         lateral = self._body.lateral(y, given, climber.mass)
         s_x, s_y = self.wall.along(climber.inclination, float(y[1]))
         return (
-            float(self.contact.slip_margin(climber, into, given.drive, lateral)),
+            float(self.contact.slip_margin(climber, into, given.force, lateral)),
             float(self.contact.tip_margin(climber, into, GRAVITY * math.hypot(s_x, s_y))),
         )
 
@@ -120,7 +120,7 @@ class Plant:
 
     @cached_property
     def _is_plain(self) -> bool:
-        """Whether sticking forwards is all that there is besides smooth motion."""
+        """Whether seal friction along the climber is all that may stick."""
         is_plain = self.contact.grip.seal_radius == 0
         is_plain &= self.contact.locomotion.turning_resistance(1.0) == 0
         is_plain &= self._rolling.is_soft
@@ -130,30 +130,31 @@ class Plant:
         return float(self.contact.wheel_load(self.climber, self._body.into_wall(y)))
 
     def _step(self, y: Array, slip: Array, given: Inputs) -> tuple[Array, Array]:
-        """One step, implicit if something may stick, slip or be caught within it."""
+        """(y, rims' slip) after a step, implicit if a contact may change in it."""
         end = None if slip.any() else self._regular_step(y, given)
         if end is not None:
             return end, slip
         return self._sliding.advance(y, slip, given, self._load(y))
 
     def _regular_step(self, y: Array, given: Inputs) -> Array | None:
-        """End of a step without change between sticking and slipping; None if there is one."""
-        load, turn = self._load(y), given.turn + given.push_turn
+        """y after a step in which no contact changes between sticking and slipping; else None."""
+        load, moment = self._load(y), given.moment + given.push_moment
         resistance = float(self.contact.locomotion.turning_resistance(load))
-        turning = float(np.sign(y[5]))
-        if turning == 0 and resistance > 0:
-            if abs(turn) > resistance:
+        share = float(np.sign(y[5]))  # of the resistance, against the yaw rate or the moment
+        if share == 0 and resistance > 0:
+            if abs(moment) > resistance:
                 return None
-            turning = turn / resistance
-        resisted = given._replace(push_turn=given.push_turn - resistance * turning)
+            share = moment / resistance
+        resisted = given._replace(push_moment=given.push_moment - resistance * share)
         if not self._wheels_hold(y, given, resisted):
             return None
         end = self._rolling.step(y, resisted)
-        if end is None or (resistance > 0 and y[5] != 0 and end[5] * turning <= 0):
+        if end is None or (resistance > 0 and y[5] != 0 and end[5] * share <= 0):
             return None
         return end if self._wheels_hold(end, given, resisted) else None
 
     def _wheels_hold(self, y: Array, given: Inputs, resisted: Inputs) -> bool:
+        """Whether no wheel slips at y; `resisted` are the inputs with the tracks' resistance."""
         if not self.slip:
             return True
         if abs(State(y[:3], y[3:6]).side_slip) > SIDEWAYS * (1 + abs(forward_speed(y))):
@@ -162,20 +163,20 @@ class Plant:
         return self._sliding.wheels_hold(y, given, rates, self._load(y))
 
     @cached_property
-    def _is_held_everywhere(self) -> bool:
+    def _is_attached_everywhere(self) -> bool:
         if self.wall.flat:
-            self._check_hold_at(np.zeros(6))
+            self._check_attached_at(np.zeros(6))
         return self.wall.flat
 
-    def _check_hold(self, y: Array) -> None:
-        if not self._is_held_everywhere:
-            self._check_hold_at(y)
+    def _check_attached(self, y: Array) -> None:
+        if not self._is_attached_everywhere:
+            self._check_attached_at(y)
 
-    def _check_hold_at(self, y: Array) -> None:
+    def _check_attached_at(self, y: Array) -> None:
         """Raise `FellOff` where the climber is pulled off its wall, or tipped off it."""
-        hold = float(self.contact.hold(self.climber, self._body.into_wall(y)))
-        if hold < 1e-9 * self.climber.mass * GRAVITY:  # cos(90°) is 6e-17
-            raise FellOff("force onto the wall", hold, 0.0, "N")
+        normal = float(self.contact.normal_force(self.climber, self._body.into_wall(y)))
+        if normal < 1e-9 * self.climber.mass * GRAVITY:  # cos(90°) is 6e-17
+            raise FellOff("force onto the wall", normal, 0.0, "N")
         _, tip = self.margins(State(y[:3], y[3:6]), np.zeros(2))
         if tip < 1:
             raise FellOff("tip margin", tip, 1.0, "")

@@ -1,4 +1,4 @@
-"""The smooth motion of a climber on its wall: (q̇, v̇) of (30) under the no-slip row.
+"""Equations of motion of a climber on its wall: (q̇, v̇) of (30) under the no-slip row.
 
     q̇ = v + M^(-1/2) B⁺ (b_q - A v),   v̇ = a + M^(-1/2) B⁺ (b - A a)
 
@@ -19,13 +19,13 @@ from climber_uk.mechanics.friction import Bristles
 from climber_uk.mechanics.wall import Wall
 from climber_uk.simulation.inputs import Inputs
 
-# Relaxation lengths within a step after which bristles are where they end up: exp(-20) = 2e-9.
+# Relaxation lengths in a step from which on bristles are in their steady state: exp(-20) = 2e-9.
 SETTLED = 20.0
 
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A climber with all that acts on it; y = (q, v), then the bristles (3,) if there are any."""
+    """A climber with the forces on it; y is q (3,), v (3,), and bristles (3,) if there are any."""
 
     climber: Climber
     contact: Contact
@@ -39,7 +39,7 @@ class RigidBody:
 
     @cached_property
     def stiction(self) -> float:
-        """What the seal holds at rest [N]."""
+        """Most friction of the seal at rest [N]."""
         return float(self.contact.friction.stiction(self.friction))
 
     @cached_property
@@ -52,6 +52,7 @@ class RigidBody:
         return self._weight(0.0)
 
     def _weight(self, height: float) -> tuple[float, float]:
+        """Weight along the wall (x, y) [N], at y = `height` [m]."""
         s_x, s_y = self.wall.along(self.climber.inclination, height)
         weight = self.climber.mass * GRAVITY
         return weight * s_x, weight * s_y
@@ -62,13 +63,13 @@ class RigidBody:
         return given.push_x + w_x, given.push_y + w_y
 
     def push(self, y: Array, given: Inputs) -> float:
-        """Force along the climber that friction is up against [N]."""
+        """Force along the climber, without friction [N]."""
         _, height, heading, *_ = y.tolist()
         f_x, f_y = self.outside(height, given)
-        return float(given.drive + f_x * math.cos(heading) + f_y * math.sin(heading))
+        return float(given.force + f_x * math.cos(heading) + f_y * math.sin(heading))
 
     def lateral(self, y: Array, given: Inputs, mass: float) -> float:
-        """What the wheels have to take to the left, for `mass` to follow the heading [N]."""
+        """Lateral reaction, to the left, that keeps `mass` [kg] from slipping sideways [N]."""
         _, height, heading, *_ = y.tolist()
         f_x, f_y = self.outside(height, given)
         return (
@@ -78,11 +79,11 @@ class RigidBody:
         )
 
     def into_wall(self, y: Array) -> float:
-        """What presses the climber's mass into the wall: g_n with the way's curvature [m/s²]."""
+        """g_n into the wall, with the centripetal part of a curved wall [m/s²]."""
         return float(self.wall.into(self.climber.inclination, float(y[1]), float(y[4])))
 
     def runge_kutta(self, y: Array, given: Inputs, direction: float | None, h: float) -> Array:
-        """y after `h` [s], by the classic method of fourth order; see `derivative`."""
+        """y after `h` [s], by the classic fourth-order method; `direction` as in `derivative`."""
         k1 = self.derivative(y, given, direction)
         k2 = self.derivative(y + h / 2 * k1, given, direction)
         k3 = self.derivative(y + h / 2 * k2, given, direction)
@@ -101,18 +102,18 @@ class RigidBody:
         climber = self.climber
         _, height, heading, v_x, v_y, yaw_rate, *deflection = y.tolist()
         cosine, sine = math.cos(heading), math.sin(heading)
-        force, turn = given.drive, given.turn + given.push_turn
+        force, moment = given.force, given.moment + given.push_moment
         bending = [0.0] * len(deflection)
         if direction == 0:
-            held = [0.0, 0.0, yaw_rate, 0.0, 0.0, turn / climber.yaw_inertia]
+            held = [0.0, 0.0, yaw_rate, 0.0, 0.0, moment / climber.yaw_inertia]
             return np.array(held + bending)
 
         A_v = sine * v_x - cosine * v_y
         x_dot, y_dot = v_x - sine * A_v, v_y + cosine * A_v
         speed = x_dot * cosine + y_dot * sine
         if direction is None:
-            resistance, moment, bending = self._ring(speed, yaw_rate, deflection)
-            force, turn = force - resistance, turn - moment
+            resistance, torsion, bending = self._ring(speed, yaw_rate, deflection)
+            force, moment = force - resistance, moment - torsion
         else:
             sliding = direction * speed
             force = force - self.contact.friction.level(self.friction, sliding) * direction
@@ -125,7 +126,7 @@ class RigidBody:
         b_minus_A_a = -yaw_rate * speed - (sine * a_x - cosine * a_y)
         rates = [
             *(x_dot, y_dot, yaw_rate),
-            *(a_x + sine * b_minus_A_a, a_y - cosine * b_minus_A_a, turn / climber.yaw_inertia),
+            *(a_x + sine * b_minus_A_a, a_y - cosine * b_minus_A_a, moment / climber.yaw_inertia),
         ]
         return np.array(rates + bending)
 
@@ -134,8 +135,8 @@ class RigidBody:
     ) -> tuple[float, float, list[float]]:
         """Force and moment of the seal against v and ω, and the rates of its bristles.
 
-        A ring of radius R that slides at s = √(v² + (R ω)²): exact for sliding alone and for
-        turning alone, and for both the ellipse between them.
+        A ring of radius R that slides at s = √(v² + (R ω)²): exact for driving alone and for yawing
+        alone, and for both the ellipse between them.
         """
         radius, law, f = self.contact.grip.seal_radius, self.contact.friction, self.friction
         around = radius * omega

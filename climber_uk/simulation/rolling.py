@@ -1,4 +1,4 @@
-"""A climber whose wheels do not slip, over one step: sticking, sliding, and from one to the other.
+"""Steps of a climber whose wheels do not slip: its seal sticks, slides, and changes between them.
 
 Friction of a seal without radius is exact: it slides against the motion or, at rest, takes whatever
 value up to its stiction holds the climber still; the instant of change is located in the step.
@@ -18,18 +18,18 @@ from climber_uk.simulation.rigid_body import SETTLED, RigidBody, forward_speed
 MAX_CHANGES_IN_A_STEP = 8
 # Rate of friction times a part of a step, at most: Runge-Kutta is stable up to 2.8.
 STIFF = 0.5
-MAX_PARTS = 100  # beyond that, what is stiff is left to an implicit method
+MAX_PARTS = 100  # of a step; stiffer friction is left to an implicit method
 
 
 class NoSlipStepper:
-    """One step of a body without side slip."""
+    """Steps of a rigid body without side slip; y as in `RigidBody`."""
 
     def __init__(self, body: RigidBody) -> None:
         self.body = body
 
     @cached_property
     def sticks(self) -> bool:
-        """Whether friction has an edge at rest, however small it may be."""
+        """Whether the friction law has stiction."""
         return bool(self.body.contact.friction.stiction(1.0) > 0)
 
     def step(self, y: Array, given: Inputs) -> Array | None:
@@ -39,7 +39,7 @@ class NoSlipStepper:
         if self.body.contact.grip.seal_radius == 0:
             return self.exact_step(y, given) if self.is_soft else None
         rests = not y[3:6].any()
-        if rests and self._ring_holds(y, given):
+        if rests and self._ring_sticks(y, given):
             return y
         if rests or self._creeps(y):
             return None
@@ -47,7 +47,7 @@ class NoSlipStepper:
         return None if end is None or self._creeps(end) else end
 
     def accelerations(self, y: Array, given: Inputs) -> tuple[float, float]:
-        """v̇ [m/s²] and ω̇ [rad/s²]."""
+        """Forward acceleration v̇ [m/s²] and yaw acceleration ω̇ [rad/s²] at y."""
         radius = self.body.contact.grip.seal_radius
         if self.sticks and radius > 0 and not y[3:6].any():
             return 0.0, 0.0
@@ -65,17 +65,18 @@ class NoSlipStepper:
 
     @cached_property
     def _steep_parts(self) -> int:
-        """In which friction's change with speed is followed."""
+        """Parts of a step that are short enough for the friction's slope over speed."""
         steepness = self.body.contact.friction.steepness(self.body.friction)
         parts = math.ceil(min(self.body.step * steepness / self.body.climber.mass / STIFF, 1e9))
         return max(1, parts)
 
     @property
     def is_soft(self) -> bool:
-        """Whether a seal without radius is not too stiff for steps in parts."""
+        """Whether `MAX_PARTS` are enough for a seal without radius."""
         return self._steep_parts <= MAX_PARTS
 
     def _exact_part(self, y: Array, given: Inputs, left_over: float) -> Array:
+        """y after `left_over` [s], with each change between sticking and sliding located."""
         direction = self._direction(y, given)
         for _ in range(MAX_CHANGES_IN_A_STEP):
             end = self.body.runge_kutta(y, given, direction, left_over)
@@ -89,7 +90,7 @@ class NoSlipStepper:
         return self.body.runge_kutta(y, given, direction, left_over)
 
     def _direction(self, y: Array, given: Inputs) -> float:
-        """Way the seal slides: 1 forwards, -1 backwards, 0 where friction holds it."""
+        """Direction in which the seal slides: 1 forwards, -1 backwards, 0 where it sticks."""
         speed = forward_speed(y)
         if speed != 0:
             return 1.0 if speed > 0 else -1.0
@@ -97,7 +98,7 @@ class NoSlipStepper:
         return 0.0 if abs(push) <= self.body.stiction else float(np.sign(push))
 
     def _margin(self, y: Array, given: Inputs, direction: float) -> float:
-        """Falls below 0 where sliding in `direction` ends or, for 0, where friction gives way."""
+        """Below 0 once sliding in `direction` has ended [m/s] or, for 0, sticking has [N]."""
         if direction == 0:
             return self.body.stiction - abs(self.body.push(y, given))
         return direction * forward_speed(y)
@@ -105,7 +106,7 @@ class NoSlipStepper:
     def _until_change(
         self, y: Array, given: Inputs, direction: float, step: float
     ) -> tuple[Array, float]:
-        """State at the instant within `step` at which `_margin` reaches 0, and that instant."""
+        """y at the instant within `step` [s] at which `_margin` reaches 0, and that instant [s]."""
 
         def margin(duration: float) -> float:
             end = self.body.runge_kutta(y, given, direction, duration)
@@ -118,8 +119,9 @@ class NoSlipStepper:
 
     # A ring, or friction without an edge
 
-    def _ring_holds(self, y: Array, given: Inputs) -> bool:
-        around = (given.turn + given.push_turn) / self.body.contact.grip.seal_radius
+    def _ring_sticks(self, y: Array, given: Inputs) -> bool:
+        """Whether stiction of a ring holds the climber against force and moment."""
+        around = (given.moment + given.push_moment) / self.body.contact.grip.seal_radius
         return math.hypot(self.body.push(y, given), around) <= self.body.stiction
 
     def _sliding_speed(self, y: Array) -> float:
@@ -127,12 +129,12 @@ class NoSlipStepper:
 
     @cached_property
     def _lightest(self) -> float:
-        """Mass that a ring's friction moves most easily [kg]."""
+        """Least mass that the seal's friction acts on: m, or J/R² of a ring [kg]."""
         climber, radius = self.body.climber, self.body.contact.grip.seal_radius
         return min(climber.mass, climber.yaw_inertia / radius**2) if radius > 0 else climber.mass
 
     def _creeps(self, y: Array) -> bool:
-        """Whether a ring slides so slowly that its friction turns too fast for the step."""
+        """Whether a ring slides so slowly that its friction changes direction within a step."""
         fastest = self.body.stiction * self.body.step
         return fastest > STIFF * self._lightest * self._sliding_speed(y)
 
@@ -157,7 +159,7 @@ class NoSlipStepper:
 
 
 def _zero(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where `function` changes its sign, by the Illinois method (doi 10.1007/BF01934364).
+    """Root of `function` between `low` and `high`, by the Illinois method (doi 10.1007/BF01934364).
 
     `scipy.optimize` finds it too, but takes longer to import than the rest of a node to start.
     """

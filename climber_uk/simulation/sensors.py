@@ -59,13 +59,13 @@ MEASURING = "odometry_source", "odometry_delay", "encoder_resolution", "seed"
 
 @dataclass(frozen=True)
 class Sensors:
-    """What is between the truth and the odometry; all of it off."""
+    """Errors of the odometry; without any it is the true state."""
 
     odometry_source: str = parameter("truth", "", "what odometry measures", choices=SOURCES)
     odometry_delay: float = parameter(
         0.0,
         "s",
-        "from measuring, which is the stamp, to publishing",
+        "from measuring, which its stamp tells, to publishing",
         at_least=0,
         plausible=(0.0, 1),
     )
@@ -73,9 +73,9 @@ class Sensors:
         0.0, "m", "standard deviation of x and y", at_least=0, plausible=(0.0, 1)
     )
     heading_noise: float = parameter(
-        0.0, "rad", "standard deviation", at_least=0, plausible=(0.0, 1)
+        0.0, "rad", "standard deviation of the heading", at_least=0, plausible=(0.0, 1)
     )
-    speed_noise: float = parameter(0.0, "m/s", "standard deviation", at_least=0)
+    speed_noise: float = parameter(0.0, "m/s", "standard deviation of the speed", at_least=0)
     yaw_rate_noise: float = parameter(0.0, "rad/s", "standard deviation", at_least=0)
     x_bias: float = parameter(0.0, "m", "added to x")
     y_bias: float = parameter(0.0, "m", "added to y")
@@ -85,11 +85,11 @@ class Sensors:
     encoder_resolution: float = parameter(
         0.0,
         "rad",
-        "of the wheels' encoders, for odometry from wheels; 0: exact",
+        "of the wheels' encoders, for odometry_source wheels; 0: exact",
         at_least=0,
         plausible=(0.0, 1),
     )
-    seed: int = parameter(0, "", "of all noise", at_least=0)
+    seed: int = parameter(0, "", "of the noise: the same seed gives the same noise", at_least=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -119,21 +119,24 @@ class Sensors:
         """The same without what `told` adds."""
         return Sensors(**{name: getattr(self, name) for name in MEASURING})
 
-    def told(self, motion: Motion, noise: Iterable[Any]) -> Motion:
-        """Motion with bias and noise, of five numbers of unit variance: x, y, θ, v, ω."""
-        x, y, heading, cosine, sine, speed, yaw_rate = motion
-        right, up, turned, faster, turning = noise
+    def corrupted(self, motion: Motion, noise: Iterable[Any]) -> Motion:
+        """`motion` with bias and noise; `noise` has unit variance, in the order x, y, θ, v, ω."""
+        n_x, n_y, n_heading, n_speed, n_yaw_rate = noise
+        angle = self.heading_bias + self.heading_noise * n_heading
         return Motion(
-            x + self.x_bias + self.position_noise * right,
-            y + self.y_bias + self.position_noise * up,
-            *rotated(heading, cosine, sine, self.heading_bias + self.heading_noise * turned),
-            speed + self.speed_bias + self.speed_noise * faster,
-            yaw_rate + self.yaw_rate_bias + self.yaw_rate_noise * turning,
+            motion.x + self.x_bias + self.position_noise * n_x,
+            motion.y + self.y_bias + self.position_noise * n_y,
+            *rotated(motion.heading, motion.cosine, motion.sine, angle),
+            motion.speed + self.speed_bias + self.speed_noise * n_speed,
+            motion.yaw_rate + self.yaw_rate_bias + self.yaw_rate_noise * n_yaw_rate,
         )
 
 
 class Odometer:
-    """The sensors at work, from a start at `state`; the same seed, the same noise."""
+    """Odometry of one climber: keeps what was measured until its delay is over.
+
+    Raises `ValueError` unless the delay is a multiple of `period` [s].
+    """
 
     def __init__(
         self,
@@ -149,11 +152,11 @@ class Odometer:
         self._measure = source.start(sensors, climber, period, state)
         late = sensors.delay_in(period)
         first = self._measured(state)
-        # before the start the climber was where it is
+        # before the start the climber was where it starts
         self._on_its_way = deque([(-number, first) for number in range(late, -1, -1)])
 
     def latest(self) -> tuple[int, State]:
-        """Period, counted from the start, in which the odometry due now was measured, and it."""
+        """The odometry that is due now: the period in which it was measured, and the state."""
         return self._on_its_way[0]
 
     def measure(self, state: State, wheels: State, angles: Array) -> None:
@@ -167,13 +170,13 @@ class Odometer:
         if self.sensors.is_ideal:
             return state
         noise = self._random.normal(size=5).tolist()
-        told, aside = self.sensors.told(state.motion, noise), float(state.side_slip)
+        noisy, aside = self.sensors.corrupted(state.motion, noise), float(state.side_slip)
         velocity = [
-            told.speed * told.cosine - aside * told.sine,
-            told.speed * told.sine + aside * told.cosine,
-            told.yaw_rate,
+            noisy.speed * noisy.cosine - aside * noisy.sine,
+            noisy.speed * noisy.sine + aside * noisy.cosine,
+            noisy.yaw_rate,
         ]
-        return State(np.array([told.x, told.y, told.heading]), np.array(velocity))
+        return State(np.array([noisy.x, noisy.y, noisy.heading]), np.array(velocity))
 
 
 class DeadReckoning:

@@ -1,4 +1,4 @@
-"""A climber with its pump, motors and sensors, from one odometry to the next."""
+"""The simulated robot: plant, pump, motors and sensors, stepped together."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ VARIANTS: dict[str, Mapping[str, Any]] = {
 
 @dataclass(frozen=True)
 class Physics:
-    """Which of everything the plant is made of, and what happens to it."""
+    """The physics that the plant has, by name, and when its pump fails."""
 
     friction: str = parameter("coulomb", "", "law of the seal", choices=FRICTION)
     adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
@@ -37,19 +37,19 @@ class Physics:
     wall: str = parameter("plane", "", "what it runs along", choices=WALLS)
     slip: bool = parameter(False, "", "whether wheels slip where their load does not suffice")
     pressure_loss_time: float = parameter(
-        0.0, "s", "since the start, at which the pump's pressure drops; 0: never", at_least=0
+        0.0, "s", "after the start, when the pump's pressure drops; 0: never", at_least=0
     )
-    pressure_loss_level: float = parameter(0.0, "Pa", "to which it drops then", at_least=0)
+    pressure_loss_level: float = parameter(0.0, "Pa", "pressure to which it drops", at_least=0)
 
     def __post_init__(self) -> None:
         check(self)
 
 
 class Push(NamedTuple):
-    """A wrench on the climber's centre of mass."""
+    """An external force and moment on the climber's centre of mass."""
 
     wrench: Array  # (3,) force x, y [N], moment about z [N m]
-    in_body: bool = False  # whether it turns with the climber
+    in_body: bool = False  # whether it is in the body's frame, else in the wall's
 
     def on(self, state: State) -> Array:
         """Wrench (3,) in the wall's frame."""
@@ -60,11 +60,11 @@ class Push(NamedTuple):
         return np.array([x * cosine - y * sine, x * sine + y * cosine, moment])
 
 
-NONE = Push(NO_PUSH)
+UNPUSHED = Push(NO_PUSH)
 
 
 class Parts(NamedTuple):
-    """What a machine is made of; its plant's pressure is the one that the pump is set to."""
+    """What a simulated robot is made of; the plant's pressure is the one the pump is set to."""
 
     plant: Plant
     motors: Motors
@@ -74,14 +74,17 @@ class Parts(NamedTuple):
 
 
 class SimulatedRobot:
-    """The state of all of it; `advance` raises what `Plant.advance` does, and changes nothing."""
+    """State of plant, pump, motors and sensors.
+
+    `advance` raises as `Plant.advance` does, and then leaves the state as it was.
+    """
 
     def __init__(self, parts: Parts, start: State, period: float) -> None:
         self.parts, self.period = parts, period
         self.state, self.steps = start, 0
         self.torques: Array = np.zeros(2)  # [N m] at the wheels: right, left
         self.angles: Array = np.zeros(2)  # [rad] of the wheels: right, left
-        self.push = NONE
+        self.push = UNPUSHED
         self.plant = self._at_pressure(parts.plant, self._final_pressure())
         self.rates = self.plant.wheel_rates(start)  # [rad/s] of the wheels: right, left
         climber = parts.plant.climber
@@ -89,21 +92,21 @@ class SimulatedRobot:
 
     @property
     def pressure(self) -> float:
-        """Of the suction, now [Pa]."""
+        """Pressure difference of the suction, now [Pa]."""
         return self.plant.climber.suction_pressure
 
     @property
     def time(self) -> float:
-        """Since the start [s]."""
+        """Time since the start [s]."""
         return self.steps * self.plant.step
 
     def take(self, parts: Parts) -> None:
-        """Go on with changed parts; the pressure takes its time."""
+        """Go on with changed parts; the pressure goes on from where it is."""
         self.parts = parts
         self.plant = self._at_pressure(parts.plant, self.pressure)
 
-    def advance(self, commanded: Array, push: Push = NONE) -> None:
-        """Go on by one step of the integrator."""
+    def advance(self, commanded: Array, push: Push = UNPUSHED) -> None:
+        """Go on by one step under commanded torques (2,) (right, left) [N m] and a push."""
         step, motors = self.parts.plant.step, self.parts.motors
         plant = self._at_pressure(self.plant, self._next_pressure(step))
         wheels = plant.as_wheels_tell(self.state)
@@ -115,15 +118,16 @@ class SimulatedRobot:
         self.steps += 1
 
     def measure(self) -> None:
-        """Take an odometry."""
+        """Take an odometry of the present state; once in a period."""
         wheels = self.plant.as_wheels_tell(self.state)
         self.odometer.measure(self.state, wheels, self.angles)
 
     def margins(self) -> tuple[float, float]:
-        """Slip and tip margin, now."""
+        """Slip and tip margin (§7), now."""
         return self.plant.margins(self.state, self.torques, self.push.on(self.state))
 
     def _pump(self) -> float:
+        """Pressure that the pump could reach without a leak, now [Pa]."""
         physics = self.parts.physics
         lost = 0 < physics.pressure_loss_time <= self.time + 1e-9
         return physics.pressure_loss_level if lost else self.parts.plant.climber.suction_pressure

@@ -1,9 +1,9 @@
-"""A climber whose contacts may stick and slip in every direction: implicit, never gaining energy.
+"""Steps of a climber whose contacts stick and slip in any direction: implicit, gaining no energy.
 
     ν⁺ = ν + M⁻¹ (h Q + Σ Hᵢ λᵢ),   λᵢ opposes Hᵢᵀ ν⁺,  |λᵢ| <= h cᵢ
 
 Implicit Euler on the friction cones (Moreau 1988; here their loads are known, so that ν⁺ is the
-minimum of a convex function and unique). ν = (v, u, ω, ρR, ρL): forward, to the left, turning, and
+minimum of a convex function and unique). ν = (v, u, ω, ρR, ρL): forward, to the left, yaw rate, and
 the speed of each wheel's rim. Contacts: two wheels, the ring of the seal, tracks that scrub. First
 order in the step, against four while nothing changes; so steps are short, and taken only here.
 """
@@ -19,14 +19,14 @@ from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import RigidBody, forward_speed
 
 PARTS = 8  # of a step
-AT_REST = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds
+STUCK = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds
 
 
 class ContactStepper:
-    """Steps of a body whose wheels slip, if `slip`, where their load does not suffice.
+    """Steps of a rigid body; wheels slip, if `slip`, where their load does not suffice.
 
     (11) and (15) count the inertia of rolling wheels into m and J; where wheels slip it is taken
-    out again. Raises `ValueError` if it is more than there is.
+    out again. Raises `ValueError` if it is not less than m and J.
     """
 
     def __init__(self, body: RigidBody, slip: bool) -> None:
@@ -39,47 +39,47 @@ class ContactStepper:
 
     @cached_property
     def rim(self) -> float:
-        """Mass of a wheel's rim: its inertia over r² [kg]."""
+        """Inertia of a wheel over r², as a mass at its rim [kg]."""
         return self.body.contact.grip.wheel_inertia / self.body.climber.wheel_radius**2
 
     @cached_property
     def mass(self) -> float:
-        """Mass [kg] without what turns with the wheels."""
+        """Mass [kg] without the wheels' inertia."""
         return self.body.climber.mass - 2 * self.rim * self.slip
 
     @cached_property
     def yaw_inertia(self) -> float:
-        """Yaw inertia [kg m²] without what turns with the wheels."""
+        """Yaw inertia [kg m²] without the wheels' inertia."""
         climber = self.body.climber
         return climber.yaw_inertia - 2 * self.rim * climber.half_track**2 * self.slip
 
     def wheels_hold(
         self, y: Array, given: Inputs, accelerations: tuple[float, float], load: float
     ) -> bool:
-        """Whether wheels that share `load` [N] do what rolling on asks of them."""
+        """Whether wheels that share `load` [N] can go on rolling, with v̇ [m/s²] and ω̇ [rad/s²]."""
         d, (v_1, omega_1) = self.body.climber.half_track, accelerations
         most = self.body.contact.grip.wheel_friction_coefficient * load / 2
-        right = (given.drive + given.turn / d) / 2 - self.rim * (v_1 + d * omega_1)
-        left = (given.drive - given.turn / d) / 2 - self.rim * (v_1 - d * omega_1)
+        right = (given.force + given.moment / d) / 2 - self.rim * (v_1 + d * omega_1)
+        left = (given.force - given.moment / d) / 2 - self.rim * (v_1 - d * omega_1)
         if max(abs(right), abs(left)) > most:
             return False
         sideways = math.sqrt(most**2 - right**2) + math.sqrt(most**2 - left**2)
         return abs(self.body.lateral(y, given, self.mass)) <= sideways
 
     def advance(self, y: Array, slip: Array, given: Inputs, load: float) -> tuple[Array, Array]:
-        """(y, rims' slip) after a step under `load` [N] on the wheels."""
+        """(y, slip (2,) of the rims [m/s]) after a step, with `load` [N] on the wheels."""
         caught = False
         for _ in range(PARTS):
             before = y
-            y, slip, caught = self._part(y, slip, given, load, self.body.step / PARTS)
+            y, slip, caught = self._implicit_step(y, slip, given, load, self.body.step / PARTS)
             if caught and (y == before).all():
-                break  # it rests, and goes on doing so
+                break  # at rest, and nothing will change that in this step
         return self._rolling_on(y, slip) if caught else (y, slip)
 
-    def _part(
+    def _implicit_step(
         self, y: Array, slip: Array, given: Inputs, load: float, h: float
     ) -> tuple[Array, Array, bool]:
-        """(y, rims' slip) after `h` [s], and whether no wheel slips any more."""
+        """(y, slip of the rims) after `h` [s], and whether no wheel slips any more."""
         d = self.body.climber.half_track
         x, height, heading, v_x, v_y, omega, *deflection = y.tolist()
         middle = heading + h / 2 * omega if self.slip else heading
@@ -89,25 +89,25 @@ class ContactStepper:
         sliding = np.array([v, u, self.body.contact.grip.seal_radius * omega])
 
         f_x, f_y = self.body.outside(height, given)
-        pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, given.push_turn])
+        pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, given.push_moment])
         against, drag = self._smooth_friction(sliding, np.array(deflection), h)
         masses = np.array([self.mass, self.mass, self.yaw_inertia])
         free = masses * [v, u, omega] + h * (pull - against)
         if self.slip:
-            right, left = (given.drive + given.turn / d) / 2, (given.drive - given.turn / d) / 2
+            right, left = (given.force + given.moment / d) / 2, (given.force - given.moment / d) / 2
             rims = slip + np.array([rolls + d * omega, rolls - d * omega])
             free = np.concatenate([free, self.rim * rims + h * np.array([right, left])])
             masses = np.concatenate([masses + h * drag, [self.rim, self.rim]])
             lightness = 1 / masses
         else:
-            free += h * np.array([given.drive, 0.0, given.turn])
+            free += h * np.array([given.force, 0.0, given.moment])
             lightness = 1 / (masses + h * drag)
             free[1] = lightness[1] = 0.0
         cones = self._cones(load, float(np.linalg.norm(sliding)), h)
         found, holds = solve_friction_impulses(free * lightness, lightness, cones)
-        v, u, omega = self._at_rest(found[:3], holds)
+        v, u, omega = self._velocities(found[:3], holds)
 
-        bent_1 = self._bent(
+        deflection_1 = self._deflected(
             sliding, np.array([v, u, omega * self._radius]), np.array(deflection), h
         )
         x, height = x + h * (v * cosine - u * sine), height + h * (v * sine + u * cosine)
@@ -115,11 +115,11 @@ class ContactStepper:
         if not self.slip:
             cosine, sine = math.cos(heading), math.sin(heading)
         v_x, v_y = v * cosine - u * sine, v * sine + u * cosine
-        end = np.array([x, height, heading, v_x, v_y, omega, *bent_1])
+        end = np.array([x, height, heading, v_x, v_y, omega, *deflection_1])
         if not self.slip:
             return end, slip, False
         rolls = forward_speed(end)
-        caught = max(abs(s) for cone in cones[:2] for s in cone.rows @ found) < AT_REST
+        caught = max(abs(s) for cone in cones[:2] for s in cone.rows @ found) < STUCK
         return end, found[3:] - [rolls + d * omega, rolls - d * omega], caught
 
     @property
@@ -132,7 +132,7 @@ class ContactStepper:
         return float(self.body.contact.friction.drag(self.body.friction))
 
     def _cones(self, load: float, sliding: float, h: float) -> list[Cone]:
-        """The wheels first, if they may slip; then the seal, and what resists turning."""
+        """Cones of the wheels, if they may slip, of the seal, and of the tracks' scrubbing."""
         contact, d = self.body.contact, self.body.climber.half_track
         cones, n = [], 5 if self.slip else 3
         if self.slip:
@@ -146,23 +146,23 @@ class ContactStepper:
             rows = np.eye(3, n)
             rows[2, 2] = self._radius
             level = float(contact.friction.level(self.body.friction, sliding))
-            level -= self._drag * sliding  # that is implicit
+            level -= self._drag * sliding  # which is implicit
             cones.append(Cone(rows, h * level))
         else:
             cones.append(Cone(np.eye(1, n), 0.0))
-        turning = float(contact.locomotion.turning_resistance(load))
-        cones.append(Cone(np.eye(1, n, 2), h * turning))
+        resistance = float(contact.locomotion.turning_resistance(load))
+        cones.append(Cone(np.eye(1, n, 2), h * resistance))
         return cones
 
-    def _at_rest(self, found: Array, holds: list[bool]) -> tuple[float, float, float]:
-        """(v, u, ω), 0 and not merely small where friction holds it."""
+    def _velocities(self, found: Array, holds: list[bool]) -> tuple[float, float, float]:
+        """(v, u, ω) of `found` (n,), exactly 0 where a contact sticks."""
         v, u, omega = found.tolist()
-        seal_holds, turn_is_held = holds[-2:]
-        if seal_holds and math.hypot(v, u, self._radius * omega) < AT_REST:
+        seal_sticks, yaw_sticks = holds[-2:]
+        if seal_sticks and math.hypot(v, u, self._radius * omega) < STUCK:
             v, u, omega = 0.0, 0.0, 0.0 if self._radius > 0 else omega
-        return v, u, 0.0 if turn_is_held and abs(omega) < AT_REST else omega
+        return v, u, 0.0 if yaw_sticks and abs(omega) < STUCK else omega
 
-    # Friction without an edge: a + D s⁺ against the sliding s⁺ = (v, u, R ω) after h
+    # Friction without stiction: a + D s⁺ against the sliding s⁺ = (v, u, R ω) after h
 
     def _smooth_friction(self, sliding: Array, deflection: Array, h: float) -> tuple[Array, Array]:
         """Force (3,) that is there already [N, N, N m], and drag (3,) [N s/m, N s/m, N m s]."""
@@ -180,7 +180,7 @@ class ContactStepper:
         share = law.level(f, speed) / speed if speed > 0 else law.steepness(f)
         return np.zeros(3), lever**2 * share
 
-    def _bent(self, before: Array, after: Array, deflection: Array, h: float) -> Array:
+    def _deflected(self, before: Array, after: Array, deflection: Array, h: float) -> Array:
         """Bristles after `h`, in which they slid at `before` (3,), and at last `after` (3,)."""
         bristles = self.body.bristles
         if bristles is None:
@@ -190,7 +190,7 @@ class ContactStepper:
         )
 
     def _rolling_on(self, y: Array, slip: Array) -> tuple[Array, Array]:
-        """(y, no slip) with the momentum of rims and climber together: they roll on as one."""
+        """(y, no slip) of wheels that roll again: the momentum of rims and climber is kept."""
         climber, d = self.body.climber, self.body.climber.half_track
         v = forward_speed(y) + self.rim * float(slip.sum()) / climber.mass
         omega = float(y[5]) + self.rim * d * float(slip[0] - slip[1]) / climber.yaw_inertia

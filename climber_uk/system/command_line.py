@@ -1,4 +1,4 @@
-"""What all command lines share: `--help`, `--version`, errors of one line, output into a pipe."""
+"""Command lines: `--help`, `--version`, errors of one line, and output into a closed pipe."""
 
 import argparse
 import io
@@ -13,7 +13,7 @@ PACKAGE = "climber_uk"
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser with `--version`; what is wrong with the arguments is said in one line, status 2."""
+    """Parser with `--version`; wrong arguments end with one line and status 2."""
 
     def __init__(self, name: str, description: str | None, epilog: str | None = None) -> None:
         super().__init__(name, description=description, epilog=epilog)
@@ -21,12 +21,12 @@ class Parser(argparse.ArgumentParser):
             "--version",
             action=_Version,
             nargs=0,
-            default=argparse.SUPPRESS,  # it is no option of what runs
+            default=argparse.SUPPRESS,  # it is not among the parsed options
             help="print the version and exit",
         )
 
     def arguments(self, given: Sequence[str] | None = None) -> argparse.Namespace:
-        """Parse; from now on a reader of the output, as `head`, may end before this program."""
+        """Options; from now on a reader of the output, as `head`, may end before this program."""
         out = sys.stdout
         if out is sys.__stdout__ and out is not None:
             binary = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
@@ -48,7 +48,7 @@ class Parser(argparse.ArgumentParser):
             self.error(f"{value}: there is no such user")
 
     def error(self, message: str) -> NoReturn:
-        """Exit with one line."""
+        """Exit with one line and status 2."""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 

@@ -1,4 +1,4 @@
-"""Processes that are started by this one, and do not outlive it."""
+"""Child processes that do not outlive this process."""
 
 import ctypes
 import os
@@ -16,19 +16,19 @@ PR_SET_PDEATHSIG = 1
 
 
 def dies_with_me() -> Callable[[], None]:
-    """For `Popen`'s `preexec_fn`: a child that gets SIGTERM when this process has ended."""
+    """For `Popen`'s `preexec_fn`: has the child get SIGTERM when this process ends."""
     return partial(_begin_child, os.getpid())
 
 
 def _begin_child(parent: int) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # what comes before `exec` would be lost else
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # else one before `exec` would be lost
     die_with(parent)
 
 
 def die_with(parent: int) -> None:
-    """Have this process get SIGTERM when its parent, of that id, ends, be it by SIGKILL."""
+    """Have this process get SIGTERM when its parent, of that process id, ends in any way."""
     LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:  # it ended before
+    if os.getppid() != parent:  # it has ended already
         os.kill(os.getpid(), signal.SIGTERM)
 
 
@@ -45,9 +45,9 @@ def call(command: Sequence[str | Path]) -> int:
 
 
 def end(processes: Sequence["subprocess.Popen[bytes]"], patience: Callable[[], float]) -> None:
-    """Have processes end by SIGTERM; by SIGKILL those that do not within `patience()` [s].
+    """End processes by SIGTERM; by SIGKILL those that have not ended after `patience()` [s].
 
-    It is asked again and again: it may shrink meanwhile.
+    `patience` is called again and again, as it may shrink meanwhile.
     """
     for process in processes:
         process.send_signal(signal.SIGTERM)

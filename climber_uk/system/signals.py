@@ -1,4 +1,4 @@
-"""Signals that ask a process to end: taken alike, and ignored once it does."""
+"""Signals that ask a process to end: one handler for all, and how to ignore them."""
 
 import signal
 from collections.abc import Callable
@@ -8,7 +8,7 @@ END = signal.SIGINT, signal.SIGTERM, signal.SIGHUP  # Ctrl-C, kill, and a termin
 
 
 def on_end(handler: Callable[..., Any]) -> None:
-    """Call `handler` for every signal that asks this process to end, but for one nohup ignores."""
+    """Have `handler` called at each signal to end, except SIGHUP where nohup ignores it."""
     for number in END:
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, handler)

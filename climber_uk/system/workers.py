@@ -1,4 +1,4 @@
-"""Processes that compute for this one, and end when it does, however it ends."""
+"""Worker processes, which end with this process in any case."""
 
 import multiprocessing
 import os
@@ -12,7 +12,7 @@ from climber_uk.system.processes import die_with
 
 @contextmanager
 def workers(number: int | None) -> Iterator[ProcessPoolExecutor]:
-    """So many processes (None: one for each core); an exception ends them at once."""
+    """Executor of `number` processes (None: one for each core); an exception ends them at once."""
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(number, spawn, _start, (os.getpid(),)) as executor:
         try:

@@ -104,7 +104,7 @@ def test_what_is_fixed_holds_for_all_and_what_is_drawn_for_each(campaign):
     own = found.columns(0, 4)
     loops = found.scenario.loops(own)
     assert loops.climber.yaw_inertia == 1.0
-    assert loops.controller.climber.mass == 5.5
+    assert loops.law.climber.mass == 5.5
     np.testing.assert_array_equal(loops.climber.mass, own[PLANT + "mass"])
     assert len(set(own[PLANT + "mass"])) == len(set(own[SEED])) == 4
     assert loops.start.y.tolist() == [6.0] * 4  # as paper.yaml says

@@ -135,7 +135,7 @@ def test_its_noise_is_that_of_the_plants_sensors():
     for _ in range(4):
         _, expected = odometer.latest()
         noise = next(drawn)[:, 0]
-        told = loops.sensors.told(state.motion, noise.tolist())
+        told = loops.sensors.corrupted(state.motion, noise.tolist())
         np.testing.assert_array_equal([told.x, told.y, told.heading], expected.pose)
         odometer.measure(state, state, np.zeros(2))
 

@@ -174,7 +174,7 @@ def test_what_the_limits_take_away_is_told():
         command = law.command(situation(START), reference.target)
         assert np.abs(command.torques).max() <= limit
         assert bool(np.abs(command.missing).max() > 1e-9) is is_cut
-        demanded = law.climber.drive_and_turn(command.torques) + command.missing
+        demanded = law.climber.force_and_moment(command.torques) + command.missing
         force = command.constraint_force
         np.testing.assert_allclose(demanded, [force[0], force[2]], atol=1e-9)
 

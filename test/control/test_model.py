@@ -14,7 +14,7 @@ STILL, NONE, NOTHING = Torques(0.0, 0.0), Wrench(0.0, 0.0), DisturbanceEstimate(
 
 def after(climber, motion, wheels, disturbance, time):
     drive, turn = climber.wrench(*wheels)
-    return predict(climber, motion, drive + disturbance.drive, turn + disturbance.turn, time)
+    return predict(climber, motion, drive + disturbance.force, turn + disturbance.moment, time)
 
 
 @given(

@@ -62,7 +62,7 @@ def test_what_is_missing_is_no_longer_asked_for():
     pace = Pace(lag=0.4, rate=0.8, change=0.5)
     slower = pace.slowed(2.0, PREVIEW, time, STEP)
     before, after = (Reference.of(p.target(PREVIEW, time)) for p in (pace, slower))
-    assert before.speed_rate - after.speed_rate == pytest.approx(2.0)
+    assert before.forward_acceleration - after.forward_acceleration == pytest.approx(2.0)
     np.testing.assert_array_equal(before.velocity, after.velocity)
 
 

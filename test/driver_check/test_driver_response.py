@@ -7,7 +7,7 @@ import pytest
 from driven import CLIMBER, START, arrived, evidence, odometry, tried
 
 from climber_uk.driver_check import checks, reacting, report
-from climber_uk.driver_check.evidence import Command, Pulse, Trial
+from climber_uk.driver_check.evidence import Command, PulseTimes, TrialRecord
 from climber_uk.driver_check.report import Verdict
 from climber_uk.driver_check.response import WIRINGS, expected_gain, response_of
 from climber_uk.driver_check.trial import Bounds
@@ -122,8 +122,8 @@ def silence(acceleration, until):
         for h, r, s in zip(heading, rate, stamps, strict=True)
     ]
     commands = [Command(stamps[0], np.array([0.01, -0.01]))]
-    pulses = [Pulse(True, stamps[0], stamps[30])]
-    return evidence(heard, Trial(pulses, commands, 2.0, (stamps[31], stamps[-1])))
+    pulses = [PulseTimes(True, stamps[0], stamps[30])]
+    return evidence(heard, TrialRecord(pulses, commands, 2.0, (stamps[31], stamps[-1])))
 
 
 def test_a_torque_that_ends_after_the_last_command_passes():

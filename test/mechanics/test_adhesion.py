@@ -22,7 +22,7 @@ HELD = Attachment()
 def test_the_papers_wheels_carry_k_p_s_and_its_seal_rubs_with_f():
     assert HELD.wheel_load(PAPER, 0.0) == pytest.approx(79.5)
     assert HELD.seal_friction(PAPER) == PAPER.seal_friction
-    assert HELD.hold(PAPER, 0.0) == pytest.approx(150.0)
+    assert HELD.normal_force(PAPER, 0.0) == pytest.approx(150.0)
 
 
 @pytest.mark.parametrize(("inclination", "load"), [(0, 128.55), (60, 104.025), (180, 30.45)])
@@ -34,7 +34,7 @@ def test_weight_into_the_wall_loads_the_wheels_and_on_a_ceiling_relieves_them(in
 def test_wheels_never_pull_at_the_wall():
     weak = replace(PAPER, suction_pressure=1000.0)  # k P S = 31.8 N < 49.05 N < P S = 60 N
     assert HELD.wheel_load(weak, -GRAVITY) == 0
-    assert HELD.hold(weak, -GRAVITY) == pytest.approx(10.95)
+    assert HELD.normal_force(weak, -GRAVITY) == pytest.approx(10.95)
 
 
 def test_without_seal_all_adhesion_is_on_the_wheels():

@@ -50,7 +50,7 @@ def test_rolling_is_the_udwadia_kalaba_motion_under_no_slip(heading, v, omega, t
 
 @given(torque_pairs)
 def test_torques_survive_the_way_to_forces_and_back(torques):
-    drive, turn = PAPER.drive_and_turn(torques)
+    drive, turn = PAPER.force_and_moment(torques)
     np.testing.assert_allclose(PAPER.wheel_torques(drive, turn), torques, atol=1e-12)
 
 

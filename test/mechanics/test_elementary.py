@@ -55,7 +55,7 @@ def test_an_angle_is_turned_by_the_same_bits_in_any_company():
     heading, angle = random.uniform(-4, 4, 50), random.uniform(-0.06, 0.06, 50)
     given = heading, np.cos(heading), np.sin(heading), angle
     together = elementary.rotated(*given)
-    for few in (slice(0, 1), slice(7, 8), slice(10, 35), np.abs(angle) < elementary.SMALL):
+    for few in (slice(0, 1), slice(7, 8), slice(10, 35), np.abs(angle) < elementary.SMALL_ANGLE):
         alone = elementary.rotated(*(numbers[few] for numbers in given))
         for part, whole in zip(alone, together, strict=True):
             np.testing.assert_array_equal(part, whole[few])

@@ -12,9 +12,9 @@ MANY = replace(Climber(), mass=np.array([1.0, 2.0, 3.0]))
 def test_a_part_of_many_has_the_numbers_of_those_and_shares_the_rest():
     some = part((MANY, Wrench(np.array([4.0, 5.0, 6.0]), 7.0)), np.array([2, 0]))
     np.testing.assert_array_equal(some[0].mass, [3, 1])
-    np.testing.assert_array_equal(some[1].drive, [6, 4])
+    np.testing.assert_array_equal(some[1].force, [6, 4])
     assert some[0].yaw_inertia == MANY.yaw_inertia
-    assert some[1].turn == 7.0
+    assert some[1].moment == 7.0
     assert part(Climber(), 0) == Climber()
 
 
@@ -22,16 +22,16 @@ def test_only_the_exceptional_ones_are_computed_anew():
     asked = []
 
     def negative(wrench):
-        asked.extend(wrench.drive.tolist())
-        return Wrench(-wrench.drive, 0.0)
+        asked.extend(wrench.force.tolist())
+        return Wrench(-wrench.force, 0.0)
 
     wrench = Wrench(np.array([1.0, 2.0, 3.0]), 9.0)
-    got = amended(wrench.drive > 1.5, wrench, negative, wrench)
-    np.testing.assert_array_equal(got.drive, [1, -2, -3])
-    np.testing.assert_array_equal(got.turn, [9, 0, 0])
+    got = amended(wrench.force > 1.5, wrench, negative, wrench)
+    np.testing.assert_array_equal(got.force, [1, -2, -3])
+    np.testing.assert_array_equal(got.moment, [9, 0, 0])
     assert asked == [2, 3]
-    assert amended(wrench.drive > 5, wrench, negative, wrench) is wrench
-    np.testing.assert_array_equal(wrench.drive, [1, 2, 3])
+    assert amended(wrench.force > 5, wrench, negative, wrench) is wrench
+    np.testing.assert_array_equal(wrench.force, [1, 2, 3])
 
 
 def test_of_one_the_exception_is_all_or_nothing():

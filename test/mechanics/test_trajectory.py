@@ -53,8 +53,8 @@ def test_every_derivative_is_the_difference_of_the_one_below(shape, law, reverse
         (*turned, here.velocity[:, 2]),
         (before.velocity, after.velocity, here.acceleration),
         (before.acceleration[:, :2], after.acceleration[:, :2], here.jerk),
-        (before.speed, after.speed, here.speed_rate),
-        (before.speed_rate, after.speed_rate, here.speed_second_rate),
+        (before.speed, after.speed, here.forward_acceleration),
+        (before.forward_acceleration, after.forward_acceleration, here.forward_jerk),
     ):
         difference = (high - low) / (2 * h)
         assert np.abs(difference - rate).max() <= 1e-6 * max(1.0, np.abs(rate).max())

@@ -316,7 +316,7 @@ def test_over_a_minute_of_random_driving_not_a_millionth_of_the_energy_is_lost(n
             demand = random.uniform(0.2, 1.0) * random.choice([-1, 1]), random.uniform(-1, 1)
             push = random.normal(size=3) * [3.0, 3.0, 0.3]
         torques = driven(state, random, climber, demand)
-        drive, turn = climber.drive_and_turn(torques)
+        drive, turn = climber.force_and_moment(torques)
 
         def powers(state, drive=drive, turn=turn, push=push):
             motors = drive * state.forward_speed + turn * state.yaw_rate
@@ -338,7 +338,7 @@ def test_with_friction_enough_slip_mode_is_the_plant_that_does_not_slip():
     firm, loose = Plant(PAPER, step), Plant(PAPER, step, Contact(grip=Grip(5.0)), slip=True)
     for number in range(4000):
         now = trajectory.at((number + 0.5) * step)
-        drive = 5 * now.speed_rate + PAPER.seal_friction + 49.05 * np.sin(now.heading)
+        drive = 5 * now.forward_acceleration + PAPER.seal_friction + 49.05 * np.sin(now.heading)
         torques = PAPER.wheel_torques(drive, 0.33 * now.acceleration[2])
         rolling = firm.advance(rolling, torques, 1)
         slipping = loose.advance(slipping, torques, 1)

@@ -112,12 +112,12 @@ def test_wheels_that_roll_count_the_way_and_those_that_slip_drift():
 def test_sensors_are_ideal_only_if_no_error_of_any_kind_is_added():
     motion, noise = State.rolling(np.zeros(3), 0.2, 0.1).motion, [1.0] * 5
     assert Sensors().is_ideal
-    assert Sensors().told(motion, noise) == motion
+    assert Sensors().corrupted(motion, noise) == motion
     for field in dataclasses.fields(Sensors):
         if field.name not in MEASURING:
             sensors = Sensors(**{field.name: 0.25})
             assert not sensors.is_ideal
-            assert sensors.told(motion, noise) != motion  # it is not read by nobody
+            assert sensors.corrupted(motion, noise) != motion  # it is not read by nobody
             assert sensors.ideal == Sensors()
 
 

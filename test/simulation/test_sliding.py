@@ -91,7 +91,7 @@ def test_a_part_of_a_step_takes_no_more_energy_than_the_motors_give(seed, law, r
     y = np.concatenate([random.normal(size=6), np.zeros(3)])
     slip, torques, h = random.normal(size=2) * 3, random.normal(size=2), 0.0025
     given = Inputs.of(PAPER, torques, NO_PUSH)
-    end, slipping, _ = sliding._part(y, slip, given, load=79.5, h=h)
+    end, slipping, _ = sliding._implicit_step(y, slip, given, load=79.5, h=h)
     before = PlantState(y[:3], y[3:6], y[6:], slip)
     after = PlantState(end[:3], end[3:6], end[6:], slipping)
     d = PAPER.half_track * after.yaw_rate * np.array([1, -1])

@@ -21,7 +21,7 @@ def friction(case: Case) -> float:
     if climber is None or len(run.commands) < 2:
         return NAN
     time, speed = run.seconds(run.commands), run.rates[run.is_answered, 0]
-    drive, _ = climber.drive_and_turn(run.torques)
+    drive, _ = climber.force_and_moment(run.torques)
     push = drive - climber.weight_along_wall * np.sin(run.pose[run.is_answered, 2])
     pushed = np.concatenate([[0.0], np.cumsum(push[:-1] * np.diff(time))])
     ways = np.concatenate([[0], np.cumsum(np.sign(speed) * (np.abs(speed) > MOVING))])
