@@ -8,6 +8,7 @@ from climber_uk.control.approach import Approach
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, State
 
 slow = pytest.mark.slow
@@ -66,6 +67,34 @@ def test_enabled_again_in_mid_course_it_goes_on_where_it_is():
 
 
 @slow
+def test_a_reference_that_is_not_held_back_is_kept_over_a_long_wait():
+    """By a planner that does not listen: it tells the next second, and never again what was."""
+    climb = Climb().run(12.0)
+    whole = climb.controller.active.preview
+    climb.controller.enable(False)
+    climb.run(3.0)
+    stopped = climb.position
+    for begin in range(15, 55):
+        times = slice(*np.searchsorted(whole.times, [begin * SECOND, (begin + 2) * SECOND]))
+        told = (whole.times, whole.pose, whole.velocity, whole.acceleration)
+        climb.time += 1.0
+        now = SECOND + round(climb.time * SECOND)
+        climb.controller.on_reference(now, Preview(*(values[times] for values in told)))
+    climb.run(0.5)
+    assert climb.position == stopped
+    here = SECOND + round(stopped * SECOND)
+    np.testing.assert_array_equal(
+        climb.controller.active.preview.at(here).pose, whole.at(here).pose
+    )
+    climb.controller.enable(True)
+    climb.run(10.0)
+    assert climb.follows()
+    assert climb.position == pytest.approx(stopped + 10.0, abs=0.5)
+    assert climb.fastest() <= 1.3 * climb.reference_speed
+    assert climb.off_the_path() < 0.005
+
+
+@slow
 def test_a_start_3_m_off_is_refused_with_the_distance():
     climb = Climb(offset=(3.0, 0.0, 0.0)).run(1.0)
     assert climb.controller.mode is Mode.TOO_FAR
@@ -93,7 +122,13 @@ def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned
 
 
 @slow
-@pytest.mark.parametrize("offset", [0.0, 0.01, 0.02, 0.03, 0.05, 0.09, -0.04, -0.09])
+@pytest.mark.parametrize(
+    "offset",
+    [
+        *(0.0, 0.02, 0.05, 0.09, -0.09),
+        *(pytest.param(offset, marks=pytest.mark.soak) for offset in (0.01, 0.03, -0.04)),
+    ],
+)
 @pytest.mark.parametrize("since", [0.0, 6.0])
 def test_an_offset_of_the_clocks_is_no_latency(offset, since):
     climb = Climb().run(since).run(4.0, clock=offset)
