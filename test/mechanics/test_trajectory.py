@@ -44,7 +44,7 @@ LAWS = {
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_every_derivative_is_the_difference_of_the_one_below(shape, law, reverse_gear):
     trajectory = Trajectory(shape, law, reverse_gear)
-    h = 1e-5
+    h = 1e-6
     time = np.linspace(-0.3, min(trajectory.duration, 40) + 0.3, 1001) + 1e-4
     before, here, after = (trajectory.at(time + shift) for shift in (-h, 0, h))
     turned = np.unwrap(np.stack([before.pose[:, 2], after.pose[:, 2]]), axis=0)
