@@ -55,8 +55,8 @@ class TrajectoryPublisher(ClimberNode):
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(PublisherOptions)
-        self.build_trajectory = build_trajectory(self.parameters.read)
-        self.trajectory = self.build_trajectory
+        self.planned = build_trajectory(self.parameters.read)
+        self.trajectory = self.planned
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
         self.followed: int | None = None  # [ns] how far a controller has come
         self.last_look = self.stood_at = 0  # [ns] of the clock
@@ -77,7 +77,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def summary(self) -> str:
         """Extremes of the trajectory, for the log."""
-        found = summary(self.build_trajectory)
+        found = summary(self.planned)
         self.parameters.remarks += found.remarks
         return f"{self.parameters.read(TrajectoryParameters).shape}, {found}"
 
@@ -94,7 +94,7 @@ class TrajectoryPublisher(ClimberNode):
             return response
         start = self.next_point * self.options.point_period
         law = Stopping(self.trajectory.law, start, self.options.stop_time)
-        self.trajectory = replace(self.build_trajectory, law=law)
+        self.trajectory = replace(self.planned, law=law)
         response.success, response.message = True, f"comes to rest from {start:.2f} s on"
         self.get_logger().info(response.message)
         return response
@@ -122,10 +122,11 @@ class TrajectoryPublisher(ClimberNode):
         self.report("start", "")
         self.destroy_subscription(self.odometry)
         self.odometry = None
-        self.trajectory, self.next_point = self.build_trajectory, 0
+        self.trajectory, self.next_point = self.planned, 0
         self.points.clear()
         self.followed = None
-        self.start, self.last_look = stamp + round(self.options.start_delay * SECOND), now
+        self.start = stamp + round(self.options.start_delay * SECOND)
+        self.last_look = now or stamp  # the odometry may have come before the first clock
         self.publish_around(self.start)
         shape = self.parameters.read(TrajectoryParameters).shape
         self.get_logger().info(f"{shape} starts at {self.start / SECOND:.3f} s")
@@ -151,13 +152,13 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_path(self, stamp: int) -> None:
         """Publish the whole path, for display."""
-        path = self.build_trajectory.path(points=400)
+        path = self.planned.path(points=400)
         self.path.publish(writing.path(path, stamp, self.names.odom_frame))
 
     def publish(self) -> None:
         """Publish the preview from where the trajectory has come to."""
         now = self.get_clock().now().nanoseconds
-        if now < self.last_look - CLOCK_STEP and self.start is not None:
+        if 0 < now < self.last_look - CLOCK_STEP and self.start is not None:
             self.get_logger().warning("the clock went back: starts again at the next odometry")
             self.start = None
             self.wait_for_odometry()
