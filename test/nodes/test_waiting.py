@@ -14,8 +14,8 @@ from test_faults import CONTROLLER, LOCK_STEP, PLANNER, PLANT, Climb, said
 from world import CONFIG
 
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics import trajectory_parameters as plan
 from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages import reading, writing
 from climber_uk.parameters.parameter_file import Values, read_file
 
@@ -76,7 +76,7 @@ class Waiting(Climb):
 
     def off_the_path(self, since):
         """Largest distance [m] from the path as a curve."""
-        path = plan.planned(Values(read_file(CONFIG / "climber.yaml", f"/{PLANNER}")).read)
+        path = build_trajectory(Values(read_file(CONFIG / "climber.yaml", f"/{PLANNER}")).read)
         curve = path.at(np.arange(0.0, 57.0, 0.01)).pose[:, :2]
         places = [
             (m.pose.pose.position.x, m.pose.pose.position.y)
