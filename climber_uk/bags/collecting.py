@@ -2,7 +2,8 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from operator import itemgetter
 from typing import Any
 
 from tqdm import tqdm
@@ -46,6 +47,11 @@ class Collected:
             self.frames.setdefault(name, batch.strings["header.frame_id"])
             self.parts[name].append((batch.stamps, batch.log_times, *TAKEN[name](batch)))
 
+    @property
+    def first_parameters(self) -> dict[str, Any]:
+        """Those that the controller told first; none if it did not."""
+        return min(self.parameters, key=itemgetter(0), default=(0, {}))[1]
+
     def runs(self) -> list["Collected"]:
         """What belongs to each run: they differ where the odometry's time starts again."""
         stamps, arrivals, _, faults = in_order(self.parts[topics.ODOMETRY])
@@ -77,25 +83,35 @@ class Collected:
 
 
 def collect(
-    bag: Bag, names: Topics, namespaces: Sequence[str]
+    bag: Bag,
+    names: Topics,
+    namespaces: Sequence[str],
+    of: Collection[str] = topics.KNOWN,
+    by_publishing: bool = False,
 ) -> tuple[dict[str, Collected], list[Event]]:
-    """Return what a bag tells of the climbers in some namespaces, and all events."""
+    """Return what a bag tells of the climbers in some namespaces, and all events.
+
+    Of the topics with the names `of` only; `by_publishing` gives arrivals as the times of
+    publishing, not of recording.
+    """
     collected = {namespace: Collected() for namespace in namespaces}
     takers = {
         topic: (name, found)
         for namespace, found in collected.items()
         for topic, name in names.of(namespace)
+        if name in of
     }
     texts = {
-        names.full(topics.DIAGNOSTICS, ""): events.statuses,
-        names.full(topics.LOG, ""): events.warnings,
+        names.full(name, ""): tell
+        for name, tell in ((topics.DIAGNOSTICS, events.statuses), (topics.LOG, events.warnings))
+        if name in of
     }
     wanted = [topic for topic in bag.types if topic in takers or topic in texts]
     told: list[Event] = []
     with tqdm(
         total=bag.count(wanted), unit=" messages", delay=PATIENCE, leave=False, disable=None
     ) as progress:
-        for topic, batch in read_batches(bag, wanted):
+        for topic, batch in read_batches(bag, wanted, by_publishing):
             progress.update(len(batch))
             try:
                 if topic in texts:

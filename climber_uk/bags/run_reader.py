@@ -3,13 +3,14 @@
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from operator import itemgetter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from climber_uk.bags import events, topics
-from climber_uk.bags.bag import Bag
-from climber_uk.bags.collecting import Collected
+from climber_uk.bags.bag import Bag, open_bag
+from climber_uk.bags.collecting import Collected, collect
 from climber_uk.bags.events import Event
 from climber_uk.bags.joints import Joints, of_both, of_one, wheel_names
 from climber_uk.bags.recorded import TimeSeries, in_order
@@ -39,11 +40,20 @@ class RunReader:
     bag: Bag
     names: Topics
     namespace: str
-    parameters: Callable[[str], Told] | None  # of a namespace, in place of those in the bag
+    parameters: Callable[[str], Told] | None = None  # of a namespace, in place of those in the bag
 
     def topic(self, name: str) -> str:
         """Full name of one of the climber's topics."""
         return self.names.full(name, self.namespace)
+
+    @classmethod
+    def read(
+        cls, path: Path, names: Topics, namespace: str, of: Collection[str] = topics.KNOWN
+    ) -> tuple["RunReader", Collected]:
+        """Read what a bag tells on the topics `of` of one climber; raises as `open_bag` does."""
+        with open_bag(path) as bag:
+            reader = cls(bag, names, namespace)
+            return reader, collect(bag, names, [namespace], of)[0][namespace]
 
     def runs(self, found: Collected, told: Collection[Event]) -> list[RecordedRun]:
         """All runs; raises `NoRunError`."""

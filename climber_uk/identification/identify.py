@@ -11,17 +11,17 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from climber_uk.bags.topics import PARAMETERS
+from climber_uk.bags.run_reader import RunReader
+from climber_uk.bags.topics import ODOMETRY, Topics
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
 from climber_uk.identification.identified import NAMES
 from climber_uk.identification.integral_equations import Cut
-from climber_uk.identification.recorded_motion import Source, read_motion
+from climber_uk.identification.recorded_motion import TOPICS, read_motion
 from climber_uk.identification.recorded_site import (
     assumed_away,
     differences,
-    recorded_parameters,
     site_of,
 )
 from climber_uk.identification.report import (
@@ -37,10 +37,10 @@ from climber_uk.identification.report import (
 from climber_uk.mechanics.climber import Climber
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.report.outputs import printable
 from climber_uk.system.command_line import Parser
 
 PUBLISHER = "trajectory_publisher"
-SIDES = "right", "left"
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
@@ -48,11 +48,16 @@ def tell(options: argparse.Namespace) -> None:
     """Print and write what a bag tells; raises `ValueError` of what it does not."""
     cut = Values(vars(options)).read(Cut)
     file, plant = parameters_of(CONTROLLER, options), plant_of(options)
-    topic = Source(namespace=options.namespace).topic(PARAMETERS)
-    recorded = recorded_parameters(options.bag, topic)
+    names = Topics({ODOMETRY: options.odometry})
+    reader, climber = RunReader.read(options.bag, names, options.namespace.strip("/"), TOPICS)
+    recorded = climber.first_parameters
     parameters = {**recorded, **file}
     believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
-    motion, unfit = read_motion(options.bag, source(options, {**file, **recorded}, believed))
+    told = {**file, **recorded}
+    delay = told.get("transport_delay", 0.0) if options.delay is None else options.delay
+    motion, unfit = read_motion(reader, climber, told, believed.suction_pressure, delay)
+    for loss in reader.bag.losses:
+        print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
     found = identify(motion, believed, cut, site)
     print(table(found, believed), end="")
     print(*remarks(found), sep="\n")
@@ -69,19 +74,6 @@ def tell(options: argparse.Namespace) -> None:
         write_changed(options.params, changes(found, believed), options.output)
     if said := list(missing(found)):
         raise ValueError("\n".join(said))
-
-
-def source(options: argparse.Namespace, parameters: dict[str, Any], believed: Climber) -> Source:
-    """Where the bag tells of the climber whose controller had `parameters`."""
-    joints = [parameters.get(f"{side}_wheel_joint", f"{side}_wheel_joint") for side in SIDES]
-    delay = parameters.get("transport_delay", 0.0) if options.delay is None else options.delay
-    return Source(
-        namespace=options.namespace,
-        odometry=options.odometry,
-        joints=(joints[0], joints[1]),
-        pressure=believed.suction_pressure,
-        delay=delay,
-    )
 
 
 def plan(options: argparse.Namespace) -> None:
@@ -111,7 +103,7 @@ def plan(options: argparse.Namespace) -> None:
 
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
     """Those of a node in the parameter file; none without one."""
-    name = Source(namespace=options.namespace).topic(node)
+    name = Topics().full(node, options.namespace.strip("/"))
     return read_file(options.params, name) if options.params else {}
 
 

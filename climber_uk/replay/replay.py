@@ -7,11 +7,11 @@ moved the climber: every answer is one to the run as it was, whatever the parame
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
+from climber_uk.bags.bag import Bag
 from climber_uk.bags.publishing_order import read_published
-from climber_uk.bags.topics import ODOMETRY, REFERENCE, TORQUES
+from climber_uk.bags.topics import ODOMETRY, PRESSURE, REFERENCE, TORQUES
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
@@ -21,7 +21,7 @@ from climber_uk.messages.names import Names
 from climber_uk.parameters.parameter_file import Values
 from climber_uk.replay.recorded_controller import CLOCK, Modes, RecordedController
 
-PRESSURE = "suction_pressure"
+TOPICS = ODOMETRY, REFERENCE, PRESSURE, TORQUES  # of what the controller was told, and answered
 DEFAULTS = {
     prefix + field.name: field.default
     for kind, prefix in [*KINDS, (Names, "")]
@@ -61,8 +61,11 @@ class Replay:
         }
         return {name: (was, now) for name, (was, now) in pairs.items() if was != now}
 
-    def run(self, bag: Path, namespace: str) -> None:
-        """Answer all of a bag; raises as `read_controller` does."""
+    def run(self, bag: Bag, namespace: str, is_published: bool) -> None:
+        """Answer all of a bag; raises as `RecordedController` does.
+
+        Messages, not arrays: one by one they go through the reading that the node has.
+        """
         odometry, reference = f"{namespace}/{ODOMETRY}", f"{namespace}/{REFERENCE}"
         missing = {odometry, reference}
         takers = {
@@ -72,13 +75,13 @@ class Replay:
             f"{namespace}/{PRESSURE}": self.on_pressure,
             f"{namespace}/{TORQUES}": self.on_torques,
         }
-        for topic, at, message in read_published(bag, takers):
+        for topic, at, message in read_published(bag, takers, is_published):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
             takers[topic](at, message)
         if missing:
-            raise ValueError(f"{bag} has no message on {' and '.join(sorted(missing))}")
+            raise ValueError(f"{bag.path} has no message on {' and '.join(sorted(missing))}")
 
     def pass_time(self, now: int) -> None:
         """Let the clock be a time of the wall clock, unless time is simulated; never go back."""

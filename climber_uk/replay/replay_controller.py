@@ -15,11 +15,12 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
+from climber_uk.bags.bag import open_bag
 from climber_uk.bags.publishing_order import are_known
-from climber_uk.bags.topics import TORQUES
+from climber_uk.bags.topics import DIAGNOSTICS, PARAMETERS
 from climber_uk.parameters.parameter_file import read_argument, read_file
-from climber_uk.replay.recorded_controller import NODE, PARAMETERS, RecordedController
-from climber_uk.replay.replay import DEFAULTS, Replay
+from climber_uk.replay.recorded_controller import CLOCK, NODE, RecordedController
+from climber_uk.replay.replay import DEFAULTS, TOPICS, Replay
 from climber_uk.replay.torque_comparison import (
     WHEELS,
     Comparison,
@@ -44,19 +45,22 @@ def replayed(options: argparse.Namespace) -> Comparison:
     def choose(told: Mapping[str, Any]) -> dict[str, Any]:
         return {**(told if file is None else file), **given}
 
-    recorded = RecordedController(options.bag, namespace, file)
-    if recorded.parameters is None and file is None:
-        raise ValueError(
-            f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
-        )
-    if not are_known(options.bag, [f"{namespace}/{TORQUES}"]):
-        print(
-            f"replay_controller: {options.bag} does not tell when messages were published: they "
-            "are taken in the order of their arrival at the recorder",
-            file=sys.stderr,
-        )
-    replay = Replay(recorded, namespace, choose)
-    replay.run(options.bag, namespace)
+    topics = [f"{namespace}/{name}" for name in (*TOPICS, PARAMETERS)]
+    with open_bag(options.bag) as bag:
+        is_published = are_known(bag, [*topics, CLOCK, DIAGNOSTICS])
+        recorded = RecordedController(bag, namespace, is_published, file)
+        if recorded.parameters is None and file is None:
+            raise ValueError(
+                f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
+            )
+        if not is_published:
+            print(
+                f"replay_controller: {options.bag} does not tell when messages were published: "
+                "they are taken in the order of their arrival at the recorder",
+                file=sys.stderr,
+            )
+        replay = Replay(recorded, namespace, choose)
+        replay.run(bag, namespace, is_published)
     return compare(recorded, replay)
 
 
