@@ -8,7 +8,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from climber_uk.bags import events, topics
+from climber_uk.bags import events
 from climber_uk.bags.bag import Bag
 from climber_uk.bags.batches import Batch, read_batches
 from climber_uk.bags.events import Event
@@ -17,7 +17,8 @@ from climber_uk.bags.recorded import FilePart, in_order
 from climber_uk.bags.reference import Points
 from climber_uk.bags.restarts import windows
 from climber_uk.bags.taking import TAKEN
-from climber_uk.bags.topics import Topics
+from climber_uk.bags.topics import KNOWN, Topics
+from climber_uk.messages import topics
 
 PATIENCE = 2.0  # [s] after which progress is told
 
@@ -86,7 +87,7 @@ def collect(
     bag: Bag,
     names: Topics,
     namespaces: Sequence[str],
-    of: Collection[str] = topics.KNOWN,
+    of: Collection[str] = KNOWN,
     by_publishing: bool = False,
 ) -> tuple[dict[str, Collected], list[Event]]:
     """Return what a bag tells of the climbers in some namespaces, and all events.

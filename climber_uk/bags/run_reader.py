@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from climber_uk.bags import events, topics
+from climber_uk.bags import events
 from climber_uk.bags.bag import Bag, open_bag
 from climber_uk.bags.collecting import Collected, collect
 from climber_uk.bags.events import Event
@@ -17,9 +17,10 @@ from climber_uk.bags.recorded import TimeSeries, in_order
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.taking import TAKEN
-from climber_uk.bags.topics import Topics
+from climber_uk.bags.topics import KNOWN, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
+from climber_uk.messages import topics
 from climber_uk.parameters.parameter_file import Values
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
@@ -48,7 +49,7 @@ class RunReader:
 
     @classmethod
     def read(
-        cls, path: Path, names: Topics, namespace: str, of: Collection[str] = topics.KNOWN
+        cls, path: Path, names: Topics, namespace: str, of: Collection[str] = KNOWN
     ) -> tuple["RunReader", Collected]:
         """Read what a bag tells on the topics `of` of one climber; raises as `open_bag` does."""
         with open_bag(path) as bag:

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.bags.batches import Batch
-from climber_uk.bags.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, REFERENCE_TIME, TRUTH
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE
+from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, REFERENCE_TIME, TRUTH
 
 Faults = NDArray[np.intp]  # (n,) places in FAULTS
 FAULTS = (

@@ -3,13 +3,21 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
-REFERENCE_TIME = "reference_time"  # where on the reference the climber was
-TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
-JOINTS, PRESSURE, PARAMETERS = "joint_states", "suction_pressure", "uk_torque_controller/parameters"
-FORCE = "uk_torque_controller/constraint_force"
-MARGINS = "plant_simulator/margins", "uk_torque_controller/margins"  # the plant knows better
-DIAGNOSTICS, LOG = "/diagnostics", "/rosout"
+from climber_uk.messages.topics import (
+    DIAGNOSTICS,
+    FORCE,
+    JOINTS,
+    LOG,
+    MARGINS,
+    ODOMETRY,
+    PARAMETERS,
+    PRESSURE,
+    REFERENCE,
+    REFERENCE_TIME,
+    TORQUES,
+    TRUTH,
+)
+
 NAMES = (
     *(ODOMETRY, TRUTH, REFERENCE, REFERENCE_TIME, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE),
     *MARGINS,

@@ -18,16 +18,10 @@ from climber_uk.campaign.distributions import (
     extremes,
 )
 from climber_uk.campaign.limits import Limit
-from climber_uk.campaign.names import (
-    CONSTRAINT_SET,
-    LOSS_TIME,
-    NODES,
-    PARAMETERS,
-    PLANT,
-    SEED,
-)
+from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, PARAMETERS, SEED
 from climber_uk.campaign.scenario import Node, Scenario
 from climber_uk.mechanics import Array
+from climber_uk.messages.topics import NODES, PLANT
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.parameters.parameter_file import given, load, nothing_for, read_sections, similar
 from climber_uk.simulation.options import SimulationOptions

@@ -26,6 +26,7 @@ from climber_uk.driver_check.node import DriverNode
 from climber_uk.driver_check.trial import Bounds
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.names import Names
+from climber_uk.messages.topics import CONTROLLER, ODOMETRY
 from climber_uk.parameters.changed_parameters import write_sections
 from climber_uk.parameters.parameter_file import Section, nothing_for, read_sections
 from climber_uk.parameters.parameter_files import paths
@@ -34,7 +35,7 @@ from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.signals import on_end
 
-NODE, CONTROLLER = "check_driver", "uk_torque_controller"
+NODE = "check_driver"
 PATIENCE = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques
 CATCH_UP = 0.2  # [s] to hear what came while the first report was made, and is old
@@ -123,8 +124,8 @@ def check(
 
 def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None:
     """Hear odometry for a while, by the wall clock or by its stamps."""
-    spin.until(lambda: bool(node.count_publishers("odom")), PATIENCE)
-    if not node.count_publishers("odom"):
+    spin.until(lambda: bool(node.count_publishers(ODOMETRY)), PATIENCE)
+    if not node.count_publishers(ODOMETRY):
         return
     spin.until(lambda: node.hears, PATIENCE / 2)
     node.arrivals.clear()  # when they came says nothing

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from climber_uk.bags.run_reader import RunReader
-from climber_uk.bags.topics import ODOMETRY, Topics
+from climber_uk.bags.topics import Topics
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
@@ -25,8 +25,6 @@ from climber_uk.identification.recorded_site import (
     site_of,
 )
 from climber_uk.identification.report import (
-    CONTROLLER,
-    PLANT,
     changes,
     label_of,
     missing,
@@ -35,12 +33,12 @@ from climber_uk.identification.report import (
     table,
 )
 from climber_uk.mechanics.climber import Climber
+from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.report.outputs import printable
 from climber_uk.system.command_line import Parser
 
-PUBLISHER = "trajectory_publisher"
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
@@ -78,7 +76,7 @@ def tell(options: argparse.Namespace) -> None:
 
 def plan(options: argparse.Namespace) -> None:
     """Write a trajectory, with all that is in the parameter file; raises `ValueError`."""
-    parameters = parameters_of(PUBLISHER, options)
+    parameters = parameters_of(PLANNER, options)
     origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
     controller = parameters_of(CONTROLLER, options)
     site, believed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
@@ -88,7 +86,7 @@ def plan(options: argparse.Namespace) -> None:
     best = excitation.plan(believed, limits, origin, site)
     x, y, heading = best.trajectory.at(0.0).pose.tolist()
     changed = {
-        PUBLISHER: best.parameters,
+        PLANNER: best.parameters,
         PLANT: {"initial_x": x, "initial_y": y, "initial_heading": heading, **AT_REST},
         "run_demo": {"duration": best.trajectory.duration},
     }
@@ -121,7 +119,7 @@ def main() -> None:
     parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
-    parser.add_argument("--odometry", default="odom", help="topic (default: odom)")
+    parser.add_argument("--odometry", default=ODOMETRY, help=f"topic (default: {ODOMETRY})")
     parser.add_argument(
         "--delay", type=float, help="[s] of torques, unless joint_states tells them"
     )

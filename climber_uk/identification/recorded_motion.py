@@ -11,9 +11,9 @@ from climber_uk.bags.collecting import Collected
 from climber_uk.bags.joints import torques_and_angles, wheel_names
 from climber_uk.bags.recorded import TimeSeries
 from climber_uk.bags.run_reader import RunReader, Told
-from climber_uk.bags.topics import JOINTS, ODOMETRY, PARAMETERS, PRESSURE, TORQUES
 from climber_uk.identification.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.messages.topics import JOINTS, ODOMETRY, PARAMETERS, PRESSURE, TORQUES
 
 Indices = NDArray[np.intp]
 Torques = tuple[Array, Array]  # when they begin (m,) [s], and they (m, 2) [N m]

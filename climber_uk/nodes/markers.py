@@ -19,17 +19,16 @@ from visualization_msgs.msg import MarkerArray
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
+from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, REFERENCE, TORQUES
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.running import BEST_EFFORT, PUBLISH_PERIOD, RELIABLE, ClimberNode, Throttle, run
 
 T = TypeVar("T")
-REFERENCE, TORQUES = "reference", "wheel_torques"
-FORCE, MARGINS = "uk_torque_controller/constraint_force", "uk_torque_controller/margins"
 SEEN = {
     REFERENCE: MultiDOFJointTrajectory,
     TORQUES: JointState,
     FORCE: WrenchStamped,
-    MARGINS: Vector3Stamped,
+    MARGINS[1]: Vector3Stamped,
 }
 AGE = SECOND  # [ns] of what is no longer drawn
 ABOVE = 0.05  # [m] off the wall: arrows hide nothing there, and nothing hides them
@@ -66,7 +65,7 @@ class Markers(ClimberNode):
         self.way: deque[Place] = deque(maxlen=self.options.way_points)
         self.is_due, self.last = Throttle(PUBLISH_PERIOD), 0
         self.markers = self.publisher(MarkerArray, "markers", RELIABLE)
-        self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
+        self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT)
         for topic, kind in SEEN.items():
             self.subscription(kind, topic, partial(self.latest.__setitem__, topic), BEST_EFFORT)
 
@@ -81,7 +80,9 @@ class Markers(ClimberNode):
         if not self.is_due(stamp):
             return
         odom_frame, base_frame = self.names.odom_frame, self.names.base_frame
-        state = self.understood("odom", message, lambda m: reading.state(m, odom_frame, base_frame))
+        state = self.understood(
+            ODOMETRY, message, lambda m: reading.state(m, odom_frame, base_frame)
+        )
         if state is not None:
             if stamp < self.last:
                 self.way.clear()
@@ -109,7 +110,7 @@ class Markers(ClimberNode):
         """All that is known at a time [ns], of a climber at `pose` (3,)."""
         prefix = self.get_namespace().strip("/")
         drawing = Drawing(stamp, self.names.odom_frame, f"{prefix}/" if prefix else "")
-        margin = self.fresh(MARGINS, stamp, lambda message: float(message.vector.x))
+        margin = self.fresh(MARGINS[1], stamp, lambda message: float(message.vector.x))
         colour = GREY if margin is None else colour_of(margin)
         drawing.climber("climber", pose, self.options.half_track, self.options.wheel_radius, colour)
         self.draw_way(drawing, place(pose, 0.0, 0.0, WALL))

@@ -19,6 +19,7 @@ from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.mechanics.trajectory_parameters import KINDS, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
+from climber_uk.messages.topics import ODOMETRY, PLANNER, REFERENCE, REFERENCE_PATH, REFERENCE_TIME
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
 
@@ -50,7 +51,7 @@ class TrajectoryPublisher(ClimberNode):
     """Starts a trajectory at the stamp of an odometry, and goes on as it is followed."""
 
     def __init__(self) -> None:
-        super().__init__("trajectory_publisher")
+        super().__init__(PLANNER)
         for kind, prefix in [*KINDS, (PublisherOptions, "")]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
@@ -63,9 +64,9 @@ class TrajectoryPublisher(ClimberNode):
         self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
         self.next_point = 0  # every point is computed once: previews agree to the last bit
 
-        self.reference = self.publisher(MultiDOFJointTrajectory, "reference")
-        self.path = self.publisher(Path, "reference_path", LATCHED)
-        self.subscription(TimeReference, "reference_time", self.on_reference_time)
+        self.reference = self.publisher(MultiDOFJointTrajectory, REFERENCE)
+        self.path = self.publisher(Path, REFERENCE_PATH, LATCHED)
+        self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_timer(self.options.publish_period, self.publish)
@@ -102,7 +103,7 @@ class TrajectoryPublisher(ClimberNode):
     def wait_for_odometry(self) -> None:
         """Start at the next odometry."""
         if self.odometry is None:
-            self.odometry = self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
+            self.odometry = self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT)
 
     def on_odometry(self, message: Odometry) -> None:
         """Start the trajectory `start_delay` after the stamp of `message`."""
@@ -145,7 +146,7 @@ class TrajectoryPublisher(ClimberNode):
         assert self.start is not None
         if self.followed is not None:
             return self.followed
-        if self.count_publishers("reference_time"):
+        if self.count_publishers(REFERENCE_TIME):
             return self.start
         return max(self.start, self.get_clock().now().nanoseconds)
 

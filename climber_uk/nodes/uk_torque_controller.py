@@ -24,6 +24,17 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.reference import tracking_error
 from climber_uk.messages import reading, reading_reference, writing
+from climber_uk.messages.topics import (
+    CONTROLLER,
+    FORCE,
+    ODOMETRY,
+    PARAMETERS,
+    PRESSURE,
+    REFERENCE,
+    REFERENCE_TIME,
+    TORQUES,
+    private,
+)
 from climber_uk.parameters.declaration import check, parameter
 from climber_uk.ros.managed import ManagedNode
 from climber_uk.ros.margins import Margins
@@ -57,7 +68,7 @@ class UkTorqueController(ManagedNode):
     """Messages to and from a `Controller`, which decides."""
 
     def __init__(self) -> None:
-        super().__init__("uk_torque_controller")
+        super().__init__(CONTROLLER)
         parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
         for kind, prefix in [*KINDS, (NodeOptions, ""), (Grip, ""), (Alarm, ""), *parts]:
             self.parameters.declare(kind, prefix)
@@ -72,19 +83,19 @@ class UkTorqueController(ManagedNode):
         self.is_position_due = Throttle(PUBLISH_PERIOD)
         self.told_mode = Mode.WAITING
 
-        self.torques = self.publisher(JointState, "wheel_torques")
+        self.torques = self.publisher(JointState, TORQUES)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         self.error = self.publisher(Vector3Stamped, "~/tracking_error")
-        self.force = self.publisher(WrenchStamped, "~/constraint_force")
+        self.force = self.publisher(WrenchStamped, private(FORCE))
         self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
-        self.reference_time = self.publisher(TimeReference, "reference_time")
-        self.told = self.publisher(ParameterEvent, "~/parameters", LATCHED)
+        self.reference_time = self.publisher(TimeReference, REFERENCE_TIME)
+        self.told = self.publisher(ParameterEvent, private(PARAMETERS), LATCHED)
         self.tell_parameters()
         safety = self.controller.safety
         shortest = min(safety.odometry_timeout, safety.reference_timeout)
         # on the wall clock: one in simulated time would not notice that there is no clock
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
-        self.start_diagnostics(self.values, alone_on=("odom", "reference", "wheel_torques"))
+        self.start_diagnostics(self.values, alone_on=(ODOMETRY, REFERENCE, TORQUES))
         self.start_life()
 
     def summary(self) -> str:
@@ -103,11 +114,11 @@ class UkTorqueController(ManagedNode):
         self.controller = build_controller(self.parameters, self.pressure)
         self.controller.enable(False)
         return [
-            self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT),
+            self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT),
             self.subscription(
-                MultiDOFJointTrajectory, "reference", self.on_reference, RELIABLE, raw=True
+                MultiDOFJointTrajectory, REFERENCE, self.on_reference, RELIABLE, raw=True
             ),
-            self.subscription(FluidPressure, "suction_pressure", self.on_pressure, BEST_EFFORT),
+            self.subscription(FluidPressure, PRESSURE, self.on_pressure, BEST_EFFORT),
         ]
 
     def act(self, active: bool) -> None:
@@ -159,9 +170,9 @@ class UkTorqueController(ManagedNode):
             preview = reading_reference.preview(message, self.names.odom_frame)
             preview.check_heading()
         except ValueError as error:
-            self.say("reference", "refused", str(error))
+            self.say(REFERENCE, "refused", str(error))
             return
-        self.say("reference", "")
+        self.say(REFERENCE, "")
         self.tell(self.controller.on_reference(self.now(), preview))
 
     def on_pressure(self, message: FluidPressure) -> None:
@@ -169,9 +180,9 @@ class UkTorqueController(ManagedNode):
         try:
             pressure = reading.pressure(message)
         except ValueError as error:
-            self.say("suction_pressure", "refused", str(error))
+            self.say(PRESSURE, "refused", str(error))
             return
-        self.say("suction_pressure", "")
+        self.say(PRESSURE, "")
         if pressure != self.pressure:
             self.pressure = pressure
             self.retune()

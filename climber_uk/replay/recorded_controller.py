@@ -15,12 +15,11 @@ from climber_uk.bags.collecting import collect
 from climber_uk.bags.events import Event, changes
 from climber_uk.bags.joints import of_both, wheel_names
 from climber_uk.bags.restarts import restarts
-from climber_uk.bags.topics import DIAGNOSTICS, PARAMETERS, TORQUES, Topics
+from climber_uk.bags.topics import Topics
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array, Stamps
+from climber_uk.messages.topics import CLOCK, CONTROLLER, DIAGNOSTICS, PARAMETERS, TORQUES
 
-NODE = "uk_torque_controller"
-CLOCK = "/clock"
 TOLD = TORQUES, PARAMETERS, DIAGNOSTICS  # topics of what the controller told
 Modes = list[tuple[int, str]]  # each with the time of the node's clock from which on it was
 
@@ -70,7 +69,7 @@ class RecordedController:
             zip(torques.stamps.tolist(), torques.values, strict=True)
         )
         modes = [event for event in told if event.kind == "mode" and event.text]
-        modes = [event for event in modes if event.node == f"{namespace}/{NODE}"]
+        modes = [event for event in modes if event.node == f"{namespace}/{CONTROLLER}"]
         news = [(event.stamp or 0, event.text) for event in changes(modes)]
         self.modes: Modes = news
         self.settings = _settings(found.parameters, modes, arrivals)

@@ -11,15 +11,15 @@ from typing import Any
 
 from climber_uk.bags.bag import Bag
 from climber_uk.bags.publishing_order import read_published
-from climber_uk.bags.topics import ODOMETRY, PRESSURE, REFERENCE, TORQUES
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import Torques
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.names import Names
+from climber_uk.messages.topics import CLOCK, ODOMETRY, PRESSURE, REFERENCE, TORQUES
 from climber_uk.parameters.parameter_file import Values
-from climber_uk.replay.recorded_controller import CLOCK, Modes, RecordedController
+from climber_uk.replay.recorded_controller import Modes, RecordedController
 
 TOPICS = ODOMETRY, REFERENCE, PRESSURE, TORQUES  # of what the controller was told, and answered
 DEFAULTS = {

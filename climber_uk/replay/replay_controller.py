@@ -17,9 +17,9 @@ from matplotlib import pyplot as plt
 
 from climber_uk.bags.bag import open_bag
 from climber_uk.bags.publishing_order import are_known
-from climber_uk.bags.topics import DIAGNOSTICS, PARAMETERS
+from climber_uk.messages.topics import CLOCK, CONTROLLER, DIAGNOSTICS, PARAMETERS
 from climber_uk.parameters.parameter_file import read_argument, read_file
-from climber_uk.replay.recorded_controller import CLOCK, NODE, RecordedController
+from climber_uk.replay.recorded_controller import RecordedController
 from climber_uk.replay.replay import DEFAULTS, TOPICS, Replay
 from climber_uk.replay.torque_comparison import (
     WHEELS,
@@ -36,7 +36,7 @@ from climber_uk.system.command_line import Parser
 def replayed(options: argparse.Namespace) -> Comparison:
     """Replay a bag; raises `OSError` or `ValueError`, of one line, if that cannot be."""
     namespace = "/" + options.namespace.strip("/") if options.namespace.strip("/") else ""
-    file = read_file(options.params, f"{namespace}/{NODE}") if options.params else None
+    file = read_file(options.params, f"{namespace}/{CONTROLLER}") if options.params else None
     given = dict(read_argument(argument) for argument in options.parameter)
     for name in given:
         if name not in DEFAULTS:

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from climber_uk.bags.run_reader import NoRunError, RunReader
-from climber_uk.bags.topics import ODOMETRY, REFERENCE, TRUTH, Topics
+from climber_uk.bags.topics import Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
+from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
 from climber_uk.report.outputs import output, printable
 from climber_uk.system.command_line import Parser
 
