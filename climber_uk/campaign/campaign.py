@@ -22,23 +22,20 @@ from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, PARAMETERS, SEE
 from climber_uk.campaign.scenario import Node, Scenario
 from climber_uk.mechanics import Array
 from climber_uk.messages.topics import NODES, PLANT
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import given, load, nothing_for, read_sections, similar
 from climber_uk.simulation.options import SimulationOptions
 
 SEEDS = Uniform(0, 2**31)  # that a node takes, rounded down
 
 
-@dataclass(frozen=True)
+@parameters
 class Size:
     """How many runs of what length."""
 
     runs: int = parameter(10_000, "", "how many", at_least=1)
     seed: int = parameter(0, "", "of all that is random", at_least=0)
     duration: float = parameter(20.0, "s", "of each", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ constraints (8) is M Aᵀ b - Q. It splits uniquely into the wheels' lateral rea
 torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -24,12 +24,12 @@ from climber_uk.mechanics.quantities import (
     Torques,
     Wrench,
 )
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@parameters
 class ControlOptions:
     """How the torques are computed; see `ControlLaw`."""
 
@@ -42,9 +42,6 @@ class ControlOptions:
     max_torque_rate: float = parameter(
         0.0, "N m/s", "fastest change of a torque; 0: none too fast", at_least=0, runtime=True
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def lookahead(self, period: float) -> float:
         """From the begin of a torque's action of `period` [s] to the time it is computed for."""
@@ -90,7 +87,7 @@ class ControlLaw:
 
     climber: Climber
     constraints: ConstraintSet
-    options: ControlOptions
+    options: ControlOptions = field(default_factory=ControlOptions)
 
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
@@ -117,10 +114,11 @@ class ControlLaw:
 
     def force(self, demand: DesiredAcceleration, motion: Motion) -> tuple[Any, Any, Any]:
         """M Aᵀ b - Q in the climber's frame: forward [N], about z [N m] and to the left [N]."""
-        (v_1, turning, speed), (_, _, _, cosine, sine, v, omega) = demand, motion
+        v_1, turning, speed = demand
         mass, inertia, friction, weight = self.climber.inertial
-        drive = mass * v_1 + friction * tanh(speed / self.options.friction_speed) + weight * sine
-        return drive, inertia * turning, mass * v * omega + weight * cosine
+        friction = friction * tanh(speed / self.options.friction_speed)
+        drive = mass * v_1 + friction + weight * motion.sine
+        return drive, inertia * turning, self.climber.lateral_reaction(motion)
 
     def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -33,13 +32,13 @@ from climber_uk.messages.topics import (
     PLANT,
     REFERENCE_PATH,
 )
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import read_file
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
-from climber_uk.system.signals import ignore_end, on_end
+from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
 # One topic of each node that only the recorder subscribes, and does once it has found the node.
 FOUND = (REFERENCE_PATH, FORCE, JOINTS)
@@ -58,18 +57,11 @@ class Ended(RuntimeError):  # noqa: N818 - it is what happened
         self.name = name
 
 
-class Interrupted(Exception):  # noqa: N818 - as above
-    """A signal came."""
-
-
-@dataclass(frozen=True)
+@parameters
 class DemoOptions:
     """How long the demonstration takes."""
 
     duration: float = parameter(20.0, "s", "of the trajectory that is run", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Demo(ClimberNode):

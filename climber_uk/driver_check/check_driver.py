@@ -33,16 +33,12 @@ from climber_uk.parameters.parameter_files import paths
 from climber_uk.ros.running import in_a_line
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
-from climber_uk.system.signals import on_end
+from climber_uk.system.signals import Interrupted, on_end
 
 NODE = "check_driver"
 PATIENCE = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques
 CATCH_UP = 0.2  # [s] to hear what came while the first report was made, and is old
-
-
-class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
-    """A signal came."""
 
 
 @contextmanager

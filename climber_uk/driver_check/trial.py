@@ -1,7 +1,6 @@
 """A trial: one stage after the other, from odometry to odometry, within bounds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import State, along
 from climber_uk.messages import reading
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 RECENT = 20  # messages that tell whether it stands
 ORDER = True, False, False, True  # whether each pulse turns
@@ -26,7 +25,7 @@ TRIES = 20  # of stages in all, of which a busy machine spoils some
 BACK = 0.005, 0.02  # [m], [rad] from its start at which the next pulse leads back
 
 
-@dataclass(frozen=True)
+@parameters
 class Bounds:
     """How far a trial may go."""
 
@@ -38,9 +37,6 @@ class Bounds:
     watchdog_time: float = parameter(
         0.5, "s", "after which a torque must have ended if no other came", above=0
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Trial:

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sqrt, with_sign_of
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 MAX_MARGIN = 100.0  # margins are told within ± that: without a demand there would be no end
 
@@ -26,7 +26,7 @@ class Adhesion(Protocol):
         """Coulomb's friction f of what slides on the wall [N]."""
 
 
-@dataclass(frozen=True)
+@parameters
 class Suction:
     """P S, of which a seal carries (1 - k), and rubs; the pump fills a volume that leaks.
 
@@ -35,9 +35,6 @@ class Suction:
 
     pump_time: float = parameter(0.0, "s", "T_pump; 0: at once", at_least=0)
     leak_time: float = parameter(0.0, "s", "T_leak; 0: it does not leak", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def force(self, climber: Climber) -> float:
         """See `Adhesion`."""
@@ -61,7 +58,7 @@ class Suction:
         return final + (before - final) * exp(-rate * time)
 
 
-@dataclass(frozen=True)
+@parameters
 class Magnetic:
     """F₀ / (1 + gap/g₀)², as of a magnet whose flux crosses the gap twice; nothing slides."""
 
@@ -74,9 +71,6 @@ class Magnetic:
     gap_of_a_quarter: float = parameter(
         2e-3, "m", "g₀, which leaves a quarter of F₀", above=0, plausible=(1e-6, 0.1)
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def force(self, climber: Climber) -> float:
         """See `Adhesion`."""
@@ -116,7 +110,7 @@ def with_its_seal(climber: Climber, adhesion: str) -> Climber:
     return climber if adhesion == "suction" else replace(climber, seal_friction_coefficient=0.0)
 
 
-@dataclass(frozen=True)
+@parameters
 class Grip:
     """How a climber stands on its wall."""
 
@@ -143,9 +137,6 @@ class Grip:
         at_least=0,
         plausible=(0.01, 1),
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,7 +175,7 @@ class Attachment:
         return _margin(holding, climber.mass * abs(along_wall) * self.grip.centre_height)
 
 
-@dataclass(frozen=True)
+@parameters
 class Alarm:
     """Margins that are worth a word; see `Attachment`."""
 
@@ -192,9 +183,6 @@ class Alarm:
     error_margin: float = parameter(
         1.0, "", "below which they are errors", at_least=0, runtime=True
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def level(self, margin: float) -> int:
         """0 for ample, 1 for a warning, 2 for an error."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.elementary import exp
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
 class Friction(Protocol):
@@ -52,16 +52,13 @@ class Coulomb:
         return 0.0 * f
 
 
-@dataclass(frozen=True)
+@parameters
 class Viscous:
     """In proportion to the speed, as of a lubricated seal: it holds nothing."""
 
     speed: float = parameter(0.1, "m/s", "at which it rubs as much as Coulomb's law", above=0)
 
     bristles: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def stiction(self, f: Any) -> Any:
         """See `Friction`."""
@@ -76,7 +73,7 @@ class Viscous:
         return f / self.speed
 
 
-@dataclass(frozen=True)
+@parameters
 class Stribeck:
     """More at rest than in motion, and more again the faster it goes."""
 
@@ -85,9 +82,6 @@ class Stribeck:
     viscous: float = parameter(0.0, "s/m", "κ: f more per speed", at_least=0)
 
     bristles: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def stiction(self, f: Any) -> Any:
         """See `Friction`."""

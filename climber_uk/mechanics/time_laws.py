@@ -12,7 +12,7 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.shapes import Shape
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
 class TimeLaw(Protocol):
@@ -39,14 +39,11 @@ def _rate() -> float:
     return rate
 
 
-@dataclass(frozen=True)
+@parameters
 class ConstantRate:
     """s = rate · t: already moving at the start, and for ever."""
 
     rate: float = _rate()
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
@@ -62,7 +59,7 @@ class ConstantRate:
         return self.rate * time, self.rate + zero, zero, zero
 
 
-@dataclass(frozen=True)
+@parameters
 class RestToRest:
     """From rest up to `rate`, along, and back to rest, smooth to the jerk; once or repeatedly.
 
@@ -76,9 +73,6 @@ class RestToRest:
     laps: int = parameter(1, "", "rounds of a closed shape without a stop", at_least=1)
     runs: int = parameter(1, "", "runs from rest to rest; 0: without end", at_least=0)
     pause: float = parameter(1.0, "s", "rest between two runs", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""

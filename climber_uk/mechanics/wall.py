@@ -8,12 +8,11 @@ equations of motion changes. A new wall is one class and one entry.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY
 from climber_uk.mechanics.elementary import cos, sin
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
 class Wall(Protocol):
@@ -28,7 +27,7 @@ class Wall(Protocol):
         """g_n (...) [m/s²] into the wall, with what the way's curvature adds at ẏ = `y_speed`."""
 
 
-@dataclass(frozen=True)
+@parameters
 class Plane:
     """A flat wall; y points uphill unless it is tilted."""
 
@@ -37,9 +36,6 @@ class Plane:
     )
 
     flat: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
@@ -51,7 +47,7 @@ class Plane:
         return GRAVITY * cos(inclination * DEGREE) + 0.0 * y
 
 
-@dataclass(frozen=True)
+@parameters
 class Cylinder:
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
@@ -60,7 +56,6 @@ class Cylinder:
     flat: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        check(self)
         if self.radius == 0:
             raise ValueError("radius=0.0 must not be 0 [m]")
 

@@ -5,7 +5,6 @@ All is drawn in the wall's frame, at the pose that odometry tells: no /tf is nee
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from math import dist
 from typing import Any, TypeVar
@@ -20,7 +19,7 @@ from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
 from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, REFERENCE, TORQUES
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.running import BEST_EFFORT, PUBLISH_PERIOD, RELIABLE, ClimberNode, Throttle, run
 
 T = TypeVar("T")
@@ -36,7 +35,7 @@ ORANGE, BLUE = (1.0, 0.6, 0.1, 1.0), (0.2, 0.6, 1.0, 1.0)
 GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
+@parameters
 class MarkerOptions:
     """How large it is drawn."""
 
@@ -48,9 +47,6 @@ class MarkerOptions:
     force_scale: float = parameter(0.005, "m/N", "length of a force's arrow", above=0)
     way_spacing: float = parameter(0.05, "m", "between two points of the way", above=0)
     way_points: int = parameter(400, "", "of the way that are kept", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Markers(ClimberNode):

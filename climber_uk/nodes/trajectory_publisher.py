@@ -6,7 +6,7 @@ tells, the clock leads.
 """
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nav_msgs.msg import Odometry, Path
 from rclpy.subscription import Subscription
@@ -20,7 +20,7 @@ from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.mechanics.trajectory_parameters import KINDS, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
 from climber_uk.messages.topics import ODOMETRY, PLANNER, REFERENCE, REFERENCE_PATH, REFERENCE_TIME
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
 
 STANDSTILL = 0.2  # [s] of wall-clock time after which a clock that does not go on stands still
@@ -28,7 +28,7 @@ ODOMETRY_AGE = 1.0  # [s] of an odometry that is too old to start at
 CLOCK_STEP = SECOND // 5  # [ns] back, from which time has started anew
 
 
-@dataclass(frozen=True)
+@parameters
 class PublisherOptions:
     """How it is told."""
 
@@ -40,7 +40,6 @@ class PublisherOptions:
     stop_time: float = parameter(1.0, "s", "from the full rate to rest at ~/stop", above=0)
 
     def __post_init__(self) -> None:
-        check(self)
         if self.preview < 2 * self.publish_period:
             raise ValueError(
                 f"preview={self.preview} must be >= 2 publish_period={self.publish_period} [s]"

@@ -4,7 +4,6 @@ Inactive, it answers with its safe output: a climber that hangs on a wall must b
 """
 
 import math
-from dataclasses import dataclass
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
@@ -35,7 +34,7 @@ from climber_uk.messages.topics import (
     TORQUES,
     private,
 )
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.managed import ManagedNode
 from climber_uk.ros.margins import Margins
 from climber_uk.ros.running import (
@@ -51,7 +50,7 @@ from climber_uk.ros.running import (
 LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points: to read one takes a quarter of a second
 
 
-@dataclass(frozen=True)
+@parameters
 class NodeOptions:
     """What is published."""
 
@@ -59,9 +58,6 @@ class NodeOptions:
     effort_order: str = parameter(
         "left_right", "", "order of the torques in them", choices=("left_right", "right_left")
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class UkTorqueController(ManagedNode):

@@ -4,9 +4,11 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
+
+T = TypeVar("T")
 
 
 def parameter(
@@ -28,7 +30,7 @@ def parameter(
     `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
     range `plausible` is doubted, not refused; a name that it had `formerly` is still taken;
     `runtime` marks what a running node may change, `is_path` the name of a file, which in a
-    parameter file is relative to that. Pass the dataclass's instance to `check` in `__post_init__`.
+    parameter file is relative to that. The class is made by `parameters`.
     """
     return dataclasses.field(
         default=default,
@@ -45,6 +47,20 @@ def parameter(
             "is_path": is_path,
         },
     )
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def parameters(cls: type[T]) -> type[T]:
+    """Frozen dataclass that checks its `parameter` fields, before its own `__post_init__`."""
+    and_then = vars(cls).get("__post_init__")
+
+    def check_it(self: Any) -> None:
+        check(self)
+        if and_then:
+            and_then(self)
+
+    cls.__post_init__ = check_it  # type: ignore[attr-defined]
+    return dataclasses.dataclass(frozen=True)(cls)
 
 
 def check(instance: Any) -> None:

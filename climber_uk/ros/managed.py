@@ -1,27 +1,22 @@
 """A managed node: configured and activated by itself, or by whoever manages the others."""
 
-from dataclasses import dataclass
-
 from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.subscription import Subscription
 from std_srvs.srv import SetBool
 
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.running import ClimberNode
 
 ACTIVE, INACTIVE = "active", "inactive"
 
 
-@dataclass(frozen=True)
+@parameters
 class Life:
     """How a managed node starts."""
 
     autostart: bool = parameter(True, "", "become active at the start, without a manager")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class ManagedNode(LifecycleNodeMixin, ClimberNode):

@@ -1,14 +1,12 @@
 """How a simulation runs: its time, its start, and what of it is worth a word."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from climber_uk.mechanics.quantities import State
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
-@dataclass(frozen=True)
+@parameters
 class SimulationOptions:
     """How time passes, and where the climber starts."""
 
@@ -41,7 +39,6 @@ class SimulationOptions:
     initial_yaw_rate: float = parameter(0.0, "rad/s", "yaw rate at the start")
 
     def __post_init__(self) -> None:
-        check(self)
         if abs(self.steps * self.integration_step - self.control_period) > 1e-9:
             raise ValueError(
                 f"control_period={self.control_period} must be a multiple of "

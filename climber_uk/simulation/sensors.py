@@ -3,7 +3,6 @@
 import math
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,10 +12,10 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import rotated
 from climber_uk.mechanics.quantities import Motion, State
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
-@dataclass(frozen=True)
+@parameters
 class Sensors:
     """What is between the truth and the odometry; all of it off."""
 
@@ -51,9 +50,6 @@ class Sensors:
         plausible=(0.0, 1),
     )
     seed: int = parameter(0, "", "of all noise", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def delay_in(self, period: float) -> int:
         """Odometry's delay in periods of `period` [s]; `ValueError` if it is no multiple."""

@@ -1,6 +1,6 @@
 """A climber with its pump, motors and sensors, from one odometry to the next."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from climber_uk.mechanics.contact import LOCOMOTION
 from climber_uk.mechanics.friction import FRICTION
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import WALLS
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.simulation.inputs import NO_PUSH
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
@@ -25,7 +25,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
+@parameters
 class Physics:
     """Which of everything the plant is made of, and what happens to it."""
 
@@ -38,9 +38,6 @@ class Physics:
         0.0, "s", "since the start, at which the pump's pressure drops; 0: never", at_least=0
     )
     pressure_loss_level: float = parameter(0.0, "Pa", "to which it drops then", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Push(NamedTuple):

@@ -7,6 +7,10 @@ from typing import Any
 END = signal.SIGINT, signal.SIGTERM, signal.SIGHUP  # Ctrl-C, kill, and a terminal that is closed
 
 
+class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
+    """A signal came."""
+
+
 def on_end(handler: Callable[..., Any]) -> None:
     """Call `handler` for every signal that asks this process to end, but for one nohup ignores."""
     for number in END:
