@@ -17,7 +17,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import rotated
 from climber_uk.mechanics.quantities import Motion, State
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 Measure = Callable[[State, State, Array], State]
@@ -57,7 +57,7 @@ SOURCES = Variants[type[OdometrySource]]({"truth": Truth, "wheels": Wheels}, "od
 MEASURING = "odometry_source", "odometry_delay", "encoder_resolution", "seed"
 
 
-@dataclass(frozen=True)
+@parameters
 class Sensors:
     """Errors of the odometry; without any it is the true state."""
 
@@ -90,9 +90,6 @@ class Sensors:
         plausible=(0.0, 1),
     )
     seed: int = parameter(0, "", "of the noise: the same seed gives the same noise", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def delay_in(self, period: float) -> int:
         """Odometry's delay in periods of `period` [s]; `ValueError` if it is no multiple."""
