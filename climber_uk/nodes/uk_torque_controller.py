@@ -103,7 +103,7 @@ class UkTorqueController(ManagedNode):
         climber, choice = self.parameters.read(Climber), self.parameters.read(ConstraintChoice)
         law, adhesion = f"constraints {choice.constraints}", choice.adhesion
         law = law if choice.controller == UDWADIA_KALABA else f"controller {choice.controller}"
-        pull = self.hold.adhesion.force(climber)
+        pull = self.attachment.adhesion.force(climber)
         return (
             f"{climber.mass:g} kg, at most {climber.max_wheel_torque:g} N m a wheel, "
             f"{adhesion} of {pull:.4g} N, {law}, "
