@@ -103,17 +103,17 @@ class Sensors:
 
     @cached_property
     def is_ideal(self) -> bool:
-        """Whether they tell what is measured as it is: nothing that `told` adds is set."""
+        """Whether they tell what is measured as it is: nothing that `corrupted` adds is set."""
         return not any(np.any(getattr(self, field.name)) for field in self.errors())
 
     @classmethod
     def errors(cls) -> "list[Field[Any]]":
-        """Fields of what `told` adds."""
+        """Fields of what `corrupted` adds."""
         return [field for field in fields(cls) if field.name not in MEASURING]
 
     @property
     def ideal(self) -> "Sensors":
-        """The same without what `told` adds."""
+        """The same without what `corrupted` adds."""
         return Sensors(**{name: getattr(self, name) for name in MEASURING})
 
     def corrupted(self, motion: Motion, noise: Iterable[Any]) -> Motion:
