@@ -181,7 +181,7 @@ def ways(constraints: str, options: ControlOptions) -> dict[str, ControlLaw]:
     return {
         OURS: ControlLaw(Climber(), gains, options),
         "generic UK, numpy": ControlLaw(Climber(), gains, replace(options, solver="generic")),
-        "the paper's formula": WithMatrices(Climber(), gains, options, as_the_paper),
+        "the paper's formula": WithMatrices(Climber(), gains, options),
     }
 
 

@@ -37,7 +37,7 @@ def laws(constraints: str, law: ControlOptions) -> dict[str, ControlLaw]:
     climber, gains = Climber(), CONSTRAINTS[constraints]()
     return {
         **ways(constraints, law),
-        "Schur complement, numpy": WithMatrices(climber, gains, law, by_schur),
+        "Schur complement, numpy": WithMatrices(climber, gains, law, solve=by_schur),
         "MuJoCo, inverse dynamics": WithMuJoCo(climber, gains, law),
         "Pinocchio, inverse dynamics": WithPinocchio(climber, gains, law),
         "Pinocchio, M and nonlinear effects": WithPinocchioMatrices(climber, gains, law),
