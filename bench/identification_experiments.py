@@ -5,13 +5,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from climber_uk.closed_loop.simulate import Controlling, Link, Run, simulate
-from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Answer, Controller
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.model import Observer
-from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
 from climber_uk.identification.estimation import CUT, identify
 from climber_uk.identification.identified import NAMES, Choice, Identified
 from climber_uk.identification.integral_equations import Cut
@@ -53,9 +50,9 @@ class Scenario:
 
     def run(self, believed: Climber, true: Climber, link: Link, seed: int = 0) -> tuple[Run, "Ear"]:
         """Run of a controller that believes in a climber, and what it was told."""
-        law = ControlLaw(believed, self.guidance, ControlOptions())
+        law = ControlLaw(believed, self.guidance)
         timing = Timing(control_period=self.period)
-        ear = Ear(Controller(SampledController(law, Observer(), timing, Pacing()), Safety()))
+        ear = Ear(Controller(SampledController(law, timing=timing)))
         link = replace(link, step=self.period / 2, period=self.period)
         loop = self.trajectory, self.start, self.duration, ear, true, link
         return simulate(*loop, seed=seed, plant_of=self.plant), ear

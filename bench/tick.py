@@ -19,9 +19,7 @@ from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.constraint_set import rows
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
-from climber_uk.control.model import Observer
-from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview
@@ -183,7 +181,7 @@ def ways(constraints: str, options: ControlOptions) -> dict[str, ControlLaw]:
     return {
         OURS: ControlLaw(Climber(), gains, options),
         "generic UK, numpy": ControlLaw(Climber(), gains, replace(options, solver="generic")),
-        "the paper's formula": WithMatrices(Climber(), gains, options, as_the_paper),
+        "the paper's formula": WithMatrices(Climber(), gains, options),
     }
 
 
@@ -216,7 +214,7 @@ def main() -> None:
     limit = None if options.no_c else Limit()
     for constraints in CONSTRAINTS:
         trackers = {
-            name: SampledController(law, Observer(), Timing(), Pacing())
+            name: SampledController(law)
             for name, law in ways(constraints, ControlOptions()).items()
         }
         whole = {name: ticks(sampled_controller) for name, sampled_controller in trackers.items()}

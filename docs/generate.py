@@ -13,6 +13,7 @@ import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from climber_uk.driver_check.node import DriverNode
+from climber_uk.messages import topics
 from climber_uk.nodes.markers import Markers
 from climber_uk.nodes.plant_simulator import PlantSimulator
 from climber_uk.nodes.trajectory_publisher import TrajectoryPublisher
@@ -27,32 +28,45 @@ NODES: list[Callable[[], ClimberNode]] = [
     Markers,
     DriverNode,
 ]
-EVERY_NODE = ("/rosout", "/parameter_events", "_type_description", "_parameters", "parameter_types")
+EVERY_NODE = (
+    topics.LOG,
+    "/parameter_events",
+    "_type_description",
+    "_parameters",
+    "parameter_types",
+)
 
 CONTENTS = {
-    "odom": "pose in `odom`, twist in `base_link`: forward, to the left (0), about z",
-    "reference_time": "where on the reference the climber is (`time_ref`) at an odometry's stamp; "
-    "`source`: the controller's mode",
-    "reference": "the next second: per point pose, velocity and acceleration, in `odom`; the "
+    topics.ODOMETRY: "pose in `odom`, twist in `base_link`: forward, to the left (0), about z",
+    topics.REFERENCE_TIME: "where on the reference the climber is (`time_ref`) at an odometry's "
+    "stamp; `source`: the controller's mode",
+    topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
-    "reference_path": "the whole path, for display",
-    "wheel_torques": "`effort` [N m] by joint name; the stamp is that of the odometry it answers",
+    topics.REFERENCE_PATH: "the whole path, for display",
+    topics.TORQUES: "`effort` [N m] by joint name; the stamp is that of the odometry it answers",
     "effort_controller/commands": "the torques again, in the order of `effort_order`",
-    "suction_pressure": "pressure difference [Pa]; the plant tells it at 20 Hz",
-    "joint_states": "angle [rad], rate [rad/s] and torque [N m] of the wheels",
-    "ground_truth": "the simulated climber without its sensors' errors",
-    "push": "force [N] and moment [N m] on the simulated climber, in `odom` or `base_link`",
+    topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
+    topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels",
+    topics.TRUTH: "the simulated climber without its sensors' errors",
+    topics.PUSH: "force [N] and moment [N m] on the simulated climber, in `odom` or `base_link`",
     "markers": "climber, reference, way, torques and force for RViz and Foxglove, in `odom`; 20 Hz",
-    "uk_torque_controller/constraint_force": "what the controller publishes",
-    "uk_torque_controller/margins": "what the controller publishes",
-    "/clock": "simulated time, if `simulated_time`; 100 Hz of it, or each control period if longer",
+    topics.FORCE: "what the controller publishes",
+    topics.MARGINS[1]: "what the controller publishes",
+    topics.CLOCK: "simulated time, if `simulated_time`; 100 Hz of it, or each control period if "
+    "longer",
     "/tf": "the true pose, where tf2_msgs is installed",
-    "/diagnostics": "every second and when something changes: troubles and values",
+    topics.DIAGNOSTICS: "every second and when something changes: troubles and values",
     "~/tracking_error": "along-track [m], cross-track [m], heading [rad]",
-    "~/constraint_force": "Udwadia-Kalaba: drive [N], lateral [N], about z [N m], in `base_link`",
+    topics.private(
+        topics.FORCE
+    ): "Udwadia-Kalaba: drive [N], lateral [N], about z [N m], in `base_link`",
     "~/disturbance": "force [N], moment [N m] that the model did not expect, in `base_link`; 20 Hz",
-    "~/margins": "lowest slip, tip margin (below 1 it slips, tips), load on the wheels [N]; 20 Hz",
-    "~/parameters": "all parameters as they are, at the start and whenever one changes",
+    topics.private(
+        topics.MARGINS[1]
+    ): "lowest slip, tip margin (below 1 it slips, tips), load on the wheels [N]; 20 Hz",
+    topics.private(
+        topics.PARAMETERS
+    ): "all parameters as they are, at the start and whenever one changes",
     "~/transition_event": "changes of the managed node's state",
     "~/start": "start, or start again, at the next odometry",
     "~/stop": "come to rest on the path",

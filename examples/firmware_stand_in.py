@@ -15,7 +15,6 @@ import threading
 import time
 import tty
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,7 @@ from rosgraph_msgs.msg import Clock
 
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros import plant_parts
 from climber_uk.ros.plant_time import ASK_AGAIN, TICK
 from climber_uk.ros.running import ClimberNode, Throttle
@@ -40,7 +39,7 @@ CUT, LIMITED = 1, 2  # flags
 SIGNS = np.array(MOUNTED)
 
 
-@dataclass(frozen=True)
+@parameters
 class Board:
     """Motors, gears and encoders."""
 
@@ -50,9 +49,6 @@ class Board:
     max_current: float = parameter(3.2, "A", "limit of each motor's current", above=0)
     watchdog_time: float = parameter(0.1, "s", "without a command that cuts currents", above=0)
     truth: str = parameter("", "", "CSV file for the true motion and torques; '': none")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class FirmwareStandIn(ClimberNode):

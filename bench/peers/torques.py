@@ -15,9 +15,7 @@ from tick import PERIOD, TICKS, WARM, WithMatrices, bare, ticks, ways, with_know
 
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
-from climber_uk.control.model import Observer
-from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State, Torques, Wrench
@@ -39,7 +37,7 @@ def laws(constraints: str, law: ControlOptions) -> dict[str, ControlLaw]:
     climber, gains = Climber(), CONSTRAINTS[constraints]()
     return {
         **ways(constraints, law),
-        "Schur complement, numpy": WithMatrices(climber, gains, law, by_schur),
+        "Schur complement, numpy": WithMatrices(climber, gains, law, solve=by_schur),
         "MuJoCo, inverse dynamics": WithMuJoCo(climber, gains, law),
         "Pinocchio, inverse dynamics": WithPinocchio(climber, gains, law),
         "Pinocchio, M and nonlinear effects": WithPinocchioMatrices(climber, gains, law),
@@ -89,7 +87,7 @@ def compare(rounds: int) -> None:
         }
         table(f"one torque, {constraints}", in_turns(alone, rounds, WARM), "µs", per_tick)
         trackers = {
-            name: SampledController(law, Observer(), Timing(), Pacing())
+            name: SampledController(law)
             for name, law in laws(constraints, ControlOptions()).items()
         }
         whole = {

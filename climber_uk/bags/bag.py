@@ -59,10 +59,15 @@ class Bag:
         is_split = all(end <= start for (_, end), (start, _) in pairwise(ends))
         yield from chain(*parts) if is_split else merge(*parts, key=lambda message: message[1])
 
-    def raw_messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, bytes]]:
-        """Yield connection, log time [ns] and serialised message in the order of the log times."""
-        for connection, log_time, _, data in self.recorded(topics):
-            yield connection, log_time, data
+    def raw_messages(
+        self, topics: Collection[str], by_publishing: bool = False
+    ) -> Iterator[tuple[Connection, int, bytes]]:
+        """Yield connection, log time [ns] and serialised message in the order of the log times.
+
+        `by_publishing` gives the time of publishing in place of the log time.
+        """
+        for connection, log_time, publish_time, data in self.recorded(topics):
+            yield connection, publish_time if by_publishing else log_time, data
 
     def messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, int, Any]]:
         """Yield connection, log time, publishing time (0: not told) [ns] and message."""

@@ -57,8 +57,13 @@ class Batch:
         return seconds * SECOND + self.rows[f"{path}.nanosec"]
 
 
-def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
-    """Yield topic and batch; the messages of a topic are nearly in the order of their log times."""
+def read_batches(
+    bag: Bag, topics: Collection[str], by_publishing: bool = False
+) -> Iterator[tuple[str, Batch]]:
+    """Yield topic and batch; the messages of a topic are nearly in the order of their log times.
+
+    `by_publishing` gives the time of publishing in place of the log time.
+    """
     waiting: dict[Any, list[tuple[int, bytes]]] = defaultdict(list)
     sizes: dict[Any, int] = defaultdict(int)
     connections: dict[Any, Any] = {}
@@ -74,7 +79,7 @@ def read_batches(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Batch
         for batch in batches:
             yield topic, batch
 
-    for connection, log_time, data in bag.raw_messages(topics):
+    for connection, log_time, data in bag.raw_messages(topics, by_publishing):
         key = connection.topic, connection.msgtype
         connections[key] = connection
         waiting[key].append((log_time, data))

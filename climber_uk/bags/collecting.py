@@ -2,15 +2,15 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Collection, Iterator, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from climber_uk.bags import events, topics
-from climber_uk.bags.bag import Bag, open_bag
+from climber_uk.bags import events
+from climber_uk.bags.bag import Bag
 from climber_uk.bags.batches import Batch, read_batches
 from climber_uk.bags.events import Event
 from climber_uk.bags.joints import Joints
@@ -24,8 +24,9 @@ from climber_uk.bags.restarts import (
     windows,
 )
 from climber_uk.bags.taking import STRAY, TAKEN
-from climber_uk.bags.topics import Topics
+from climber_uk.bags.topics import KNOWN, Topics
 from climber_uk.mechanics import Array, Stamps
+from climber_uk.messages import topics
 
 PATIENCE = 2.0  # [s] after which progress is told
 
@@ -56,6 +57,11 @@ class Collected:
             if frame != (first := self.frames.setdefault(name, frame)):
                 raise ValueError(f"frame_id={frame!r}, others have {first!r}")
             self.parts[name].append((batch.stamps, batch.log_times, *TAKEN[name](batch)))
+
+    @property
+    def first_parameters(self) -> dict[str, Any]:
+        """Those that the controller told first; none if it did not."""
+        return min(self.parameters, key=itemgetter(0), default=(0, {}))[1]
 
     def runs(self) -> list["Collected"]:
         """What belongs to each run: they differ where the odometry's time starts again."""
@@ -114,25 +120,35 @@ class Collected:
 
 
 def collect(
-    bag: Bag, names: Topics, namespaces: Sequence[str]
+    bag: Bag,
+    names: Topics,
+    namespaces: Sequence[str],
+    of: Collection[str] = KNOWN,
+    by_publishing: bool = False,
 ) -> tuple[dict[str, Collected], list[Event]]:
-    """Return what a bag tells of the climbers in some namespaces, and all events."""
+    """Return what a bag tells of the climbers in some namespaces, and all events.
+
+    Of the topics with the names `of` only; `by_publishing` gives arrivals as the times of
+    publishing, not of recording.
+    """
     collected = {namespace: Collected() for namespace in namespaces}
     takers = {
         topic: (name, found)
         for namespace, found in collected.items()
         for topic, name in names.of(namespace)
+        if name in of
     }
     texts = {
-        names.full(topics.DIAGNOSTICS, ""): events.statuses,
-        names.full(topics.LOG, ""): events.warnings,
+        names.full(name, ""): tell
+        for name, tell in ((topics.DIAGNOSTICS, events.statuses), (topics.LOG, events.warnings))
+        if name in of
     }
     wanted = [topic for topic in bag.types if topic in takers or topic in texts]
     told: list[Event] = []
     with tqdm(
         total=bag.count(wanted), unit=" messages", delay=PATIENCE, leave=False, disable=None
     ) as progress:
-        for topic, batch in read_batches(bag, wanted):
+        for topic, batch in read_batches(bag, wanted, by_publishing):
             progress.update(len(batch))
             try:
                 if topic in texts:
@@ -145,20 +161,6 @@ def collect(
     for found in collected.values():
         found.leave_out_strays()
     return collected, told
-
-
-def check_one_run(path: Path, names: Topics, namespace: str) -> list[str]:
-    """Return what is to be said of a bag; raises `ValueError` if a climber has runs, not one."""
-    with open_bag(path) as bag:
-        found = collect(bag, names, [namespace])[0][namespace]
-        topic = names.full(topics.ODOMETRY, namespace)
-        if found.parts[topics.ODOMETRY]:
-            if (count := len(found.runs())) > 1:
-                said = f"time starts again, there are {count} runs: want one"
-                raise ValueError(f"{path}: {topic}: {said}")
-            if found.disagreement:
-                raise ValueError(f"{path}: no run on {topic}: {found.disagreement}")
-        return bag.losses
 
 
 def _parameters(batch: Batch) -> Iterator[tuple[int, dict[str, Any]]]:

@@ -28,6 +28,7 @@ class Joints:
     names: tuple[str, ...]
     rates: Array  # (n, k) [rad/s]
     torques: Array  # (n, k) [N m]
+    angles: Array  # (n, k) [rad]
 
     @classmethod
     def of(cls, batch: Batch) -> "Joints":
@@ -36,7 +37,10 @@ class Joints:
         if len(set(names)) < len(names):
             raise ValueError(f"{', '.join(names)}: a name twice")
         rates, torques = (_each(batch, field, len(names)) for field in ("velocity", "effort"))
-        return cls(batch.stamps, batch.log_times, names, rates, torques)
+        angles = batch["position"]
+        if angles.shape != rates.shape:
+            angles = _untold(batch, len(names))
+        return cls(batch.stamps, batch.log_times, names, rates, torques, angles)
 
     def where(self, chosen: Any) -> "Joints":
         """Those that a mask chooses."""
@@ -44,7 +48,7 @@ class Joints:
         return replace(self, **arrays)
 
     def part(self, quantity: str, joints: Sequence[str]) -> FilePart:
-        """The `rates` or `torques` of some of the joints, in their order."""
+        """The `rates`, `torques` or `angles` of some of the joints, in their order."""
         columns = [self.names.index(joint) for joint in joints]
         values = getattr(self, quantity)[:, columns]
         return self.stamps, self.arrivals, values, np.where(are_sound(values).all(axis=1), 0, 1)
@@ -53,10 +57,14 @@ class Joints:
 def _each(batch: Batch, field: str, count: int) -> Array:
     values = batch[field]
     if values.shape[1] == 0:
-        return np.full((len(batch), count), np.nan)
+        return _untold(batch, count)
     if values.shape[1] != count:
         raise ValueError(f"{field} has {values.shape[1]} values for {count} names")
     return values
+
+
+def _untold(batch: Batch, count: int) -> Array:
+    return np.broadcast_to(np.nan, (len(batch), count))
 
 
 def wheel_names(joints: Iterable[str], parameters: Mapping[str, Any]) -> tuple[str, str]:
@@ -74,6 +82,22 @@ def wheel_names(joints: Iterable[str], parameters: Mapping[str, Any]) -> tuple[s
             f"{' and '.join(keys)} in a --params file say what they are called"
         )
     return wanted[0], wanted[1]
+
+
+def torques_and_angles(parts: Sequence[Joints], wheels: tuple[str, str]) -> TimeSeries:
+    """Torques right, left [N m] and angles right, left [rad] (n, 4); nan where not told."""
+    told = [part for part in parts if set(wheels) <= set(part.names)]
+    return TimeSeries.of(
+        [
+            (
+                part.stamps,
+                part.arrivals,
+                np.hstack([part.part(quantity, wheels)[2] for quantity in ("torques", "angles")]),
+                np.zeros(len(part.stamps), np.intp),
+            )
+            for part in told
+        ]
+    )
 
 
 def of_both(parts: Sequence[Joints], wheels: tuple[str, str]) -> TimeSeries:

@@ -8,30 +8,24 @@ it 0, it is the log time.
 
 from collections.abc import Collection, Iterator, Mapping
 from heapq import merge
-from pathlib import Path
 from typing import Any
 
-from climber_uk.bags.bag import Bag, open_bag
+from climber_uk.bags.bag import Bag
 
 
-def read_published(path: Path, topics: Mapping[str, str]) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, publishing time [ns] and message; raises as `open_bag` does.
+def read_published(
+    bag: Bag, topics: Mapping[str, str], known: bool
+) -> Iterator[tuple[str, int, Any]]:
+    """Yield topic, publishing time [ns], the log time if those are not `known`, and message.
 
     Messages are those of some topics that have the type which `topics` tells.
     """
-    with open_bag(path) as bag:
-        known = _are_known(bag, topics)
-        streams = [_published(bag, topic, of, known) for topic, of in topics.items()]
-        yield from merge(*streams, key=lambda message: message[1])
+    streams = [_published(bag, topic, of, known) for topic, of in topics.items()]
+    yield from merge(*streams, key=lambda message: message[1])
 
 
-def are_known(path: Path, topics: Collection[str]) -> bool:
+def are_known(bag: Bag, topics: Collection[str]) -> bool:
     """Whether a bag tells when the messages of some topics were published."""
-    with open_bag(path) as bag:
-        return _are_known(bag, topics)
-
-
-def _are_known(bag: Bag, topics: Collection[str]) -> bool:
     return all(publish_time for _, _, publish_time, _ in bag.recorded(topics))
 
 

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from climber_uk.bags import topics
 from climber_uk.bags.bag import open_bag
 from climber_uk.bags.collecting import collect
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.run_reader import NoRunError, RunReader, Told
 from climber_uk.bags.topics import Topics
+from climber_uk.messages import topics
 
 
 def read_run(bag: str | Path, namespace: str = "") -> RecordedRun:

@@ -10,6 +10,7 @@ from climber_uk.bags.batches import Batch
 from climber_uk.bags.taking import heading
 from climber_uk.mechanics import Array, Stamps
 from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.preview import quintic
 
 AT_ONCE = 65536  # times
 
@@ -94,9 +95,5 @@ def _interpolated(times: Stamps, motion: Array, stamps: Stamps) -> Array:
     )
     way = p_end - p
     way[:, 2] = wrapped(way[:, 2])
-    # what is left to reach at the end by u³, u⁴ and u⁵
-    p_left, v_left, a_left = way - v - a / 2, v_end - v - a, a_end - a
-    c_3 = 10 * p_left - 4 * v_left + a_left / 2
-    c_4 = -15 * p_left + 7 * v_left - a_left
-    c_5 = 6 * p_left - 3 * v_left + a_left / 2
+    c_3, c_4, c_5 = quintic(way, v, a, v_end, a_end)
     return p + u * (v + u * (a / 2 + u * (c_3 + u * (c_4 + u * c_5))))

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from climber_uk.bags import topics
 from climber_uk.bags.body_rates import body_rates
 from climber_uk.bags.events import Event
 from climber_uk.bags.recorded import TimeSeries
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.reference import Reference, tracking_error
+from climber_uk.messages import topics
 from climber_uk.parameters.parameter_file import Values
 
 REACH = 0.1  # [s] to either side, over which a speed is taken from poses

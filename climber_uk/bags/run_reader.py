@@ -3,22 +3,24 @@
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from operator import itemgetter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from climber_uk.bags import events, topics
-from climber_uk.bags.bag import Bag
-from climber_uk.bags.collecting import Collected
+from climber_uk.bags import events
+from climber_uk.bags.bag import Bag, open_bag
+from climber_uk.bags.collecting import Collected, collect
 from climber_uk.bags.events import Event
 from climber_uk.bags.joints import Joints, of_both, of_one, wheel_names
 from climber_uk.bags.recorded import TimeSeries
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.taking import TAKEN
-from climber_uk.bags.topics import Topics
+from climber_uk.bags.topics import KNOWN, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
+from climber_uk.messages import topics
 from climber_uk.parameters.parameter_file import Values
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
@@ -38,11 +40,20 @@ class RunReader:
     bag: Bag
     names: Topics
     namespace: str
-    parameters: Callable[[str], Told] | None  # of a namespace, in place of those in the bag
+    parameters: Callable[[str], Told] | None = None  # of a namespace, in place of those in the bag
 
     def topic(self, name: str) -> str:
         """Full name of one of the climber's topics."""
         return self.names.full(name, self.namespace)
+
+    @classmethod
+    def read(
+        cls, path: Path, names: Topics, namespace: str, of: Collection[str] = KNOWN
+    ) -> tuple["RunReader", Collected]:
+        """Read what a bag tells on the topics `of` of one climber; raises as `open_bag` does."""
+        with open_bag(path) as bag:
+            reader = cls(bag, names, namespace)
+            return reader, collect(bag, names, [namespace], of)[0][namespace]
 
     def runs(self, found: Collected, told: Collection[Event]) -> list[RecordedRun]:
         """All runs; raises `NoRunError`."""
@@ -73,6 +84,17 @@ class RunReader:
             topic = self.topic(topics.ODOMETRY)
             self.bag.lose(f"{topic}: time starts again, there are {len(parts)} runs")
         return parts
+
+    def check_one_run(self, found: Collected) -> None:
+        """Raise `ValueError` if there are several runs, one after the other or at once."""
+        if not found.parts[topics.ODOMETRY]:
+            return
+        path, topic, count = self.bag.path, self.topic(topics.ODOMETRY), len(found.runs())
+        if count > 1:
+            said = f"time starts again, there are {count} runs: want one"
+            raise ValueError(f"{path}: {topic}: {said}")
+        if found.disagreement:
+            raise ValueError(f"{path}: no run on {topic}: {found.disagreement}")
 
     def check_truth(self, found: Collected) -> None:
         """Do not use poses of which it is not known where they are to the odometry's."""

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.bags.batches import Batch
-from climber_uk.bags.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, REFERENCE_TIME, TRUTH
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE
+from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE, turn_about_z
+from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, REFERENCE_TIME, TRUTH
 
 Faults = NDArray[np.intp]  # (n,) places in FAULTS
 FAULTS = (
@@ -28,11 +28,9 @@ def heading(batch: Batch, path: str) -> tuple[Array, Faults]:
     """Headings (n,) [rad] of orientations at `path`, and what is wrong with them."""
     x, y, z, w = batch.columns(*(f"{path}.{axis}" for axis in "xyzw")).T
     with np.errstate(over="ignore", invalid="ignore"):
-        tilted = np.hypot(x, y)
-        norm = np.hypot(tilted, np.hypot(z, w))
+        turn, _, _, is_unit, is_planar = turn_about_z(x, y, z, w)
         is_finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z) & np.isfinite(w)
-        wrong = ~is_finite, ~(np.abs(norm - 1) <= NORM_TOLERANCE), ~(tilted < MOST_TILT * norm)
-        return np.arctan2(2 * w * z, w * w - z * z), np.select(wrong, [3, 4, 5])
+        return turn, np.select([~is_finite, ~is_unit, ~is_planar], [3, 4, 5])
 
 
 def are_sound(values: Array) -> NDArray[np.bool]:

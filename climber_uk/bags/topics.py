@@ -3,18 +3,26 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
-REFERENCE_TIME = "reference_time"  # where on the reference the climber was
-TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
-JOINTS, PRESSURE, PARAMETERS = "joint_states", "suction_pressure", "uk_torque_controller/parameters"
-FORCE = "uk_torque_controller/constraint_force"
-MARGINS = "plant_simulator/margins", "uk_torque_controller/margins"  # the plant knows better
-DIAGNOSTICS, LOG = "/diagnostics", "/rosout"
+from climber_uk.messages.topics import (
+    CLOCK,
+    DIAGNOSTICS,
+    FORCE,
+    JOINTS,
+    LOG,
+    MARGINS,
+    ODOMETRY,
+    PARAMETERS,
+    PRESSURE,
+    REFERENCE,
+    REFERENCE_TIME,
+    TORQUES,
+    TRUTH,
+)
+
 NAMES = (
     *(ODOMETRY, TRUTH, REFERENCE, REFERENCE_TIME, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE),
     *MARGINS,
 )
-CLOCK = "/clock"
 TYPES = {
     **dict.fromkeys((ODOMETRY, TRUTH), "nav_msgs/msg/Odometry"),
     **dict.fromkeys((TORQUES, JOINTS), "sensor_msgs/msg/JointState"),

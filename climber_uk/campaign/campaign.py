@@ -12,26 +12,24 @@ import yaml
 from climber_uk.campaign import names
 from climber_uk.campaign.distributions import Distribution, Uniform, distribution, drawn, extremes
 from climber_uk.campaign.limits import Limit
-from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, NODES, PARAMETERS, PLANT, SEED
+from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, PARAMETERS, SEED
 from climber_uk.campaign.scenario import Node, Scenario
 from climber_uk.mechanics import Array
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.messages.topics import NODES, PLANT
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import given, load, nothing_for, read_sections, similar
 from climber_uk.simulation.options import SimulationOptions
 
 SEEDS = Uniform(0, 2**31)  # of the nodes, rounded down
 
 
-@dataclass(frozen=True)
+@parameters
 class Size:
     """Number of runs, their seed, and their duration."""
 
     runs: int = parameter(10_000, "", "number of runs", at_least=1)
     seed: int = parameter(0, "", "of all random numbers", at_least=0)
     duration: float = parameter(20.0, "s", "duration of each run", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True)

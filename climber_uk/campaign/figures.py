@@ -20,6 +20,7 @@ from climber_uk.campaign.names import PARAMETERS
 from climber_uk.campaign.parts import Store
 from climber_uk.campaign.results import broken, wilson
 from climber_uk.mechanics import Array
+from climber_uk.messages.topics import PLANT
 
 POINTS = 5000  # in a scatter figure: the first runs, which are random as all are
 BARS = 60  # in a histogram
@@ -136,7 +137,7 @@ def _panels(names: Sequence[str]) -> tuple[Any, list[Axes]]:
 
 
 def _parameter(name: str) -> str:
-    return _label(name.replace("plant_simulator.", ""), PARAMETERS[name].metadata["unit"])
+    return _label(name.replace(f"{PLANT}.", ""), PARAMETERS[name].metadata["unit"])
 
 
 def _label(name: str, unit: str) -> str:

@@ -11,16 +11,12 @@ from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
+from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import VARIANTS, Physics
 
-PLANNER, CONTROLLER, PLANT = NODES = (
-    "trajectory_publisher",
-    "uk_torque_controller",
-    "plant_simulator",
-)
 SEED, PRESSURE = f"{PLANT}.seed", f"{PLANT}.suction_pressure"
 MEASURED = f"{CONTROLLER}.suction_pressure"
 CONSTRAINT_SET = f"{CONTROLLER}.constraints"

@@ -13,6 +13,7 @@ from climber_uk.campaign.limits import METRICS, Limit
 from climber_uk.campaign.names import SEED
 from climber_uk.campaign.parts import Store
 from climber_uk.mechanics import Array
+from climber_uk.messages.topics import PLANT
 
 QUANTILES = {"lowest": 0.0, "1 %": 0.01, "50 %": 0.5, "99 %": 0.99, "highest": 1.0}
 WORST = 3  # runs that are reported for each limit
@@ -82,5 +83,5 @@ def _worst(limit: Limit, store: Store, rerun: str) -> Iterator[str]:
         yield ""
         yield f"run {run}: {limit.metric} {row[limit.metric]:.5g}, verdict {row['verdict']}"
         yield f"  {rerun.format(run)}"
-        drawn = ", ".join([*own, f"{SEED}={row[SEED]}"]).replace("plant_simulator.", "")
+        drawn = ", ".join([*own, f"{SEED}={row[SEED]}"]).replace(f"{PLANT}.", "")
         yield textwrap.fill(drawn, 98, initial_indent="  ", subsequent_indent="  ")

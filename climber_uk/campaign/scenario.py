@@ -7,15 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from climber_uk.campaign.names import (
-    CONTROLLER,
-    PARAMETERS,
-    PLANNER,
-    PLANT,
-    REQUIRED,
-    SEED,
-    WITHOUT,
-)
+from climber_uk.campaign.names import PARAMETERS, REQUIRED, SEED, WITHOUT
 from climber_uk.closed_loop.batch import BatchRun, Change, Loops
 from climber_uk.control.build import settings
 from climber_uk.mechanics.adhesion import Grip
@@ -23,6 +15,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
+from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.parameters.parameter_file import Values
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors

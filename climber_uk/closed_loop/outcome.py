@@ -8,8 +8,8 @@ from climber_uk.control.control_law import Command
 from climber_uk.control.sampled_controller import CUT
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import MAX_MARGIN
-from climber_uk.mechanics.climber import GRAVITY, Climber
-from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import Contact, is_pulled_off
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
 
 SETTLED = 0.01  # [m] from the reference, within which a loop has settled
@@ -65,8 +65,7 @@ class Tally:
         np.add(self.saturated, is_saturated, out=self.saturated, where=on)
         for torque in wheels:
             np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
-        lateral = climber.mass * motion.speed * motion.yaw_rate
-        lateral = lateral + climber.weight_along_wall * motion.cosine
+        lateral = climber.lateral_reaction(motion)
         margin = self.contact.slip_margin(climber, self._into, climber.wrench(*wheels)[0], lateral)
         np.minimum(self.slip, margin, out=self.slip, where=on)
 
@@ -77,7 +76,7 @@ class Tally:
         normal = self.contact.normal_force(climber, self._into)
         along = climber.weight_along_wall / climber.mass
         tip = self.contact.tip_margin(climber, self._into, along)
-        falls = (normal < 1e-9 * climber.mass * GRAVITY) | (tip < 1)
+        falls = is_pulled_off(climber, normal) | (tip < 1)
         self.tip = np.minimum(self.tip, tip)
         self.fell = np.minimum(self.fell, np.where(falls, time, np.inf))
         if np.isfinite(self.fell).any():

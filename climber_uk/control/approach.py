@@ -5,7 +5,6 @@ Each of the three moves goes from rest to rest by the polynomial of least jerk, 
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 PEAK = 15 / 8  # of p'
 SHORTEST = 0.4  # [s] that a move takes
@@ -21,7 +20,7 @@ POINT_PERIOD = 0.05  # [s]
 HERE = 1e-3  # [m] that need not be driven
 
 
-@dataclass(frozen=True)
+@parameters
 class Approach:
     """How a climber gets to its reference, which waits for it meanwhile."""
 
@@ -36,9 +35,6 @@ class Approach:
     )
     approach_speed: float = parameter(0.1, "m/s", "fastest speed of the approach", above=0)
     approach_yaw_rate: float = parameter(0.5, "rad/s", "fastest turn of the approach", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def way(self, motion: Motion, target: ReferencePoint, begin: int) -> Preview:
         """Reference from where a climber is, at rest from `begin` [ns] on, to where `target` is."""

@@ -1,6 +1,6 @@
 """The controller as its parameters say, whoever reads them: a node, or a replay of its bag."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol, TypeVar
 
 from climber_uk.control.approach import Approach
@@ -15,7 +15,7 @@ from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
 from climber_uk.mechanics.climber import Climber
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 T = TypeVar("T")
 
@@ -27,7 +27,7 @@ class ParameterSource(Protocol):
         """Instance of `kind`; raises `ValueError` naming parameter, value and bound."""
 
 
-@dataclass(frozen=True)
+@parameters
 class ConstraintChoice:
     """Which constraints are followed, and what kind of climber follows them."""
 
@@ -39,9 +39,6 @@ class ConstraintChoice:
         choices=(UDWADIA_KALABA, *FORCE_LAWS),
     )
     adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 KINDS: list[tuple[type, str]] = [

@@ -6,7 +6,7 @@ torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
@@ -28,13 +28,13 @@ from climber_uk.mechanics.quantities import (
     along,
 )
 from climber_uk.mechanics.udwadia_kalaba import constraint_force
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
 Solve = Callable[[Any, Motion], tuple[Any, Any, Any]]  # force, moment and lateral reaction
 
 
-@dataclass(frozen=True, slots=True)
+@parameters(slots=True)
 class ControlOptions:
     """How the torques are computed; see `ControlLaw`."""
 
@@ -54,9 +54,6 @@ class ControlOptions:
         "of the Udwadia-Kalaba equation; generic: by matrices, the same, and 12 times slower",
         choices=("closed_form", "generic"),
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def lookahead(self, period: float) -> float:
         """From the begin of a torque's action of `period` [s] to the time it is computed for."""
@@ -125,7 +122,7 @@ class ControlLaw:
 
     climber: Climber
     constraints: ConstraintSet
-    options: ControlOptions
+    options: ControlOptions = field(default_factory=ControlOptions)
     other: ForceLaw | None = None  # in the constraints' place
 
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
@@ -158,7 +155,7 @@ class ControlLaw:
         mass, inertia, friction, weight = self.climber.inertial
         rubbing = friction * tanh(speed / self.options.friction_speed)
         force = mass * v_1 + rubbing + weight * motion.sine
-        return force, inertia * yaw_acceleration, self.lateral(motion)
+        return force, inertia * yaw_acceleration, self.climber.lateral_reaction(motion)
 
     def generic(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
         """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
@@ -175,15 +172,12 @@ class ControlLaw:
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
         return along(heading, Qc), unpack(Qc)[2], across(heading, Qc)
 
-    def lateral(self, motion: Motion) -> Any:
-        """Reaction of the wheels to the left, which the no-slip row asks for [N]."""
-        mass, _, _, weight = self.climber.inertial
-        return mass * motion.speed * motion.yaw_rate + weight * motion.cosine
-
     def of_forces(self, target: ReferencePoint, motion: Motion) -> tuple[Any, Any, Any]:
         """Those of another law, and the reaction of wheels that do not slip."""
         assert self.other is not None
-        return *self.other.wrench(self.climber, target, motion), self.lateral(motion)
+        return *self.other.wrench(self.climber, target, motion), self.climber.lateral_reaction(
+            motion
+        )
 
     def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

@@ -58,11 +58,11 @@ class Controller:
     def __init__(
         self,
         sampled_controller: SampledController,
-        safety: Safety,
+        safety: Safety | None = None,
         approach: Approach | None = None,
         guard: GuardOptions | None = None,
     ) -> None:
-        self.sampled_controller, self.safety = sampled_controller, safety
+        self.sampled_controller, self.safety = sampled_controller, safety or Safety()
         self.active = ActiveReference(sampled_controller, approach or Approach())
         self.guard = Guard(guard or GuardOptions())
         self.mode, self.detail = Mode.WAITING, ""

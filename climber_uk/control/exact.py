@@ -1,16 +1,14 @@
 """The constraint set `exact`: the reference's path itself."""
 
-from dataclasses import dataclass
-
 from climber_uk.mechanics.elementary import cos, select, sin
 from climber_uk.mechanics.quantities import DesiredAcceleration, Motion, ReferencePoint
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 REACH = 0.2  # [m] from the path, within which the exact set is expected to stay
 REST_SPEED = 1e-3  # [m/s] below which a heading cannot be told from the way a climber moves
 
 
-@dataclass(frozen=True, slots=True)
+@parameters(slots=True)
 class Exact:
     """The path itself: p̈ = u = p̈_d + K_d (ṗ_d - ṗ) + K_p (p_d - p), and what it hides.
 
@@ -23,9 +21,6 @@ class Exact:
         6.0, "rad/s", "ω_n: K_p = ω_n², K_d = 2 ω_n", above=0, runtime=True
     )
     hidden_rate: float = parameter(10.0, "1/s", "λ, decay of φ", above=0, runtime=True)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """See `ConstraintSet`; offsets of up to `REACH` are expected to be corrected."""

@@ -6,7 +6,6 @@ law. What it finds is a `Mode` in which the safe output is given.
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from climber_uk.control.safety import Mode
@@ -14,7 +13,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
@@ -29,7 +28,7 @@ UNTOLD = 0.012  # [s] that a loop may take longer to answer than it knows
 SUSPECTED = 0.4  # of both is enough where the climber runs away
 
 
-@dataclass(frozen=True, slots=True)
+@parameters(slots=True)
 class GuardOptions:
     """What is beyond explanation, and when the climber is trusted again; 0 switches a check off."""
 
@@ -55,9 +54,6 @@ class GuardOptions:
         3, "", "faults within `memory`, after which ~/enable is waited for", at_least=1
     )
     memory: float = parameter(20.0, "s", "for which a fault counts", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 UNGUARDED = GuardOptions(

@@ -11,12 +11,11 @@ reference's frame: along its heading, and to its left. Floats, or arrays (N,) of
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from climber_uk.mechanics.elementary import arctan, cos, either, select, sin, sqrt, tanh, wrapped
 from climber_uk.mechanics.quantities import DesiredAcceleration, Motion, ReferencePoint
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
 class PreparedTarget(NamedTuple):
@@ -37,7 +36,7 @@ class PreparedTarget(NamedTuple):
     gain: tuple[Any, Any, Any]  # g [1/m], ġ and g̈
 
 
-@dataclass(frozen=True, slots=True)
+@parameters(slots=True)
 class Guidance:
     """Speed and heading that lead back to the reference; never singular, and so good at rest.
 
@@ -69,9 +68,6 @@ class Guidance:
     turn_rate: float = parameter(
         4.0, "rad/s", "fastest turn back to the heading wanted", above=0, runtime=True
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """See `ConstraintSet`; steering along atan(g e_y) turns by g v at most."""

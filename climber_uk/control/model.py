@@ -6,7 +6,6 @@
 other friction, mass or suction, a payload, a push.
 """
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from climber_uk.mechanics.climber import Climber
@@ -22,7 +21,7 @@ from climber_uk.mechanics.elementary import (
     wrapped,
 )
 from climber_uk.mechanics.quantities import Motion
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
 REST = 1e-3  # [m/s] of an expected speed that is none
@@ -73,7 +72,7 @@ class DisturbanceEstimate(NamedTuple):
         return DisturbanceEstimate(self.force, self.moment)
 
 
-@dataclass(frozen=True, slots=True)
+@parameters(slots=True)
 class Observer:
     """Learns the disturbance, and the speeds if need be, from what comes out other than expected.
 
@@ -102,9 +101,6 @@ class Observer:
     pose_bandwidth: float = parameter(
         60.0, "1/s", "of the filter that takes speeds from poses", above=0, runtime=True
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def corrected(
         self,

@@ -5,12 +5,11 @@ one it is now.
 """
 
 import math
-from dataclasses import dataclass
 from enum import Enum
 
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 SPEED_TIME = 0.1  # [s] in which a jump of the speed would become one of the place
 
@@ -63,7 +62,7 @@ NO_FAULTS = frozenset(
 )
 
 
-@dataclass(frozen=True)
+@parameters
 class Safety:
     """What is too old or too far, and what is done then."""
 
@@ -101,9 +100,6 @@ class Safety:
     max_twist_error: float = parameter(
         0.05, "m", "of the way in half a second, between twist and pose, beside 30 %", above=0
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def has_jumped(self, expected: Motion, found: Motion, half_track: float) -> bool:
         """Whether a wheel is, or will soon be, further than `max_jump` from where expected."""

@@ -5,7 +5,7 @@ Stamps are integers in nanoseconds, on the clock of the odometry.
 
 import dataclasses
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
 LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
@@ -30,7 +30,7 @@ RETUNING_TIME = 0.5  # [s] in which changed gains come to act
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
 
 
-@dataclass(frozen=True, slots=True)
+@parameters(slots=True)
 class Timing:
     """When a torque acts: from its arrival at the wheels to that of the next.
 
@@ -63,9 +63,6 @@ class Timing:
         True, "", "learn what is missing in the transport delay while it runs", runtime=True
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class SampledController:
     """Answers odometry with torques, and learns from how the climber took the last ones.
@@ -75,10 +72,16 @@ class SampledController:
     in step: arrays (N,) where there are floats.
     """
 
-    def __init__(self, law: ControlLaw, observer: Observer, timing: Timing, pacing: Pacing) -> None:
-        self.law, self.observer = law, observer
-        self.timing, self.pacing = timing, pacing
-        self.period = timing.control_period  # [s] from one odometry to the next
+    def __init__(
+        self,
+        law: ControlLaw,
+        observer: Observer | None = None,
+        timing: Timing | None = None,
+        pacing: Pacing | None = None,
+    ) -> None:
+        self.law, self.observer = law, observer or Observer()
+        self.timing, self.pacing = timing or Timing(), pacing or Pacing()
+        self.period = self.timing.control_period  # [s] from one odometry to the next
         self._period_is_measured = False
         self._acting = TorqueHistory()
         self.latency, self.twist = Latency(), TwistKind()

@@ -7,14 +7,13 @@ not followed at all, s stands still.
 """
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import compose
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import ReferencePoint
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
 LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
@@ -22,7 +21,7 @@ LONGEST_GAP = 0.3  # [s] between two answers over which the reference goes on
 IN_TIME_AGAIN = 1e-3  # [1] of σ that is missing at the end of a restart
 
 
-@dataclass(frozen=True, slots=True)
+@parameters(slots=True)
 class Pacing:
     """How time that was lost is made up for; 0 for `catch_up` switches the time scaling off."""
 
@@ -40,9 +39,6 @@ class Pacing:
     settling_time: float = parameter(
         0.2, "s", "in which σ goes back to where it should be", above=0, runtime=True
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Pace(NamedTuple):

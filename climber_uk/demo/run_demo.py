@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -23,16 +22,26 @@ from std_srvs.srv import Trigger
 
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.messages.topics import (
+    CONTROLLER,
+    DIAGNOSTICS,
+    FORCE,
+    JOINTS,
+    NODES,
+    PLANNER,
+    PLANT,
+    REFERENCE_PATH,
+)
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import read_file
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
-from climber_uk.system.signals import ignore_end, on_end
+from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
 # One topic of each node that the recorder alone subscribes, which it does once it knows the node
-RECORDED = ("reference_path", "uk_torque_controller/constraint_force", "joint_states")
+RECORDED = REFERENCE_PATH, FORCE, JOINTS
 FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
 START_TIMEOUT = 60.0  # [s]
@@ -48,18 +57,11 @@ class Ended(RuntimeError):  # noqa: N818 - it is what happened
         self.name = name
 
 
-class Interrupted(Exception):  # noqa: N818 - as above
-    """A signal to end has come."""
-
-
-@dataclass(frozen=True)
+@parameters
 class DemoOptions:
     """Duration of the demonstration."""
 
     duration: float = parameter(20.0, "s", "how long the trajectory is run", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Demo(ClimberNode):
@@ -78,7 +80,7 @@ class Demo(ClimberNode):
         self.time: float | None = None  # [s] of the plant
         self.fall = ""  # diagnostics of a fall
         self.subscription(FluidPressure, f"{climbers[0]}/suction_pressure", self.on_pressure)
-        self.subscription(DiagnosticArray, "/diagnostics", self.on_diagnostics)
+        self.subscription(DiagnosticArray, DIAGNOSTICS, self.on_diagnostics)
         self.starters = [
             self.create_client(Trigger, f"{climber}/trajectory_publisher/start")
             for climber in climbers
@@ -210,14 +212,14 @@ def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dic
     commands = {}
     for climber in climbers:
         prefix = f"{climber.strip('/')}." if climber else ""
-        commands[prefix + "trajectory_publisher"] = executable(
-            "trajectory_publisher", *ros(use_sim_time, "autostart:=false", delay, namespace=climber)
+        commands[prefix + PLANNER] = executable(
+            PLANNER, *ros(use_sim_time, "autostart:=false", delay, namespace=climber)
         )
-        commands[prefix + "uk_torque_controller"] = executable(
-            "uk_torque_controller", *ros(use_sim_time, namespace=climber)
+        commands[prefix + CONTROLLER] = executable(
+            CONTROLLER, *ros(use_sim_time, namespace=climber)
         )
-    commands["plant_simulator"] = executable(
-        "plant_simulator",
+    commands[PLANT] = executable(
+        PLANT,
         *(["--climbers", *climbers] if any(climbers) else []),
         *ros(f"simulated_time:={str(simulated).lower()}"),
     )
@@ -252,7 +254,7 @@ def main() -> None:
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:
-        for node in ("trajectory_publisher", "uk_torque_controller", "plant_simulator"):
+        for node in NODES:
             for climber in climbers:
                 read_file(options.config, f"{climber}/{node}")
         options.output.mkdir(parents=True)

@@ -26,22 +26,19 @@ from climber_uk.driver_check.node import DriverNode
 from climber_uk.driver_check.trial import Bounds
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.names import Names
+from climber_uk.messages.topics import CONTROLLER, ODOMETRY
 from climber_uk.parameters.changed_parameters import write_sections
 from climber_uk.parameters.parameter_file import Section, nothing_for, read_sections
 from climber_uk.parameters.parameter_files import paths
 from climber_uk.ros.running import in_a_line
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
-from climber_uk.system.signals import on_end
+from climber_uk.system.signals import Interrupted, on_end
 
-NODE, CONTROLLER = "check_driver", "uk_torque_controller"
+NODE = "check_driver"
 DISCOVERY_TIMEOUT = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques
 FLUSH_TIME = 0.2  # [s] in which odometry from before the trial is received
-
-
-class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
-    """A signal to end has come."""
 
 
 @contextmanager
@@ -123,8 +120,8 @@ def check(
 
 def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None:
     """Collect odometry for `options.duration` [s] of the wall clock, or of its stamps."""
-    spin.until(lambda: bool(node.count_publishers("odom")), DISCOVERY_TIMEOUT)
-    if not node.count_publishers("odom"):
+    spin.until(lambda: bool(node.count_publishers(ODOMETRY)), DISCOVERY_TIMEOUT)
+    if not node.count_publishers(ODOMETRY):
         return
     spin.until(lambda: node.hears, DISCOVERY_TIMEOUT / 2)
     node.arrivals.clear()  # their times of arrival are of no use

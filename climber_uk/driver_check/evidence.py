@@ -17,7 +17,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Motion as Rolling
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 if TYPE_CHECKING:
     from nav_msgs.msg import Odometry
@@ -26,7 +26,7 @@ Times = NDArray[np.int64]
 PLANAR = 0, 7, 35  # x, y and about z, on the diagonal of a covariance
 
 
-@dataclass(frozen=True)
+@parameters
 class ExpectedDriver:
     """Parameters of the controller that describe the driver."""
 
@@ -37,9 +37,6 @@ class ExpectedDriver:
     transport_delay: float = parameter(
         0.0, "s", "from a torque's publication to its action", at_least=0
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Endpoint(NamedTuple):

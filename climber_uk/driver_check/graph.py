@@ -8,6 +8,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from climber_uk.driver_check import listening
 from climber_uk.driver_check.evidence import Endpoint, Graph
+from climber_uk.messages.topics import CLOCK, ODOMETRY, TORQUES
 from climber_uk.ros.running import BEST_EFFORT
 
 # the controller's offer of torques, as the middleware knows it
@@ -21,8 +22,8 @@ OFFERED = QoSProfile(
 
 def graph(node: Node, topic: str) -> Graph:
     """Graph as `node` sees it now, which has subscribed `topic` as odom."""
-    odometry = node.get_publishers_info_by_topic("odom")
-    commanded = node.get_subscriptions_info_by_topic("wheel_torques")
+    odometry = node.get_publishers_info_by_topic(ODOMETRY)
+    commanded = node.get_subscriptions_info_by_topic(TORQUES)
     return Graph(
         topic=topic,
         odometry=[_endpoint(info, info.qos_profile, BEST_EFFORT) for info in odometry],
@@ -32,13 +33,13 @@ def graph(node: Node, topic: str) -> Graph:
             for name, kinds in node.get_topic_names_and_types()
             if listening.ODOMETRY in kinds and name != topic
         ],
-        has_clock=bool(node.count_publishers("/clock")),
+        has_clock=bool(node.count_publishers(CLOCK)),
     )
 
 
 def others_commanding(node: Node) -> list[str]:
     """Full names of other nodes than `node` that publish torques."""
-    names = map(_name, node.get_publishers_info_by_topic("wheel_torques"))
+    names = map(_name, node.get_publishers_info_by_topic(TORQUES))
     return [name for name in names if name != node.get_fully_qualified_name()]
 
 

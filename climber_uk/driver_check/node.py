@@ -18,6 +18,7 @@ from climber_uk.driver_check.trial import Bounds, Trial
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages import reading, writing
+from climber_uk.messages.topics import CLOCK, ODOMETRY, TORQUES
 from climber_uk.ros.running import ClimberNode
 
 MANY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -39,8 +40,8 @@ class DriverNode(ClimberNode):
         self.trial: Trial | None = None
         self.torques: Publisher | None = None  # only once no other node commands
         self.answer: JointState | None = None
-        self.odometry = self.subscription(Odometry, "odom", self.on_odometry, MANY)
-        self.subscription(Clock, "/clock", self.on_clock, MANY)
+        self.odometry = self.subscription(Odometry, ODOMETRY, self.on_odometry, MANY)
+        self.subscription(Clock, CLOCK, self.on_clock, MANY)
 
     def on_clock(self, message: Clock, info: dict[str, int]) -> None:
         """Keep a simulated time, and when it was received."""
@@ -86,7 +87,7 @@ class DriverNode(ClimberNode):
 
     def has_clock(self) -> bool:
         """Whether /clock is published."""
-        return bool(self.count_publishers("/clock"))
+        return bool(self.count_publishers(CLOCK))
 
     @property
     def hears(self) -> bool:
@@ -104,7 +105,7 @@ class DriverNode(ClimberNode):
     def start_commanding(self) -> None:
         """Begin to publish torques, unless another node does."""
         if self.torques is None and not others_commanding(self):
-            self.torques = self.publisher(JointState, "wheel_torques")
+            self.torques = self.publisher(JointState, TORQUES)
 
     @property
     def has_rival(self) -> bool:

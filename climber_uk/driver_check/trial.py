@@ -1,7 +1,6 @@
 """A trial: pulses of torque one after the other, from odometry to odometry, within bounds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import State, along
 from climber_uk.messages import reading
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 REST_MESSAGES = 20  # by which it is judged whether the climber is at rest
 ORDER = True, False, False, True  # whether each pulse yaws, or drives
@@ -24,7 +23,7 @@ TRIES = 20  # of stages in all, as a busy computer spoils some
 BACK = 0.005, 0.02  # [m], [rad] from its start at which the next pulse leads back
 
 
-@dataclass(frozen=True)
+@parameters
 class Bounds:
     """Limits of a trial: torque, travel, yaw, and the watchdog's time."""
 
@@ -36,9 +35,6 @@ class Bounds:
     watchdog_time: float = parameter(
         0.5, "s", "from the last command to the end of its torque, at most", above=0
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Trial:

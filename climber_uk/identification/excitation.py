@@ -22,7 +22,7 @@ from climber_uk.mechanics.elementary import sign, sin
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line, Shape
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 PERIOD = 0.02  # [s]
 AMPLE = 1.6  # times as many windows as there must be
@@ -31,7 +31,7 @@ SHOWN = ~np.isin(NAMES, ("wheel_radius", "half_track"))  # need wheel angles, an
 SOUGHT = np.isin(NAMES, ("mass", "seal_friction_coefficient", "yaw_inertia"))
 
 
-@dataclass(frozen=True)
+@parameters
 class ExcitationLimits:
     """What the trajectory may take."""
 
@@ -39,9 +39,6 @@ class ExcitationLimits:
     speed: float = parameter(0.3, "m/s", "highest speed", above=0)
     torque: float = parameter(4.0, "N m", "highest torque of a wheel", above=0)
     duration: float = parameter(60.0, "s", "longest time", above=0, at_most=3600)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True)

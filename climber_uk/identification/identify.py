@@ -11,23 +11,20 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from climber_uk.bags.collecting import check_one_run
-from climber_uk.bags.topics import ODOMETRY, PARAMETERS, Topics
+from climber_uk.bags.run_reader import RunReader
+from climber_uk.bags.topics import Topics
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
 from climber_uk.identification.identified import NAMES
 from climber_uk.identification.integral_equations import Cut
-from climber_uk.identification.recorded_motion import Source, read_motion
+from climber_uk.identification.recorded_motion import TOPICS, read_motion
 from climber_uk.identification.recorded_site import (
     assumed_away,
     differences,
-    recorded_parameters,
     site_of,
 )
 from climber_uk.identification.report import (
-    CONTROLLER,
-    PLANT,
     changes,
     label_of,
     missing,
@@ -36,13 +33,12 @@ from climber_uk.identification.report import (
     table,
 )
 from climber_uk.mechanics.climber import Climber
+from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.report.outputs import check_writable, printable
 from climber_uk.system.command_line import Parser, between
 
-PUBLISHER = "trajectory_publisher"
-SIDES = "right", "left"
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
@@ -50,14 +46,17 @@ def tell(options: argparse.Namespace) -> None:
     """Print and write what a bag tells; raises `ValueError` of what it does not."""
     cut = Values(vars(options)).read(Cut)
     file, plant = parameters_of(CONTROLLER, options), plant_of(options)
-    topic = Source(namespace=options.namespace).topic(PARAMETERS)
-    recorded = recorded_parameters(options.bag, topic)
+    names = Topics({ODOMETRY: options.odometry})
+    reader, climber = RunReader.read(options.bag, names, options.namespace.strip("/"), TOPICS)
+    recorded = climber.first_parameters
     parameters = {**recorded, **file}
     believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
-    names = Topics({ODOMETRY: options.odometry})
-    for loss in check_one_run(options.bag, names, options.namespace.strip("/")):
+    reader.check_one_run(climber)
+    told = {**file, **recorded}
+    delay = told.get("transport_delay", 0.0) if options.delay is None else options.delay
+    motion, unfit = read_motion(reader, climber, told, believed.suction_pressure, delay)
+    for loss in reader.bag.losses:
         print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
-    motion, unfit = read_motion(options.bag, source(options, {**file, **recorded}, believed))
     found = identify(motion, believed, cut, site)
     print(table(found, believed), end="")
     print(*remarks(found), sep="\n")
@@ -76,22 +75,9 @@ def tell(options: argparse.Namespace) -> None:
         raise ValueError("\n".join(said))
 
 
-def source(options: argparse.Namespace, parameters: dict[str, Any], believed: Climber) -> Source:
-    """Where the bag tells of the climber whose controller had `parameters`."""
-    joints = [parameters.get(f"{side}_wheel_joint", f"{side}_wheel_joint") for side in SIDES]
-    delay = parameters.get("transport_delay", 0.0) if options.delay is None else options.delay
-    return Source(
-        namespace=options.namespace,
-        odometry=options.odometry,
-        joints=(joints[0], joints[1]),
-        pressure=believed.suction_pressure,
-        delay=delay,
-    )
-
-
 def plan(options: argparse.Namespace) -> None:
     """Write a trajectory, with all that is in the parameter file; raises `ValueError`."""
-    parameters = parameters_of(PUBLISHER, options)
+    parameters = parameters_of(PLANNER, options)
     origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
     controller = parameters_of(CONTROLLER, options)
     site, believed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
@@ -101,7 +87,7 @@ def plan(options: argparse.Namespace) -> None:
     best = excitation.plan(believed, limits, origin, site)
     x, y, heading = best.trajectory.at(0.0).pose.tolist()
     changed = {
-        PUBLISHER: best.parameters,
+        PLANNER: best.parameters,
         PLANT: {"initial_x": x, "initial_y": y, "initial_heading": heading, **AT_REST},
         "run_demo": {"duration": best.trajectory.duration},
     }
@@ -116,7 +102,7 @@ def plan(options: argparse.Namespace) -> None:
 
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
     """Those of a node in the parameter file; none without one."""
-    name = Source(namespace=options.namespace).topic(node)
+    name = Topics().full(node, options.namespace.strip("/"))
     return read_file(options.params, name) if options.params else {}
 
 
@@ -134,7 +120,7 @@ def main() -> None:
     parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
-    parser.add_argument("--odometry", default="odom", help="topic (default: odom)")
+    parser.add_argument("--odometry", default=ODOMETRY, help=f"topic (default: {ODOMETRY})")
     parser.add_argument(
         "--delay", type=between(0.0, 10.0), help="[s] of torques, unless joint_states tells them"
     )

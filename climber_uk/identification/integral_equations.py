@@ -22,7 +22,7 @@ from climber_uk.identification.recorded_motion import SMOOTHING, Indices, Record
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.wall import Plane, Wall
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
 class Equations(NamedTuple):
@@ -48,7 +48,7 @@ class Site:
     has_seal: bool = True
 
 
-@dataclass(frozen=True)
+@parameters
 class Cut:
     """How a motion is cut into windows, in which its direction does not change."""
 
@@ -57,9 +57,6 @@ class Cut:
     least_yaw_rate: float = parameter(
         0.05, "rad/s", "below which it may as well not turn: friction there is any", above=0
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def windows(self, motion: RecordedMotion) -> list[Indices]:
         """Indices of the times in each window in which it drives one way."""

@@ -1,25 +1,24 @@
 """How a climber moved and what drove it, as arrays, from the messages of a bag."""
 
-from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from climber_uk.bags.bag import read_messages
+from climber_uk.bags.collecting import Collected
+from climber_uk.bags.joints import torques_and_angles, wheel_names
+from climber_uk.bags.recorded import TimeSeries
 from climber_uk.bags.restarts import are_strays
-from climber_uk.bags.taking import FAULTS, STRAY
-from climber_uk.bags.topics import ODOMETRY, TYPES
+from climber_uk.bags.run_reader import RunReader, Told
 from climber_uk.identification.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.messages import reading
+from climber_uk.messages.topics import JOINTS, ODOMETRY, PARAMETERS, PRESSURE, TORQUES
 
 Indices = NDArray[np.intp]
-Wheels = tuple[Array, Array]  # torques (2,), angles (2,)
 Torques = tuple[Array, Array]  # when they begin (m,) [s], and they (m, 2) [N m]
+TOPICS = ODOMETRY, TORQUES, JOINTS, PRESSURE, PARAMETERS  # that are read
 HALF_SECOND = 0.5  # [s]
 PATIENCE = 5.0  # typical times from one torque to the next, after which some are missing
 SMOOTHING = 0.2  # [s] to either side, over which rates are taken
@@ -98,114 +97,76 @@ def stretches(time: Array, begins: Array) -> Indices:
     return np.searchsorted(begins[np.stack([gaps, gaps + 1], axis=1).ravel()], time)
 
 
-@dataclass(frozen=True)
-class Source:
-    """Where a bag tells of a climber, and what holds where it does not."""
-
-    namespace: str = ""
-    odometry: str = "odom"  # topic
-    joints: tuple[str, str] = ("right_wheel_joint", "left_wheel_joint")
-    pressure: float = 0.0  # [Pa] without suction_pressure
-    delay: float = 0.0  # [s] of a command after its odometry, without torques in joint_states
-
-    def topic(self, name: str) -> str:
-        """Full name of a topic."""
-        return f"/{self.namespace.strip('/')}/{name.lstrip('/')}".replace("//", "/")
-
-
-def read_motion(bag: str | Path, source: Source) -> tuple[RecordedMotion, int]:
+def read_motion(
+    reader: RunReader, found: Collected, parameters: Told, pressure: float = 0.0, delay: float = 0.0
+) -> tuple[RecordedMotion, int]:
     """Motion of a climber, and how many messages are unfit and left out.
 
-    Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
+    What holds where they are not told: a `pressure` [Pa], and a `delay` [s] of a command after its
+    odometry. `parameters` are the controller's. Raises `ValueError` naming the bag and what it
+    lacks.
     """
-    found, unfit = _collected(bag, source)
-    states, commands, wheels, pressures = found
-    commanded, at_wheels = _commanded(commands, source.delay), _at_wheels(wheels)
+    odometry, pressures = (reader.recorded(found, name) for name in (ODOMETRY, PRESSURE))
+    others = pressures, reader.commands(found, parameters), _wheels(found, parameters)
+    unfit = sum(sum(told.unfit.values()) for told in (odometry, *others))
+    # far off the others' stamps; `collect` has marked odometry's
+    strays = [are_strays(told.stamps) for told in others]
+    unfit += sum(int(np.sum(are_off)) for are_off in strays)
+    pressures, commands, wheels = (
+        told.where(~are_off) for told, are_off in zip(others, strays, strict=True)
+    )
+    fit = np.isfinite(odometry.values).all(axis=1)  # the twist too
+    commanded = _seconds(commands) + delay, commands.values[:, :2]
+    at_wheels = _at_wheels(wheels)
     begins, torques = at_wheels or commanded
-    time = np.array([t for t in states if len(begins) > 1 and begins[0] <= t <= begins[-1]])
-    if len(time) < 2:
-        topic = source.topic(source.odometry)
-        because = f" ({len(unfit)} messages are unfit: {unfit[-1]})" if unfit else ""
+    first, last = (begins[0], begins[-1]) if len(begins) > 1 else (np.inf, np.inf)
+    time = _seconds(odometry)
+    kept = fit & (first <= time) & (time <= last)
+    if np.sum(kept) < 2:
+        topic = reader.topic(ODOMETRY)
+        because = "".join(f"; {loss}" for loss in reader.bag.losses)
         raise ValueError(
-            f"{bag} has no odometry on {topic} at times that torques are known{because}"
+            f"{reader.bag.path} has no odometry on {topic} at times that torques are known{because}"
         )
-    kept = [states[t] for t in time.tolist()]
-    pose = np.array([state.pose for state in kept])
-    rates = np.array([[state.forward_speed, state.yaw_rate] for state in kept])
-    told = pressures or {0.0: source.pressure}
+    time, values = time[kept], odometry.values[kept]
+    rates = values[:, [3, 5]]
+    pressures = pressures.where(pressures.values[:, 0] >= 0)
     motion = RecordedMotion(
         time=time,
-        pose=np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]),
+        pose=np.column_stack([values[:, :2], np.unwrap(values[:, 2])]),
         rates=rates if rates.any() else None,
         impulse=impulse(time, begins, torques),
-        pressure=np.interp(time, list(told), list(told.values())),
+        pressure=np.interp(time, _seconds(pressures), pressures.values[:, 0])
+        if len(pressures)
+        else np.full(len(time), pressure),
         stretch=stretches(time, begins),
         wheel_angles=_angles(time, wheels),
         torque_ratio=_ratio(at_wheels, commanded) if at_wheels else 1.0,
     )
-    return motion, len(unfit)
+    return motion, unfit + int(np.sum(~fit))
 
 
-def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]], list[str]]:
-    """Contents by stamp [s] of odometry, commands, wheels and pressure; why others are unfit."""
-    right, left = source.joints
-    readers: dict[str, Callable[[Any], Any]] = {
-        ODOMETRY: lambda m: reading.state(m, m.header.frame_id, m.child_frame_id),
-        "wheel_torques": lambda m: reading.wheel_torques(m, left, right),
-        "joint_states": lambda m: _wheels(m, source.joints),
-        "suction_pressure": reading.pressure,
-    }
-    topics = {source.topic(source.odometry): ODOMETRY}
-    topics |= {source.topic(name): name for name in readers if name != ODOMETRY}
-    found: dict[str, dict[float, Any]] = {name: {} for name in readers}
-    unfit: list[str] = []
-    for topic, _, message in read_messages(bag, topics):
-        name = topics[topic]
-        try:
-            if message.__msgtype__ != (wanted := TYPES[name]):
-                raise ValueError(f"type {message.__msgtype__} must be {wanted}")
-            content = readers[name](message)
-        except ValueError as error:
-            unfit.append(str(error))
-        else:
-            if content is not None:
-                found[name][reading.nanoseconds(message.header.stamp) / SECOND] = content
-    return [dict(sorted(_at_sound_times(contents, unfit))) for contents in found.values()], unfit
+def _seconds(told: TimeSeries) -> Array:
+    """Stamps (n,) [s]."""
+    return np.array([stamp / SECOND for stamp in told.stamps.tolist()])
 
 
-def _at_sound_times(contents: dict[float, Any], unfit: list[str]) -> Iterator[tuple[float, Any]]:
-    """Contents without those whose stamps are far off those recorded around them."""
-    strays = are_strays(np.array([round(time * SECOND) for time in contents], np.int64))
-    for item, is_stray in zip(contents.items(), strays.tolist(), strict=True):
-        if is_stray:
-            unfit.append(FAULTS[STRAY])
-        else:
-            yield item
+def _wheels(found: Collected, parameters: Told) -> TimeSeries:
+    """Torques and angles of both wheels (n, 4), as joint_states tell them."""
+    parts = found.joints[JOINTS]
+    with suppress(ValueError):
+        names = wheel_names({name for part in parts for name in part.names}, parameters)
+        return torques_and_angles(parts, names)
+    return TimeSeries.of([])
 
 
-def _wheels(message: Any, joints: Sequence[str]) -> Wheels | None:
-    """Torques (2,) and angles (2,) of two joints, nan where not told; None: of others alone."""
-    if not set(joints) <= set(message.name):
-        return None
-    both = []
-    for values in (message.effort, message.position):
-        told = dict(zip(message.name, values, strict=False))
-        both.append(np.array([told.get(joint, np.nan) for joint in joints]))
-    return both[0], both[1]
-
-
-def _at_wheels(wheels: dict[float, Wheels]) -> Torques | None:
+def _at_wheels(wheels: TimeSeries) -> Torques | None:
     """When torques at the wheels begin (m,) [s], and they (m, 2); None if these are not told."""
-    efforts = np.array([torques for torques, _ in wheels.values()]).reshape(-1, 2)
+    efforts = wheels.values[:, :2]
     if len(efforts) < 2 or not np.isfinite(efforts).all() or not efforts.any():
         return None
     # each tells of the time before it
-    return np.array(list(wheels)), np.concatenate([efforts[1:], efforts[-1:]])
-
-
-def _commanded(commands: dict[float, Array], delay: float) -> Torques:
-    """The same of commanded torques."""
-    return np.array(list(commands)) + delay, np.array(list(commands.values())).reshape(-1, 2)
+    return _seconds(wheels), np.concatenate([efforts[1:], efforts[-1:]])
 
 
 def _ratio(at_wheels: Torques, commanded: Torques) -> float:
@@ -220,9 +181,8 @@ def _ratio(at_wheels: Torques, commanded: Torques) -> float:
     return float(are @ were / (were @ were)) if were.any() else 1.0
 
 
-def _angles(time: Array, wheels: dict[float, Wheels]) -> Array | None:
-    angles = np.array([angles for _, angles in wheels.values()]).reshape(-1, 2)
+def _angles(time: Array, wheels: TimeSeries) -> Array | None:
+    angles = wheels.values[:, 2:4]
     if len(angles) < 2 or not np.isfinite(angles).all() or not angles.any():
         return None
-    stamps = list(wheels)
-    return np.stack([np.interp(time, stamps, wheel) for wheel in angles.T], axis=1)
+    return np.stack([np.interp(time, _seconds(wheels), wheel) for wheel in angles.T], axis=1)

@@ -5,18 +5,13 @@ only in parameter files.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
-from climber_uk.bags.bag import read_messages
-from climber_uk.bags.topics import PARAMETERS, TYPES
 from climber_uk.identification.integral_equations import Site
 from climber_uk.mechanics.adhesion import ADHESION
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.wall import WALLS
-from climber_uk.messages import reading
 from climber_uk.parameters.parameter_file import Values
 
 Parameters = Mapping[str, Any]
@@ -43,16 +38,6 @@ OF_SUCTION = (
     "suction_pressure",
     "suction_area",
 )
-
-
-def recorded_parameters(bag: Path, topic: str) -> dict[str, Any]:
-    """Those that a controller told first on a topic; none if it did not, or there is no bag."""
-    with suppress(FileNotFoundError):  # `read_motion` says so
-        for _, _, message in read_messages(bag, [topic]):
-            if message.__msgtype__ != TYPES[PARAMETERS]:
-                continue
-            return dict(reading.parameters(message))
-    return {}
 
 
 def site_of(controller: Parameters, plant: Parameters) -> Site:

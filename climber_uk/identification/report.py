@@ -6,9 +6,9 @@ from typing import Any
 from climber_uk.identification.identified import IN_TIME, NAMES, UNITS, Identified
 from climber_uk.identification.integral_equations import Site
 from climber_uk.mechanics.climber import Climber
+from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.report.tables import markdown
 
-CONTROLLER, PLANT = "uk_torque_controller", "plant_simulator"
 COLUMNS = ("parameter", "estimate", "± 95 %", "unit", "nodes now", "")
 COULOMB = "seal_friction_coefficient"
 WITHOUT_SEAL = {COULOMB: ("rolling_friction", "N")}  # what that coefficient is then

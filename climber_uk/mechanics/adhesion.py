@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, exp, select, sqrt, with_sign_of
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 MAX_MARGIN = 100.0  # margins are clipped to ± this: where nothing is demanded they are infinite
@@ -42,7 +42,7 @@ class Adhesion(Protocol):
         return before
 
 
-@dataclass(frozen=True)
+@parameters
 class Suction(Adhesion):
     """Suction force P S; its seal carries (1 - k) of it and rubs; the pumped volume leaks.
 
@@ -53,9 +53,6 @@ class Suction(Adhesion):
     leak_time: float = parameter(0.0, "s", "time constant T_leak; 0: it does not leak", at_least=0)
 
     has_seal: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def force(self, climber: Climber) -> float:
         """See `Adhesion`."""
@@ -75,7 +72,7 @@ class Suction(Adhesion):
         return final + (before - final) * exp(-rate * time)
 
 
-@dataclass(frozen=True)
+@parameters
 class Magnetic(Adhesion):
     """Magnets: F₀ / (1 + gap/g₀)², as the flux crosses the gap twice; no seal rubs."""
 
@@ -88,9 +85,6 @@ class Magnetic(Adhesion):
     gap_of_a_quarter: float = parameter(
         2e-3, "m", "gap g₀ at which a quarter of F₀ is left", above=0, plausible=(1e-6, 0.1)
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def force(self, climber: Climber) -> float:
         """See `Adhesion`."""
@@ -121,7 +115,7 @@ def with_its_seal(climber: Climber, adhesion: str) -> Climber:
     return climber if has_seal else replace(climber, seal_friction_coefficient=0.0)
 
 
-@dataclass(frozen=True)
+@parameters
 class Grip:
     """Wheels, seal and centre of mass on the wall, by which slipping and tipping are warned of."""
 
@@ -148,9 +142,6 @@ class Grip:
         at_least=0,
         plausible=(0.01, 1),
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,7 +189,7 @@ class Attachment:
         return _margin(holding, climber.mass * abs(along_wall) * self.grip.centre_height)
 
 
-@dataclass(frozen=True)
+@parameters
 class Alarm:
     """Margins of slipping and tipping below which diagnostics warn; see `Attachment`."""
 
@@ -206,9 +197,6 @@ class Alarm:
     error_margin: float = parameter(
         1.0, "", "margin below which it is an error", at_least=0, runtime=True
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def level(self, margin: float) -> int:
         """Diagnostic level of a margin: 0 fine, 1 warning, 2 error."""

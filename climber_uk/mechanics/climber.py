@@ -6,7 +6,6 @@ takes a `Motion` or single torques works on components: floats, or arrays (N,) o
 """
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,13 +14,13 @@ import numpy as np
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.elementary import clipped, cos, everywhere, select, sin
 from climber_uk.mechanics.quantities import Bounds, Motion, State, Torques
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 GRAVITY = 9.81  # [m/s²]
 DEGREE = math.pi / 180  # [rad]
 
 
-@dataclass(frozen=True)
+@parameters
 class Climber:
     """Parameters of a two-wheel suction climber; the defaults are the paper's.
 
@@ -78,9 +77,6 @@ class Climber:
         plausible=(1, 1000),
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
     @cached_property
     def mass_matrix(self) -> Array:
         """M = diag(m, m, J), (3, 3)."""
@@ -108,6 +104,11 @@ class Climber:
     def inertial(self) -> tuple[float, float, float, float]:
         """m [kg], J [kg m²], f [N] and m g_t [N]: the numbers of (11) and (15)."""
         return self.mass, self.yaw_inertia, self.seal_friction, self.weight_along_wall
+
+    def lateral_reaction(self, motion: Motion) -> Any:
+        """What the wheels take to the left [N]: m v ω + w cosθ."""
+        mass, _, _, weight = self.inertial
+        return mass * motion.speed * motion.yaw_rate + weight * motion.cosine
 
     @cached_property
     def leverage(self) -> tuple[float, float]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from climber_uk.mechanics.adhesion import Attachment
+from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.friction import Coulomb, Friction
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 
@@ -29,7 +30,7 @@ class Wheeled(Locomotion):
         return 0.0 * load
 
 
-@dataclass(frozen=True)
+@parameters
 class Tracked(Locomotion):
     """Tracks, which scrub sideways as the climber yaws: μ_t N L / 4, the load spread evenly."""
 
@@ -38,12 +39,14 @@ class Tracked(Locomotion):
     )
     length: float = parameter(0.3, "m", "length L of the tracks that is on the wall", above=0)
 
-    def __post_init__(self) -> None:
-        check(self)
-
     def turning_resistance(self, load: Any) -> Any:
         """See `Locomotion`."""
         return self.scrub_friction_coefficient * load * self.length / 4
+
+
+def is_pulled_off(climber: Climber, normal_force: Any) -> Any:
+    """Whether a force onto the wall (...) [N] is none."""
+    return normal_force < 1e-9 * climber.mass * GRAVITY  # cos(90°) is 6e-17
 
 
 LOCOMOTION = Variants[type[Locomotion]]({"wheeled": Wheeled, "tracked": Tracked}, "locomotion")

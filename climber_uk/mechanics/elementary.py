@@ -30,6 +30,11 @@ exp = _either(math.exp, np.exp)
 sign = _either(lambda x: math.copysign(1.0, x) if x else 0.0, np.sign)
 
 
+def arctan2(y: Any, x: Any) -> Any:
+    """Angle of (x, y), in [-π, π]."""
+    return math.atan2(y, x) if isinstance(y, float) else np.arctan2(y, x)
+
+
 def with_sign_of(size: Any, of: Any) -> Any:
     """`size` (>= 0) with the sign of `of`; where all of an array are positive, `size` itself."""
     if isinstance(of, float):

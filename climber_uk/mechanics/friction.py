@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from climber_uk.mechanics.elementary import exp
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 
@@ -87,14 +87,11 @@ class Coulomb(Friction):
         return 0.0 * f
 
 
-@dataclass(frozen=True)
+@parameters
 class Viscous(Friction):
     """Viscous friction, in proportion to the speed, as of a lubricated seal: no stiction."""
 
     speed: float = parameter(0.1, "m/s", "at which it equals Coulomb's friction", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def stiction(self, f: Any) -> Any:
         """See `Friction`."""
@@ -109,16 +106,13 @@ class Viscous(Friction):
         return f / self.speed
 
 
-@dataclass(frozen=True)
+@parameters
 class Stribeck(Friction):
     """Stribeck friction: highest at rest, lower in motion, and growing again with speed."""
 
     ratio: float = parameter(1.5, "", "of stiction to Coulomb's friction", at_least=1)
     speed: float = parameter(0.02, "m/s", "v_s, at which most of the surplus is gone", above=0)
     viscous: float = parameter(0.0, "s/m", "κ, viscous part of f per speed", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def stiction(self, f: Any) -> Any:
         """See `Friction`."""
@@ -142,7 +136,7 @@ class Stribeck(Friction):
         return f * self.viscous
 
 
-@dataclass(frozen=True)
+@parameters
 class LuGre(Bristles, Stribeck):
     """Bristles that bend before they slide: hysteresis, pre-sliding, and no edge at rest."""
 

@@ -68,12 +68,7 @@ class Preview:
         way[:, 2] = np.mod(way[:, 2] + np.pi, 2 * np.pi) - np.pi
         v, v_end = self.velocity[:-1] * h, self.velocity[1:] * h
         a, a_end = self.acceleration[:-1] * h**2, self.acceleration[1:] * h**2
-        # what is left to reach at the end by u³, u⁴ and u⁵
-        p_left, v_left, a_left = way - v - a / 2, v_end - v - a, a_end - a
-        c_3 = 10 * p_left - 4 * v_left + a_left / 2
-        c_4 = -15 * p_left + 7 * v_left - a_left
-        c_5 = 6 * p_left - 3 * v_left + a_left / 2
-        by_share = np.stack([self.pose[:-1], v, a / 2, c_3, c_4, c_5], axis=2)  # of h
+        by_share = np.stack([self.pose[:-1], v, a / 2, *quintic(way, v, a, v_end, a_end)], axis=2)
         return self.times.tolist(), (by_share / h[..., None] ** np.arange(6)).tolist()
 
     def at(self, time: int) -> Reference | None:
@@ -167,4 +162,17 @@ def joined(previews: Iterable[Preview]) -> Preview:
         pose=np.array([preview.pose[i] for preview, i in chosen]),
         velocity=np.array([preview.velocity[i] for preview, i in chosen]),
         acceleration=np.array([preview.acceleration[i] for preview, i in chosen]),
+    )
+
+
+def quintic(way: Array, v: Array, a: Array, v_end: Array, a_end: Array) -> tuple[Array, ...]:
+    """Coefficients of u³, u⁴, u⁵ of a Hermite piece, u from 0 to 1, that goes a `way`.
+
+    Velocities and accelerations at both ends, (...), are by u.
+    """
+    p_left, v_left, a_left = way - v - a / 2, v_end - v - a, a_end - a  # without these three
+    return (
+        10 * p_left - 4 * v_left + a_left / 2,
+        -15 * p_left + 7 * v_left - a_left,
+        6 * p_left - 3 * v_left + a_left / 2,
     )

@@ -5,14 +5,13 @@ A new shape is one class, a `Shape` with `length`, `closed` and `derivatives`, a
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.waypoints import Waypoints
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 
@@ -51,7 +50,7 @@ class Shape(Protocol):
         return np.linspace(0.0, self.length, 4001)
 
 
-@dataclass(frozen=True)
+@parameters
 class Ellipse(Shape):
     """p = (a sin s, b cos s): from the top, clockwise; the paper's path (21)."""
 
@@ -61,9 +60,6 @@ class Ellipse(Shape):
     closed: ClassVar[bool] = True
     length: ClassVar[float] = 2 * math.pi
 
-    def __post_init__(self) -> None:
-        check(self)
-
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
         a, b = self.semi_axis_x, self.semi_axis_y
@@ -72,7 +68,7 @@ class Ellipse(Shape):
         return -p_2, p_1, p_2, -p_1
 
 
-@dataclass(frozen=True)
+@parameters
 class Circle(Shape):
     """p = r (cos s, sin s): anticlockwise."""
 
@@ -81,9 +77,6 @@ class Circle(Shape):
     closed: ClassVar[bool] = True
     length: ClassVar[float] = 2 * math.pi
 
-    def __post_init__(self) -> None:
-        check(self)
-
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
         p = self.radius * _points(np.cos(s), np.sin(s))
@@ -91,7 +84,7 @@ class Circle(Shape):
         return p, p_1, -p, -p_1
 
 
-@dataclass(frozen=True)
+@parameters
 class Lemniscate(Shape):
     """p = (a sin s, b sin 2s): a figure of eight through its centre."""
 
@@ -100,9 +93,6 @@ class Lemniscate(Shape):
 
     closed: ClassVar[bool] = True
     length: ClassVar[float] = 2 * math.pi
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
@@ -115,7 +105,7 @@ class Lemniscate(Shape):
         )
 
 
-@dataclass(frozen=True)
+@parameters
 class Line(Shape):
     """p = s (cos α, sin α): a straight line from the origin."""
 
@@ -124,9 +114,6 @@ class Line(Shape):
 
     closed: ClassVar[bool] = False
 
-    def __post_init__(self) -> None:
-        check(self)
-
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
         unit = np.array([math.cos(self.direction), math.sin(self.direction)])
@@ -134,7 +121,7 @@ class Line(Shape):
         return p, unit + 0 * p, 0 * p, 0 * p
 
 
-@dataclass(frozen=True)
+@parameters
 class SineWave(Shape):
     """p = (s, A sin(2π s/λ)): along x, swinging in y."""
 
@@ -143,9 +130,6 @@ class SineWave(Shape):
     wavelength: float = parameter(1.0, "m", "wavelength λ along x", above=0)
 
     closed: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""

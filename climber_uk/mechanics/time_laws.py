@@ -13,7 +13,7 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.shapes import Shape
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 
@@ -44,15 +44,12 @@ def _rate() -> float:
     return rate
 
 
-@dataclass(frozen=True)
+@parameters
 class ConstantRate(TimeLaw):
     """s = rate · t: already moving at the start, and without an end."""
 
     rate: float = _rate()
     stops: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
@@ -68,7 +65,7 @@ class ConstantRate(TimeLaw):
         return self.rate * time, self.rate + zero, zero, zero
 
 
-@dataclass(frozen=True)
+@parameters
 class RestToRest(TimeLaw):
     """From rest up to `rate`, along, and back to rest, smooth to the jerk; once or repeatedly.
 
@@ -82,9 +79,6 @@ class RestToRest(TimeLaw):
     laps: int = parameter(1, "", "rounds of a closed shape without a stop", at_least=1)
     runs: int = parameter(1, "", "runs from rest to rest; 0: without end", at_least=0)
     pause: float = parameter(1.0, "s", "rest between two runs", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""

@@ -1,16 +1,15 @@
 """The trajectory that parameters describe, for nodes and campaigns."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from climber_uk.mechanics.shapes import SHAPES
 from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
-@dataclass(frozen=True)
+@parameters
 class TrajectoryParameters:
     """The trajectory: a shape, a time law, and where they begin."""
 
@@ -19,9 +18,6 @@ class TrajectoryParameters:
     reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
     origin_x: float = parameter(0.0, "m", "x of the shape's origin")
     origin_y: float = parameter(0.0, "m", "y of the shape's origin")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 TYPES: list[tuple[type, str]] = [

@@ -9,12 +9,11 @@ entry point `climber_uk.walls` of another package.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY
 from climber_uk.mechanics.elementary import cos, sin
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 
@@ -30,7 +29,7 @@ class Wall(Protocol):
         """g_n (...) [m/s²] into the wall, with the centripetal part at ẏ = `y_speed` [m/s]."""
 
 
-@dataclass(frozen=True)
+@parameters
 class Plane(Wall):
     """A flat wall; y points uphill unless it is tilted."""
 
@@ -39,9 +38,6 @@ class Plane(Wall):
     )
 
     flat: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
@@ -53,7 +49,7 @@ class Plane(Wall):
         return GRAVITY * cos(inclination * DEGREE) + 0.0 * y
 
 
-@dataclass(frozen=True)
+@parameters
 class Cylinder(Wall):
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
@@ -62,7 +58,6 @@ class Cylinder(Wall):
     flat: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        check(self)
         if self.radius == 0:
             raise ValueError("radius=0.0 must not be 0 [m]")
 

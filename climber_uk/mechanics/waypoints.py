@@ -11,12 +11,12 @@ from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.rounding import Rounded, rounded
 from climber_uk.mechanics.slowing import Slowed, SpeedLimits, slowed
 from climber_uk.mechanics.waypoint_file import read_waypoints
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 STATIONS = 2001
 
 
-@dataclass(frozen=True)
+@parameters
 class Waypoints:
     """A path straight from each point of a text file to the next, its corners rounded.
 
@@ -41,7 +41,6 @@ class Waypoints:
     )
 
     def __post_init__(self) -> None:
-        check(self)
         _ = self._rounded  # a bad file is found now, not when the climber starts
 
     @cached_property

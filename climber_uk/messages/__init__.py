@@ -2,6 +2,6 @@
 
 `reading` and `reading_reference` make data of messages, and check them; `writing` and `drawing`
 make messages of data. Wheels are (right, left) in data and (left, right) in messages: here their
-order changes. `names` has the frames and joints, `cdr_layout` the bytes of a message as one row of
-numbers.
+order changes. Nodes and topics are named in `topics`, frames and joints in `names`; `cdr_layout`
+makes the bytes of a message one row of numbers.
 """

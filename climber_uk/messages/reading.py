@@ -5,11 +5,12 @@ Stamps are integers in nanoseconds. Messages have wheels by name; arrays have (r
 """
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.elementary import arctan2, sqrt
 from climber_uk.mechanics.quantities import State, Torques
 
 if TYPE_CHECKING:
@@ -97,11 +98,18 @@ def check_size(**vectors: "Array | list[list[float]]") -> None:
 def heading_of(orientation: "Quaternion") -> float:
     """Heading in [-π, π] [rad]; `ValueError` unless it is a unit quaternion (nearly) about z."""
     x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
-    norm, tilted = math.hypot(x, y, z, w), math.hypot(x, y)
-    if not (abs(norm - 1) <= NORM_TOLERANCE and tilted < MOST_TILT * norm):
+    heading, norm, tilted, is_unit, is_planar = turn_about_z(x, y, z, w)
+    if not (is_unit and is_planar):
         raise ValueError(
             f"orientation ({x}, {y}, {z}, {w}) must be a unit turn about z: "
             f"norm {norm:.4g} from {1 - NORM_TOLERANCE} to {1 + NORM_TOLERANCE}, "
             f"hypot(x, y) {tilted:.4g} < {MOST_TILT}"
         )
-    return math.atan2(2 * w * z, w * w - z * z)
+    return float(heading)
+
+
+def turn_about_z(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Heading of a quaternion, or of many (n,); its norm, its tilt, and whether both are fit."""
+    norm, tilted = sqrt(x * x + y * y + z * z + w * w), sqrt(x * x + y * y)
+    is_unit, is_planar = abs(norm - 1) <= NORM_TOLERANCE, tilted < MOST_TILT * norm
+    return arctan2(2 * w * z, w * w - z * z), norm, tilted, is_unit, is_planar

@@ -5,7 +5,6 @@ All is drawn in the wall's frame, at the pose of the odometry: no /tf is needed.
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from math import dist
 from typing import Any, TypeVar
@@ -19,17 +18,16 @@ from visualization_msgs.msg import MarkerArray
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, REFERENCE, TORQUES
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.running import BEST_EFFORT, PUBLISH_PERIOD, RELIABLE, ClimberNode, Throttle, run
 
 T = TypeVar("T")
-REFERENCE, TORQUES = "reference", "wheel_torques"
-FORCE, MARGINS = "uk_torque_controller/constraint_force", "uk_torque_controller/margins"
 TOPICS = {
     REFERENCE: MultiDOFJointTrajectory,
     TORQUES: JointState,
     FORCE: WrenchStamped,
-    MARGINS: Vector3Stamped,
+    MARGINS[1]: Vector3Stamped,
 }
 AGE = SECOND  # [ns] of a message, above which it is not drawn
 ABOVE = 0.05  # [m] off the wall: arrows hide nothing there, and nothing hides them
@@ -37,7 +35,7 @@ ORANGE, BLUE = (1.0, 0.6, 0.1, 1.0), (0.2, 0.6, 1.0, 1.0)
 GREY, VIOLET = (0.6, 0.6, 0.6, 1.0), (0.6, 0.4, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
+@parameters
 class MarkerOptions:
     """Sizes in the drawing."""
 
@@ -49,9 +47,6 @@ class MarkerOptions:
     force_scale: float = parameter(0.005, "m/N", "length of an arrow by its force", above=0)
     way_spacing: float = parameter(0.05, "m", "distance between two points of the trace", above=0)
     way_points: int = parameter(400, "", "points of the trace that are kept", above=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Markers(ClimberNode):
@@ -66,7 +61,7 @@ class Markers(ClimberNode):
         self.trace: deque[Place] = deque(maxlen=self.options.way_points)
         self.is_due, self.last_stamp = Throttle(PUBLISH_PERIOD), 0
         self.markers = self.publisher(MarkerArray, "markers", RELIABLE)
-        self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
+        self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT)
         for topic, kind in TOPICS.items():
             self.subscription(kind, topic, partial(self.latest.__setitem__, topic), BEST_EFFORT)
 
@@ -81,7 +76,7 @@ class Markers(ClimberNode):
         if not self.is_due(stamp):
             return
         odom_frame, base_frame = self.names.odom_frame, self.names.base_frame
-        state = self.read("odom", message, lambda m: reading.state(m, odom_frame, base_frame))
+        state = self.read(ODOMETRY, message, lambda m: reading.state(m, odom_frame, base_frame))
         if state is not None:
             if stamp < self.last_stamp:
                 self.trace.clear()
@@ -109,7 +104,7 @@ class Markers(ClimberNode):
         """Drawing at `stamp` [ns] of a climber at `pose` (3,)."""
         prefix = self.get_namespace().strip("/")
         drawing = Drawing(stamp, self.names.odom_frame, f"{prefix}/" if prefix else "")
-        margin = self.read_latest(MARGINS, stamp, lambda message: float(message.vector.x))
+        margin = self.read_latest(MARGINS[1], stamp, lambda message: float(message.vector.x))
         colour = GREY if margin is None else colour_of(margin)
         drawing.climber("climber", pose, self.options.half_track, self.options.wheel_radius, colour)
         self.draw_trace(drawing, place(pose, 0.0, 0.0, WALL))

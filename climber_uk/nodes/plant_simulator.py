@@ -10,6 +10,7 @@ from std_srvs.srv import SetBool, Trigger
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.adhesion import Alarm
 from climber_uk.messages import reading
+from climber_uk.messages.topics import JOINTS, ODOMETRY, PLANT, PUSH, REFERENCE, TORQUES
 from climber_uk.ros import plant_parts
 from climber_uk.ros.margins import Margins
 from climber_uk.ros.plant_time import PlantTime
@@ -21,7 +22,7 @@ from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import UNPUSHED, Physics, Push, SimulatedRobot
 
-AWAITED = "odom", "joint_states", "wheel_torques", "reference"  # that `wait_for` subscribes
+AWAITED = ODOMETRY, JOINTS, TORQUES, REFERENCE  # that `wait_for` subscribes
 
 
 class PlantSimulator(ClimberNode):
@@ -31,7 +32,7 @@ class PlantSimulator(ClimberNode):
     """
 
     def __init__(self, namespace: str = "", time: PlantTime | None = None) -> None:
-        super().__init__("plant_simulator", namespace)
+        super().__init__(PLANT, namespace)
         plant_parts.declare(self.parameters)
         self.parameters.refuse_unknown("the paper's climber, at rest")
         self.options = self.parameters.read(SimulationOptions)
@@ -41,12 +42,12 @@ class PlantSimulator(ClimberNode):
         self.place_at_start()
 
         self.topics = PlantTopics(self)
-        self.subscription(JointState, "wheel_torques", self.on_torques)
-        self.subscription(WrenchStamped, "push", self.on_push)
+        self.subscription(JointState, TORQUES, self.on_torques)
+        self.subscription(WrenchStamped, PUSH, self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
         self.create_service(SetBool, "~/pause", self.on_pause)
         self.create_service(Trigger, "~/step", self.on_step)
-        self.start_diagnostics(self.values, alone_on=("odom", "wheel_torques"))
+        self.start_diagnostics(self.values, alone_on=(ODOMETRY, TORQUES))
         self.time.publish([self])
 
     def on_parameters(self) -> None:
@@ -112,9 +113,9 @@ class PlantSimulator(ClimberNode):
         try:
             wrench = reading.wrench(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
-            self.report("push", "refused", str(error))
+            self.report(PUSH, "refused", str(error))
             return
-        self.report("push", "")
+        self.report(PUSH, "")
         begin = reading.nanoseconds(message.header.stamp) or self.time.stamp
         self.pushes.add(begin, Push(*wrench))
 
@@ -125,9 +126,9 @@ class PlantSimulator(ClimberNode):
             torques = reading.wheel_torques(
                 message, names.left_wheel_joint, names.right_wheel_joint
             )
-            self.report("wheel_torques", "")
+            self.report(TORQUES, "")
         except ValueError as error:
-            self.report("wheel_torques", "refused, zero torque instead", str(error))
+            self.report(TORQUES, "refused, zero torque instead", str(error))
             torques = np.zeros(2)
         limit = self.robot.plant.climber.max_wheel_torque
         torques = np.clip(torques, -limit, limit)

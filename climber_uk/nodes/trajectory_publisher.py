@@ -6,7 +6,7 @@ controller publishes it, the clock leads.
 """
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nav_msgs.msg import Odometry, Path
 from rclpy.subscription import Subscription
@@ -19,7 +19,8 @@ from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.messages.topics import ODOMETRY, PLANNER, REFERENCE, REFERENCE_PATH, REFERENCE_TIME
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
 
 STANDSTILL = 0.2  # [s] of wall-clock time without a change, after which a clock stands still
@@ -27,7 +28,7 @@ ODOMETRY_AGE = 1.0  # [s] of an odometry, above which it does not start a trajec
 CLOCK_STEP = SECOND // 5  # [ns] back, from which on a clock was reset
 
 
-@dataclass(frozen=True)
+@parameters
 class PublisherOptions:
     """When a trajectory starts and stops, and how it is published."""
 
@@ -39,7 +40,6 @@ class PublisherOptions:
     stop_time: float = parameter(1.0, "s", "time from the full rate to rest after ~/stop", above=0)
 
     def __post_init__(self) -> None:
-        check(self)
         if self.preview < 2 * self.publish_period:
             raise ValueError(
                 f"preview={self.preview} must be >= 2 publish_period={self.publish_period} [s]"
@@ -50,7 +50,7 @@ class TrajectoryPublisher(ClimberNode):
     """Starts a trajectory at an odometry's stamp, and publishes it as far as it is followed."""
 
     def __init__(self) -> None:
-        super().__init__("trajectory_publisher")
+        super().__init__(PLANNER)
         for kind, prefix in [*TYPES, (PublisherOptions, "")]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
@@ -63,9 +63,9 @@ class TrajectoryPublisher(ClimberNode):
         self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
         self.next_point = 0  # every point is computed once: previews agree to the last bit
 
-        self.reference = self.publisher(MultiDOFJointTrajectory, "reference")
-        self.path = self.publisher(Path, "reference_path", LATCHED)
-        self.subscription(TimeReference, "reference_time", self.on_reference_time)
+        self.reference = self.publisher(MultiDOFJointTrajectory, REFERENCE)
+        self.path = self.publisher(Path, REFERENCE_PATH, LATCHED)
+        self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_timer(self.options.publish_period, self.publish)
@@ -102,7 +102,7 @@ class TrajectoryPublisher(ClimberNode):
     def wait_for_odometry(self) -> None:
         """Subscribe the odometry, to start at the next one."""
         if self.odometry is None:
-            self.odometry = self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT)
+            self.odometry = self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT)
 
     def on_odometry(self, message: Odometry) -> None:
         """Start the trajectory `start_delay` after the stamp of `message`."""
@@ -146,7 +146,7 @@ class TrajectoryPublisher(ClimberNode):
         assert self.start is not None
         if self.followed is not None:
             return self.followed
-        if self.count_publishers("reference_time"):
+        if self.count_publishers(REFERENCE_TIME):
             return self.start
         return max(self.start, self.get_clock().now().nanoseconds)
 

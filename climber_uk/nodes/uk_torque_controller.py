@@ -4,7 +4,6 @@ Inactive, it answers with its safe output: a climber on a wall needs torques at 
 """
 
 import math
-from dataclasses import dataclass
 
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
@@ -25,7 +24,18 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.reference import tracking_error
 from climber_uk.messages import reading, reading_reference, writing
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.messages.topics import (
+    CONTROLLER,
+    FORCE,
+    ODOMETRY,
+    PARAMETERS,
+    PRESSURE,
+    REFERENCE,
+    REFERENCE_TIME,
+    TORQUES,
+    private,
+)
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.managed import ManagedNode
 from climber_uk.ros.margins import Margins
 from climber_uk.ros.running import (
@@ -41,7 +51,7 @@ from climber_uk.ros.running import (
 LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points, which take a quarter of a second to read
 
 
-@dataclass(frozen=True)
+@parameters
 class NodeOptions:
     """Torques for effort controllers of ros2_control."""
 
@@ -53,15 +63,12 @@ class NodeOptions:
         choices=("left_right", "right_left"),
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class UkTorqueController(ManagedNode):
     """Passes messages to a `Controller`, and its answers on."""
 
     def __init__(self) -> None:
-        super().__init__("uk_torque_controller")
+        super().__init__(CONTROLLER)
         parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
         for kind, prefix in [*KINDS, (NodeOptions, ""), (Grip, ""), (Alarm, ""), *parts]:
             self.parameters.declare(kind, prefix)
@@ -76,19 +83,19 @@ class UkTorqueController(ManagedNode):
         self.is_position_due = Throttle(PUBLISH_PERIOD)
         self.last_mode = Mode.WAITING
 
-        self.torques = self.publisher(JointState, "wheel_torques")
+        self.torques = self.publisher(JointState, TORQUES)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         self.error = self.publisher(Vector3Stamped, "~/tracking_error")
-        self.force = self.publisher(WrenchStamped, "~/constraint_force")
+        self.force = self.publisher(WrenchStamped, private(FORCE))
         self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
-        self.reference_time = self.publisher(TimeReference, "reference_time")
-        self.parameter_values = self.publisher(ParameterEvent, "~/parameters", LATCHED)
+        self.reference_time = self.publisher(TimeReference, REFERENCE_TIME)
+        self.parameter_values = self.publisher(ParameterEvent, private(PARAMETERS), LATCHED)
         self.publish_parameters()
         safety = self.controller.safety
         shortest = min(safety.odometry_timeout, safety.reference_timeout)
         # on the wall clock: one in simulated time would not notice that there is no clock
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
-        self.start_diagnostics(self.values, alone_on=("odom", "reference", "wheel_torques"))
+        self.start_diagnostics(self.values, alone_on=(ODOMETRY, REFERENCE, TORQUES))
         self.start_life()
 
     def summary(self) -> str:
@@ -108,11 +115,11 @@ class UkTorqueController(ManagedNode):
         self.controller = build_controller(self.parameters, self.pressure)
         self.controller.enable(False)
         return [
-            self.subscription(Odometry, "odom", self.on_odometry, BEST_EFFORT),
+            self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT),
             self.subscription(
-                MultiDOFJointTrajectory, "reference", self.on_reference, RELIABLE, raw=True
+                MultiDOFJointTrajectory, REFERENCE, self.on_reference, RELIABLE, raw=True
             ),
-            self.subscription(FluidPressure, "suction_pressure", self.on_pressure, BEST_EFFORT),
+            self.subscription(FluidPressure, PRESSURE, self.on_pressure, BEST_EFFORT),
         ]
 
     def act(self, active: bool) -> None:
@@ -164,9 +171,9 @@ class UkTorqueController(ManagedNode):
             preview = reading_reference.preview(message, self.names.odom_frame)
             preview.check_heading()
         except ValueError as error:
-            self.report("reference", "refused", str(error))
+            self.report(REFERENCE, "refused", str(error))
             return
-        self.report("reference", "")
+        self.report(REFERENCE, "")
         self.publish(self.controller.on_reference(self.now(), preview))
 
     def on_pressure(self, message: FluidPressure) -> None:
@@ -174,9 +181,9 @@ class UkTorqueController(ManagedNode):
         try:
             pressure = reading.pressure(message)
         except ValueError as error:
-            self.report("suction_pressure", "refused", str(error))
+            self.report(PRESSURE, "refused", str(error))
             return
-        self.report("suction_pressure", "")
+        self.report(PRESSURE, "")
         if pressure != self.pressure:
             self.pressure = pressure
             self.retune()

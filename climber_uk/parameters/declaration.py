@@ -3,8 +3,9 @@
 import dataclasses
 import math
 from collections.abc import Collection, Mapping
+from functools import partial
 from numbers import Real
-from typing import Any
+from typing import Any, dataclass_transform
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def parameter(
     `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
     range `plausible` is doubted, not refused; a name that it had `formerly` is still taken;
     `runtime` marks what a running node may change, `is_path` the name of a file, which in a
-    parameter file is relative to that. Call `check(self)` in the dataclass's `__post_init__`.
+    parameter file is relative to that. `parameters` makes the class.
     """
     return dataclasses.field(
         default=default,
@@ -45,6 +46,22 @@ def parameter(
             "is_path": is_path,
         },
     )
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def parameters(cls: type | None = None, *, slots: bool = False) -> Any:
+    """Frozen dataclass that checks its `parameter` fields, before its own `__post_init__`."""
+    if cls is None:
+        return partial(parameters, slots=slots)
+    and_then = vars(cls).get("__post_init__")
+
+    def check_it(self: Any) -> None:
+        check(self)
+        if and_then:
+            and_then(self)
+
+    cls.__post_init__ = check_it  # type: ignore[attr-defined]
+    return dataclasses.dataclass(frozen=True, slots=slots)(cls)
 
 
 def check(instance: Any) -> None:

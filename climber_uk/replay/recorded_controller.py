@@ -3,23 +3,34 @@
 Times and stamps are integers in nanoseconds.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
-from climber_uk.bags.joints import wheel_names
-from climber_uk.bags.publishing_order import read_published
-from climber_uk.bags.topics import TORQUES, types_of
+from climber_uk.bags.bag import Bag
+from climber_uk.bags.collecting import collect
+from climber_uk.bags.events import Event, changes
+from climber_uk.bags.joints import of_both, wheel_names
+from climber_uk.bags.run_reader import RunReader
+from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.safety import Mode
-from climber_uk.mechanics import Array
-from climber_uk.messages import reading
+from climber_uk.mechanics import Array, Stamps
+from climber_uk.messages.topics import (
+    CLOCK,
+    CONTROLLER,
+    DIAGNOSTICS,
+    ODOMETRY,
+    PARAMETERS,
+    PRESSURE,
+    REFERENCE,
+    TORQUES,
+)
 
-NODE = "uk_torque_controller"
-PARAMETERS = f"{NODE}/parameters"
-CLOCK, DIAGNOSTICS = "/clock", "/diagnostics"
+# topics of what the controller was told, and of what it told
+TOPICS = ODOMETRY, REFERENCE, PRESSURE, TORQUES, PARAMETERS, DIAGNOSTICS
 Modes = list[tuple[int, str]]  # each with the time of the node's clock from which on it was
 
 
@@ -34,65 +45,55 @@ class Setting:
 class RecordedController:
     """The controller in a namespace, '' or '/name'.
 
-    Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
+    `is_published` says whether the bag tells when messages were published: those are the times
+    then, not the log times. Raises `ValueError` naming the bag and what it lacks.
     """
 
-    def __init__(self, bag: Path, namespace: str, file: Mapping[str, Any] | None = None) -> None:
-        self.node = f"{namespace}/{NODE}"
-        self.torques: dict[int, Array] = {}  # right, left [N m], by the stamp that they answer
-        # new ones, with when the first torques under them were published
-        self.settings: list[tuple[int, Setting]] = []
-        self.modes: Modes = []
-        self.parameters: Mapping[str, Any] | None = None  # those that were told first
-        self.simulated = False  # whether there was a /clock
-        self.published: dict[int, int] = {}  # when first, by that stamp
-        self._efforts: list[tuple[int, dict[str, float]]] = []  # stamp, and torques by the joint
-        self._setting = self._set_before = Setting()
+    def __init__(
+        self, bag: Bag, namespace: str, is_published: bool, file: Mapping[str, Any] | None = None
+    ) -> None:
         topic = f"{namespace}/{TORQUES}"
-        takers = {
-            topic: self._on_torques,
-            f"{namespace}/{PARAMETERS}": self._on_parameters,
-            CLOCK: self._on_clock,
-            DIAGNOSTICS: self._on_diagnostics,
-        }
-        for name, at, message in read_published(bag, types_of(takers)):
-            takers[name](at, message)
-        if not self._efforts:
-            raise ValueError(f"{bag} has no message on {topic}")
+        collected, told = collect(bag, Topics(), [namespace], TOPICS, is_published)
+        found = collected[namespace]
+        if not (efforts := found.joints[TORQUES]):
+            raise ValueError(f"{bag.path} has no message on {topic}")
+        RunReader(bag, Topics(), namespace).check_one_run(found)
+        # those that were told first
+        self.parameters: Mapping[str, Any] | None = found.first_parameters or None
+        # whether there was a /clock
+        self.simulated = any(told.msgtype == TYPES[CLOCK] for told, *_ in bag.recorded([CLOCK]))
+        stamps = np.concatenate([part.stamps for part in efforts])
+        arrivals = np.concatenate([part.arrivals for part in efforts])
+        order = np.argsort(arrivals, kind="stable")
+        stamps, arrivals = stamps[order], arrivals[order]
+        # when the torques that answer a stamp were published first
+        self.published = dict(zip(stamps[::-1].tolist(), arrivals[::-1].tolist(), strict=True))
         try:
-            self._take_torques(file or self.parameters or {})
+            joints = {name for part in efforts for name in part.names}
+            torques = of_both(efforts, wheel_names(joints, file or self.parameters or {}))
         except ValueError as error:
-            raise ValueError(f"{bag}: {topic}: {error}") from None
+            raise ValueError(f"{bag.path}: {topic}: {error}") from None
+        # right, left [N m], by the stamp that they answer
+        self.torques: dict[int, Array] = dict(
+            zip(torques.stamps.tolist(), torques.values, strict=True)
+        )
+        modes = [event for event in told if event.kind == "mode" and event.text]
+        modes = [event for event in modes if event.node == f"{namespace}/{CONTROLLER}"]
+        news = [(event.stamp or 0, event.text) for event in changes(modes)]
+        self.modes: Modes = news
+        self.settings = _settings(found.parameters, modes, arrivals)
 
-    def _on_torques(self, at: int, message: Any) -> None:
-        stamp = reading.nanoseconds(message.header.stamp)
-        self._efforts.append((stamp, dict(zip(message.name, message.effort, strict=False))))
-        self.published.setdefault(stamp, at)
-        if self._setting != self._set_before:
-            self.settings.append((at, self._setting))
-            self._set_before = self._setting
 
-    def _take_torques(self, parameters: Mapping[str, Any]) -> None:
-        """Take the two wheels' torques; raises `ValueError` if that cannot be."""
-        joints = {joint for _, efforts in self._efforts for joint in efforts}
-        wheels = wheel_names(joints, parameters)
-        for stamp, efforts in self._efforts:
-            torques = np.array([efforts.get(wheel, np.nan) for wheel in wheels])
-            if np.isfinite(torques).all():  # what is no torque cannot be compared
-                self.torques.setdefault(stamp, torques)
-
-    def _on_parameters(self, _: int, message: Any) -> None:
-        told = reading.parameters(message)
-        self._setting = replace(self._setting, parameters=told)
-        self.parameters = self.parameters or told
-
-    def _on_clock(self, *_: Any) -> None:
-        self.simulated = True
-
-    def _on_diagnostics(self, _: int, message: Any) -> None:
-        for status in message.status:
-            told = {value.key: value.value for value in status.values}
-            if status.name == self.node and (mode := told.get("mode")):
-                self._setting = replace(self._setting, enabled=mode != Mode.DISABLED.value)
-                if not self.modes or mode != self.modes[-1][1]:
-                    self.modes.append((reading.nanoseconds(message.header.stamp), mode))
+def _settings(
+    parameters: Iterable[tuple[int, dict[str, Any]]], modes: Iterable[Event], torques: Stamps
+) -> list[tuple[int, Setting]]:
+    """New ones, with when the first torques under them were published, of `torques` (n,) [ns]."""
+    told: list[tuple[int, dict[str, Any]]] = [(at, {"parameters": new}) for at, new in parameters]
+    told += [(mode.arrival, {"enabled": mode.text != Mode.DISABLED.value}) for mode in modes]
+    setting, found = Setting(), dict[int, Setting]()
+    for at, change in sorted(told, key=itemgetter(0)):
+        setting = replace(setting, **change)
+        i = np.searchsorted(torques, at, "right")
+        found |= dict.fromkeys(torques[i : i + 1].tolist(), setting)
+    pairs = zip(found.items(), [Setting(), *found.values()], strict=False)
+    return [new for new, before in pairs if new[1] != before]

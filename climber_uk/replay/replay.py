@@ -7,23 +7,23 @@ moved the climber: every answer is one to the run as it was, whatever the parame
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
+from climber_uk.bags.bag import Bag
 from climber_uk.bags.publishing_order import read_published
-from climber_uk.bags.topics import ODOMETRY, REFERENCE, TORQUES, types_of
+from climber_uk.bags.topics import types_of
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import Torques
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.names import Names
+from climber_uk.messages.topics import CLOCK, ODOMETRY, PRESSURE, REFERENCE, TORQUES
 from climber_uk.parameters.parameter_file import Values
-from climber_uk.replay.recorded_controller import CLOCK, Modes, RecordedController
+from climber_uk.replay.recorded_controller import Modes, RecordedController
 
 SHORTEST_LOOK = SECOND // 1000  # [ns] between two looks at whether inputs have stopped
 MOST_LOOKS = 10_000  # at inputs that have stopped: by then nothing changes any more
-PRESSURE = "suction_pressure"
 DEFAULTS = {
     prefix + field.name: field.default
     for kind, prefix in [*KINDS, (Names, "")]
@@ -62,8 +62,11 @@ class Replay:
         }
         return {name: (was, now) for name, (was, now) in pairs.items() if was != now}
 
-    def run(self, bag: Path, namespace: str) -> None:
-        """Answer all of a bag; raises as `read_controller` does."""
+    def run(self, bag: Bag, namespace: str, is_published: bool) -> None:
+        """Answer all of a bag; raises as `RecordedController` does.
+
+        Messages, not arrays: one by one they go through the reading that the node has.
+        """
         odometry, reference = f"{namespace}/{ODOMETRY}", f"{namespace}/{REFERENCE}"
         missing = {odometry, reference}
         takers = {
@@ -73,13 +76,13 @@ class Replay:
             f"{namespace}/{PRESSURE}": self.on_pressure,
             f"{namespace}/{TORQUES}": self.on_torques,
         }
-        for topic, at, message in read_published(bag, types_of(takers)):
+        for topic, at, message in read_published(bag, types_of(takers), is_published):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
             takers[topic](at, message)
         if missing:
-            raise ValueError(f"{bag} has no message on {' and '.join(sorted(missing))}")
+            raise ValueError(f"{bag.path} has no message on {' and '.join(sorted(missing))}")
 
     def pass_time(self, now: int) -> None:
         """Let the clock be a time of the wall clock, unless time is simulated; never go back."""

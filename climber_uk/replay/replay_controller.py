@@ -15,11 +15,12 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from climber_uk.bags.collecting import check_one_run
+from climber_uk.bags.bag import open_bag
 from climber_uk.bags.publishing_order import are_known
-from climber_uk.bags.topics import TORQUES, Topics
+from climber_uk.bags.topics import Topics
+from climber_uk.messages.topics import CLOCK, CONTROLLER, PARAMETERS
 from climber_uk.parameters.parameter_file import read_argument, read_file
-from climber_uk.replay.recorded_controller import NODE, PARAMETERS, RecordedController
+from climber_uk.replay.recorded_controller import TOPICS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
 from climber_uk.replay.torque_comparison import (
     WHEELS,
@@ -36,7 +37,7 @@ from climber_uk.system.command_line import Parser, between
 def replayed(options: argparse.Namespace) -> Comparison:
     """Replay a bag; raises `OSError` or `ValueError`, of one line, if that cannot be."""
     namespace = "/" + options.namespace.strip("/") if options.namespace.strip("/") else ""
-    file = read_file(options.params, f"{namespace}/{NODE}") if options.params else None
+    file = read_file(options.params, f"{namespace}/{CONTROLLER}") if options.params else None
     given = dict(read_argument(argument) for argument in options.parameter)
     for name in given:
         if name not in DEFAULTS:
@@ -45,21 +46,24 @@ def replayed(options: argparse.Namespace) -> Comparison:
     def choose(told: Mapping[str, Any]) -> dict[str, Any]:
         return {**(told if file is None else file), **given}
 
-    recorded = RecordedController(options.bag, namespace, file)
-    if recorded.parameters is None and file is None:
-        raise ValueError(
-            f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
-        )
-    for loss in check_one_run(options.bag, Topics(), namespace.strip("/")):
-        print(printable(f"replay_controller: {options.bag}: {loss}"), file=sys.stderr)
-    if not are_known(options.bag, [f"{namespace}/{TORQUES}"]):
-        print(
-            f"replay_controller: {options.bag} does not tell when messages were published: they "
-            "are taken in the order of their arrival at the recorder",
-            file=sys.stderr,
-        )
-    replay = Replay(recorded, namespace, choose)
-    replay.run(options.bag, namespace)
+    topics = [Topics().full(name, namespace) for name in (*TOPICS, CLOCK)]
+    with open_bag(options.bag) as bag:
+        is_published = are_known(bag, topics)
+        recorded = RecordedController(bag, namespace, is_published, file)
+        if recorded.parameters is None and file is None:
+            raise ValueError(
+                f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
+            )
+        for loss in bag.losses:
+            print(printable(f"replay_controller: {options.bag}: {loss}"), file=sys.stderr)
+        if not is_published:
+            print(
+                f"replay_controller: {options.bag} does not tell when messages were published: "
+                "they are taken in the order of their arrival at the recorder",
+                file=sys.stderr,
+            )
+        replay = Replay(recorded, namespace, choose)
+        replay.run(bag, namespace, is_published)
     return compare(recorded, replay)
 
 

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from climber_uk.bags.bag import open_bag
-from climber_uk.bags.collecting import collect
 from climber_uk.bags.run_reader import NoRunError, RunReader
-from climber_uk.bags.topics import ODOMETRY, REFERENCE, TRUTH, Topics
+from climber_uk.bags.topics import Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
+from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
 from climber_uk.report.outputs import output, printable
 from climber_uk.system.command_line import Parser
 
@@ -27,30 +26,28 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
 
     Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
     """
-    with open_bag(bag) as opened:
-        reader = RunReader(opened, Topics(), namespace, None)
-        found = collect(opened, Topics(), [namespace])[0][namespace]
-        topic = reader.topic(ODOMETRY)
-        if not found.parts[ODOMETRY]:
-            raise ValueError("; ".join([f"{bag} has no message on {topic}", *opened.losses]))
-        runs = []
-        for part in reader.parts(found):
-            try:
-                reader.check_agreement(part)
-            except NoRunError as error:
-                raise ValueError(f"{bag}: {error}") from None
-            odometry, truth = (reader.recorded(part, name) for name in (ODOMETRY, TRUTH))
-            reference = reader.reference(part, odometry.stamps)
-            known = np.isfinite(reference[:, 0])
-            poses = {
-                ODOMETRY: (odometry.stamps, odometry.values[:, :3]),
-                REFERENCE: (odometry.stamps[known], reference[known]),
-                TRUTH: (truth.stamps, truth.values[:, :3]),
-            }
-            runs.append({name: of for name, of in poses.items() if len(of[0])})
-        if not any(ODOMETRY in poses for poses in runs):
-            raise ValueError(f"{bag}: {'; '.join(opened.losses)}")
-        return runs, opened.losses
+    reader, found = RunReader.read(bag, Topics(), namespace)
+    topic = reader.topic(ODOMETRY)
+    if not found.parts[ODOMETRY]:
+        raise ValueError("; ".join([f"{bag} has no message on {topic}", *reader.bag.losses]))
+    runs = []
+    for part in reader.parts(found):
+        try:
+            reader.check_agreement(part)
+        except NoRunError as error:
+            raise ValueError(f"{bag}: {error}") from None
+        odometry, truth = (reader.recorded(part, name) for name in (ODOMETRY, TRUTH))
+        reference = reader.reference(part, odometry.stamps)
+        known = np.isfinite(reference[:, 0])
+        poses = {
+            ODOMETRY: (odometry.stamps, odometry.values[:, :3]),
+            REFERENCE: (odometry.stamps[known], reference[known]),
+            TRUTH: (truth.stamps, truth.values[:, :3]),
+        }
+        runs.append({name: of for name, of in poses.items() if len(of[0])})
+    if not any(ODOMETRY in poses for poses in runs):
+        raise ValueError(f"{bag}: {'; '.join(reader.bag.losses)}")
+    return runs, reader.bag.losses
 
 
 def lines(poses: Poses) -> str:

@@ -14,12 +14,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from climber_uk.bags import topics
 from climber_uk.bags.connection import one_line
 from climber_uk.bags.events import ERROR, OK
 from climber_uk.bags.run import RecordedRun
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
+from climber_uk.messages import topics
 
 Curves = tuple[Array, Array]  # times (n,) [s] and values (n, k)
 WIDTH = 9.0  # [in]

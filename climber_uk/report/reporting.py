@@ -10,6 +10,7 @@ from typing import Any
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics.climber import Climber
+from climber_uk.messages.topics import CONTROLLER
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.report import figures
 from climber_uk.report.condition import Condition
@@ -19,7 +20,6 @@ from climber_uk.report.page import page
 from climber_uk.report.tables import Column, text, to_csv, to_json
 from climber_uk.system.command_line import Parser, between
 
-NODE = "uk_torque_controller"
 OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
 FAILED, UNREADABLE = 1, 2
 OUTPUT_HELP = (
@@ -120,7 +120,7 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
 
 
 def _parameters(file: Path, namespace: str) -> dict[str, Any]:
-    found = read_file(file, f"/{namespace}/{NODE}".replace("//", "/"))
+    found = read_file(file, f"/{namespace}/{CONTROLLER}".replace("//", "/"))
     Values(found).read(Climber)  # which says what is wrong with them
     return found
 

@@ -1,27 +1,22 @@
 """A managed (lifecycle) node that configures and activates itself, unless a manager is to."""
 
-from dataclasses import dataclass
-
 from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.subscription import Subscription
 from std_srvs.srv import SetBool
 
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.running import ClimberNode
 
 ACTIVE, INACTIVE = "active", "inactive"
 
 
-@dataclass(frozen=True)
+@parameters
 class Life:
     """The start of a managed node."""
 
     autostart: bool = parameter(True, "", "become active by itself, without a lifecycle manager")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class ManagedNode(LifecycleNodeMixin, ClimberNode):

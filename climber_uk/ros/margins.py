@@ -4,6 +4,7 @@ from geometry_msgs.msg import Vector3Stamped
 
 from climber_uk.mechanics.adhesion import MAX_MARGIN, Alarm
 from climber_uk.messages import writing
+from climber_uk.messages.topics import MARGINS, private
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 
 STATUS_LEVELS = writing.OK, writing.WARN, writing.ERROR
@@ -14,7 +15,7 @@ class Margins:
 
     def __init__(self, node: ClimberNode, alarm: Alarm) -> None:
         self.node, self.alarm = node, alarm
-        self.publisher = node.publisher(Vector3Stamped, "~/margins")
+        self.publisher = node.publisher(Vector3Stamped, private(MARGINS[0]))
         self.is_due = Throttle(PUBLISH_PERIOD)
         self.last = self.lowest = self.unpublished = MAX_MARGIN, MAX_MARGIN  # slip, tip
         self.level = 0  # of the alarm, as published last

@@ -10,6 +10,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
+from climber_uk.messages.topics import CLOCK
 from climber_uk.ros.running import WALL_CLOCK, ClimberNode, Throttle
 from climber_uk.simulation.options import SimulationOptions
 
@@ -68,7 +69,7 @@ class PlantTime:
             self.log.info(f"time does not run until {options.wait_for} listens")
             node.create_timer(LOOK_PERIOD, self.check_listener, clock=WALL_CLOCK)
         if options.simulated_time:
-            self.topic = node.publisher(ClockMessage, "/clock")
+            self.topic = node.publisher(ClockMessage, CLOCK)
             node.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
             if options.real_time_factor > 0:
                 node.create_timer(self.pace / SECOND, self.step_if_due, clock=WALL_CLOCK)

@@ -4,6 +4,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, JointState
 
 from climber_uk.messages import writing
+from climber_uk.messages.topics import JOINTS, ODOMETRY, PRESSURE, TRUTH
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 from climber_uk.simulation.simulated_robot import SimulatedRobot
 
@@ -18,10 +19,10 @@ class PlantTopics:
 
     def __init__(self, node: ClimberNode) -> None:
         self.names, self.is_due = node.names, Throttle(PUBLISH_PERIOD)
-        self.odometry = node.publisher(Odometry, "odom")
-        self.truth = node.publisher(Odometry, "ground_truth")
-        self.joints = node.publisher(JointState, "joint_states")
-        self.pressure = node.publisher(FluidPressure, "suction_pressure")
+        self.odometry = node.publisher(Odometry, ODOMETRY)
+        self.truth = node.publisher(Odometry, TRUTH)
+        self.joints = node.publisher(JointState, JOINTS)
+        self.pressure = node.publisher(FluidPressure, PRESSURE)
         self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
 
     def publish_odometry(self, robot: SimulatedRobot, measured_at: int) -> None:

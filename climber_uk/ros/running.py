@@ -29,6 +29,7 @@ from rclpy.utilities import remove_ros_args
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.messages.names import Names
+from climber_uk.messages.topics import DIAGNOSTICS
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.parameters import QOS, NodeParameters
 from climber_uk.ros.transport import use_udp
@@ -172,7 +173,7 @@ class ClimberNode(Node):
         On the topics `alone_on` there should be no more than one publisher.
         """
         self._values, self._alone_on = values, alone_on
-        self._diagnostics = self.publisher(DiagnosticArray, "/diagnostics")
+        self._diagnostics = self.publisher(DiagnosticArray, DIAGNOSTICS)
         self.create_timer(1.0, self.check_publishers, clock=WALL_CLOCK)
 
     def check_publishers(self) -> None:

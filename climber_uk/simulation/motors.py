@@ -4,7 +4,6 @@
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,10 +11,10 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.quantities import State
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
-@dataclass(frozen=True)
+@parameters
 class Motors:
     """Lag and resolution of the motors; their limits are parameters of `Climber`."""
 
@@ -23,9 +22,6 @@ class Motors:
     torque_resolution: float = parameter(
         0.0, "N m", "step in which torques are set; 0: continuous", at_least=0
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
     def torques(
         self, climber: Climber, wheels: State, before: Array, commanded: Array, time: float

@@ -1,14 +1,12 @@
 """Options of a simulation: its clock, its steps, its timeouts and its initial state."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from climber_uk.mechanics.quantities import State
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
-@dataclass(frozen=True)
+@parameters
 class SimulationOptions:
     """Clock, steps, timeouts and initial state of a simulation."""
 
@@ -43,7 +41,6 @@ class SimulationOptions:
     initial_yaw_rate: float = parameter(0.0, "rad/s", "initial yaw rate")
 
     def __post_init__(self) -> None:
-        check(self)
         if abs(self.steps * self.integration_step - self.control_period) > 1e-9:
             raise ValueError(
                 f"control_period={self.control_period} must be a multiple of "

@@ -12,7 +12,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY, Climber
-from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.contact import Contact, is_pulled_off
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import Plane, Wall
 from climber_uk.simulation.inputs import NO_PUSH, FellOff, Inputs, NotFinite, PlantState
@@ -175,7 +175,7 @@ class Plant:
     def _check_attached_at(self, y: Array) -> None:
         """Raise `FellOff` where the climber is pulled off its wall, or tipped off it."""
         normal = float(self.contact.normal_force(self.climber, self._body.into_wall(y)))
-        if normal < 1e-9 * self.climber.mass * GRAVITY:  # cos(90°) is 6e-17
+        if is_pulled_off(self.climber, normal):
             raise FellOff("force onto the wall", normal, 0.0, "N")
         _, tip = self.margins(State(y[:3], y[3:6]), np.zeros(2))
         if tip < 1:

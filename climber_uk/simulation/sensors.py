@@ -17,7 +17,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import rotated
 from climber_uk.mechanics.quantities import Motion, State
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 Measure = Callable[[State, State, Array], State]
@@ -57,7 +57,7 @@ SOURCES = Variants[type[OdometrySource]]({"truth": Truth, "wheels": Wheels}, "od
 MEASURING = "odometry_source", "odometry_delay", "encoder_resolution", "seed"
 
 
-@dataclass(frozen=True)
+@parameters
 class Sensors:
     """Errors of the odometry; without any it is the true state."""
 
@@ -91,9 +91,6 @@ class Sensors:
     )
     seed: int = parameter(0, "", "of the noise: the same seed gives the same noise", at_least=0)
 
-    def __post_init__(self) -> None:
-        check(self)
-
     def delay_in(self, period: float) -> int:
         """Odometry's delay in periods of `period` [s]; `ValueError` if it is no multiple."""
         periods = round(self.odometry_delay / period)
@@ -106,17 +103,17 @@ class Sensors:
 
     @cached_property
     def is_ideal(self) -> bool:
-        """Whether they tell what is measured as it is: nothing that `told` adds is set."""
+        """Whether they tell what is measured as it is: nothing that `corrupted` adds is set."""
         return not any(np.any(getattr(self, field.name)) for field in self.errors())
 
     @classmethod
     def errors(cls) -> "list[Field[Any]]":
-        """Fields of what `told` adds."""
+        """Fields of what `corrupted` adds."""
         return [field for field in fields(cls) if field.name not in MEASURING]
 
     @property
     def ideal(self) -> "Sensors":
-        """The same without what `told` adds."""
+        """The same without what `corrupted` adds."""
         return Sensors(**{name: getattr(self, name) for name in MEASURING})
 
     def corrupted(self, motion: Motion, noise: Iterable[Any]) -> Motion:

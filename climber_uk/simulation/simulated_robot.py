@@ -1,7 +1,7 @@
 """The simulated robot: plant, pump, motors and sensors, stepped together."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from climber_uk.mechanics.contact import LOCOMOTION
 from climber_uk.mechanics.friction import FRICTION
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import WALLS
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.simulation.inputs import NO_PUSH
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
@@ -27,7 +27,7 @@ VARIANTS: dict[str, Mapping[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
+@parameters
 class Physics:
     """The physics that the plant has, by name, and when its pump fails."""
 
@@ -40,9 +40,6 @@ class Physics:
         0.0, "s", "after the start, when the pump's pressure drops; 0: never", at_least=0
     )
     pressure_loss_level: float = parameter(0.0, "Pa", "pressure to which it drops", at_least=0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Push(NamedTuple):

@@ -7,6 +7,10 @@ from typing import Any
 END = signal.SIGINT, signal.SIGTERM, signal.SIGHUP  # Ctrl-C, kill, and a terminal that is closed
 
 
+class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
+    """A signal came."""
+
+
 def on_end(handler: Callable[..., Any]) -> None:
     """Have `handler` called at each signal to end, except SIGHUP where nohup ignores it."""
     for number in END:

@@ -6,7 +6,8 @@ import pytest
 
 from climber_uk.campaign import names
 from climber_uk.campaign.campaign import read
-from climber_uk.campaign.names import LOSS_TIME, NODES, SEED
+from climber_uk.campaign.names import LOSS_TIME, SEED
+from climber_uk.messages.topics import NODES
 
 DOCS = Path(__file__).parents[2] / "docs"
 PLANT, CONTROLLER = "plant_simulator.", "uk_torque_controller."

@@ -9,7 +9,6 @@ from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
@@ -73,9 +72,9 @@ def alone(case, i, duration):
     """The same by the scalar `SampledController` and the plant that integrates (30)."""
     trajectory, start, true, gains, known, steps, delay = case
     model = replace(BUILT if trajectory is EIGHT else PAPER, **known)
-    law = ControlLaw(as_floats(model, i), as_floats(gains, i), ControlOptions())
+    law = ControlLaw(as_floats(model, i), as_floats(gains, i))
     timing = Timing(transport_delay=0.005 * delay)
-    sampled_controller = SampledController(law, Observer(), timing, Pacing(catch_up=0.0))
+    sampled_controller = SampledController(law, timing=timing, pacing=Pacing(catch_up=0.0))
     link = Link(step=0.005 / steps, delay=0.005 * delay)
     state = State.moving(Motion(*(float(number) for number in part(start, i))))
     controller = Controller(sampled_controller, Safety(max_jump=1e9))
@@ -114,7 +113,7 @@ def test_each_of_many_is_what_it_is_alone(name):
 
 def noisy(seeds):
     sensors = Sensors(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
-    law = ControlLaw(BUILT, SLOW, ControlOptions())
+    law = ControlLaw(BUILT, SLOW)
     start = part(ON_EIGHT, np.arange(len(seeds)))
     return Loops(start, BUILT, law, sensors=sensors, seeds=seeds)
 

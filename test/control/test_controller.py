@@ -6,14 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State, Wrench
@@ -30,8 +29,8 @@ class Loop:
     """A climber that is always where it should be, on a clock that the test turns."""
 
     def __init__(self, observer=None, **safety):
-        law = ControlLaw(Climber(), Guidance(), ControlOptions())
-        sampled_controller = SampledController(law, observer or Observer(), Timing(), Pacing())
+        law = ControlLaw(Climber(), Guidance())
+        sampled_controller = SampledController(law, observer or Observer())
         # it is moved by no torque
         guard = replace(UNGUARDED, speed_margin=0.05, yaw_rate_margin=1.0)
         self.controller = Controller(sampled_controller, Safety(**safety), guard=guard)

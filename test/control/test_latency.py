@@ -8,15 +8,13 @@ from identification_experiments import SCENARIOS
 
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.approach import ANYWHERE
-from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
-from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
 from climber_uk.simulation.sensors import Sensors
 
 BUILT = SCENARIOS["climber.yaml"]
@@ -26,8 +24,8 @@ ENCODERS = Link(sensors=WHEELS, delay=0.005, torque_lag=0.005)
 
 def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, **timing):
     """Run of climber.yaml's climber, and the controller after it."""
-    law = ControlLaw(BUILT.believed, guidance, ControlOptions())
-    sampled_controller = SampledController(law, Observer(), Timing(**timing), Pacing())
+    law = ControlLaw(BUILT.believed, guidance)
+    sampled_controller = SampledController(law, timing=Timing(**timing))
     controller = Controller(sampled_controller, Safety(), ANYWHERE, UNGUARDED)
     run = simulate(BUILT.trajectory, BUILT.start, duration, controller, climber, link)
     assert controller.mode is Mode.FOLLOWING

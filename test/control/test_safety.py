@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.model import Observer
 from climber_uk.control.safety import SPEED_TIME, Mode, Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
@@ -58,9 +56,7 @@ def test_a_heading_a_turn_away_is_none_and_what_is_not_finite_has_jumped():
 
 def controller(now=SECOND, **safety):
     """A controller that has answered an odometry of 1 s on its path, and the climber's state."""
-    sampled_controller = SampledController(
-        ControlLaw(Climber(), Guidance(), ControlOptions()), Observer(), Timing(), Pacing()
-    )
+    sampled_controller = SampledController(ControlLaw(Climber(), Guidance()))
     controller = Controller(sampled_controller, Safety(**safety))
     controller.on_reference(now, sampled(CIRCLE, 10.0))
     start = CIRCLE.at(0.0)

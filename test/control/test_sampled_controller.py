@@ -55,11 +55,10 @@ def controller(
     timing=TIMING,
     pacing=PACING,
     safety=SAFETY,
-    approach=None,
-    guard=None,
+    **parts,
 ):
     law = ControlLaw(climber, constraints, options)
-    return Controller(SampledController(law, observer, timing, pacing), safety, approach, guard)
+    return Controller(SampledController(law, observer, timing, pacing), safety, **parts)
 
 
 def lap(controlling, climber=CLIMBER, link=IDEAL, duration=10.0):

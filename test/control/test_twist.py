@@ -5,12 +5,10 @@ import pytest
 from identification_experiments import NOISE, SCENARIOS
 
 from climber_uk.closed_loop.simulate import Link, simulate
-from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller
 from climber_uk.control.model import Observer
-from climber_uk.control.safety import Safety
 from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.twist import mean_twist
 from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.sensors import Sensors
@@ -24,9 +22,9 @@ def encoders(counts):
 
 
 def driven(link, twist="auto", duration=4.0):
-    law = ControlLaw(BUILT.believed, BUILT.guidance, ControlOptions())
+    law = ControlLaw(BUILT.believed, BUILT.guidance)
     observer, timing = Observer(twist=twist), Timing(learn_delay=False)
-    controller = Controller(SampledController(law, observer, timing, Pacing()), Safety())
+    controller = Controller(SampledController(law, observer, timing))
     run = simulate(BUILT.trajectory, BUILT.start, duration, controller, BUILT.believed, link)
     return run, controller.sampled_controller
 

@@ -107,10 +107,10 @@ def test_changed_parameters_hold_in_every_namespace_and_leave_the_others(tmp_pat
 def test_the_table_is_written_as_json_and_drawn(monkeypatch, tmp_path, capsys):
     from test_estimation import moved
 
-    monkeypatch.setattr(identify, "check_one_run", lambda *_: [])
     monkeypatch.setattr(identify, "read_motion", lambda *_: (moved(noise=1.0, wheels=True), 3))
     files = {name: tmp_path / f"a.{name}" for name in ("json", "figure", "output")}
-    run(monkeypatch, "bag", *(part for name, file in files.items() for part in (f"--{name}", file)))
+    bag = made_bag(tmp_path / "bag", {})
+    run(monkeypatch, bag, *(part for name, file in files.items() for part in (f"--{name}", file)))
     rows = {row["parameter"]: row for row in json.loads(files["json"].read_text())}
     assert rows["mass"]["estimate"] == pytest.approx(6.5, rel=0.02)
     assert rows["mass"]["nodes_now"] == 5.0
@@ -259,4 +259,4 @@ def test_wrong_joint_names_are_said_with_the_right_ones(monkeypatch, tmp_path):
     bag = made_bag(tmp_path / "bag", {}, name=("left", "right"))
     with pytest.raises(SystemExit) as end:
         run(monkeypatch, bag)
-    assert "names ['left', 'right'] must be 'a_left' and 'a_right'" in str(end.value)
+    assert "no a_right and no a_left among the joints left, right" in str(end.value)

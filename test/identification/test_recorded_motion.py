@@ -5,12 +5,16 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from climber_uk.bags.bag_writer import BagWriter
-from climber_uk.identification.recorded_motion import Source, read_motion
+from climber_uk.bags.run_reader import RunReader
+from climber_uk.bags.topics import Topics
+from climber_uk.identification import recorded_motion
+from climber_uk.identification.recorded_motion import TOPICS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPES = STORE.types
 SECOND = 10**9
 RIGHT_LEFT = ("wheel_r", "wheel_l")
+JOINTS = {"right_wheel_joint": "wheel_r", "left_wheel_joint": "wheel_l"}
 TIMES = 2.0 + 0.1 * np.arange(11)  # [s]
 
 
@@ -53,6 +57,12 @@ def bag_of(directory, messages, storage="mcap"):
     return directory / "bag"
 
 
+def read_motion(bag, namespace="", **given):
+    return recorded_motion.read_motion(
+        *RunReader.read(bag, Topics(), namespace, TOPICS), JOINTS, **given
+    )
+
+
 def driving(prefix="", heading=0.0, speed=0.5):
     """Odometry of a steady drive and the torques that answer it: right 1 N m, left 2 N m."""
     for time in TIMES:
@@ -65,9 +75,7 @@ def driving(prefix="", heading=0.0, speed=0.5):
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_a_motion_is_that_of_odometry_and_of_torques_that_answer_it(tmp_path, storage):
-    motion, unfit = read_motion(
-        bag_of(tmp_path, driving(), storage), Source(joints=RIGHT_LEFT, pressure=2500.0)
-    )
+    motion, unfit = read_motion(bag_of(tmp_path, driving(), storage), pressure=2500.0)
     assert unfit == 0
     assert motion.time == pytest.approx(TIMES)
     assert motion.pose[:, 0] == pytest.approx(0.5 * (TIMES - 2.0))
@@ -78,14 +86,14 @@ def test_a_motion_is_that_of_odometry_and_of_torques_that_answer_it(tmp_path, st
 
 
 def test_a_delay_moves_the_torques(tmp_path):
-    motion, _ = read_motion(bag_of(tmp_path, driving()), Source(joints=RIGHT_LEFT, delay=0.05))
+    motion, _ = read_motion(bag_of(tmp_path, driving()), delay=0.05)
     assert motion.time == pytest.approx(TIMES[1:])  # at the first none is known
     assert motion.impulse[0] == pytest.approx([0.05, 0.1])
 
 
 def test_torques_at_the_wheels_are_those_of_the_time_before_and_preferred(tmp_path):
     told = [("/joint_states", joints(t, (4.0, t), (t, 2 * t))) for t in TIMES]
-    motion, _ = read_motion(bag_of(tmp_path, [*driving(), *told]), Source(joints=RIGHT_LEFT))
+    motion, _ = read_motion(bag_of(tmp_path, [*driving(), *told]))
     right, left = np.diff(motion.impulse, axis=0).T / 0.1
     assert right == pytest.approx(TIMES[1:])
     assert left == pytest.approx(np.full(10, 4.0))
@@ -98,7 +106,7 @@ def test_headings_do_not_jump_and_a_pose_alone_has_no_rates(tmp_path):
         if topic == "/odom":
             message.twist.twist.linear.x = message.twist.twist.angular.z = 0.0
         messages.append((topic, message))
-    motion, _ = read_motion(bag_of(tmp_path, messages), Source(joints=RIGHT_LEFT))
+    motion, _ = read_motion(bag_of(tmp_path, messages))
     assert motion.pose[:, 2] == pytest.approx(TIMES + 1.0)
     assert motion.rates is None
 
@@ -106,7 +114,7 @@ def test_headings_do_not_jump_and_a_pose_alone_has_no_rates(tmp_path):
 def test_pressure_and_namespace_are_those_of_the_climber(tmp_path):
     told = [("/b/suction_pressure", pressure(t, 1000.0 * t)) for t in (2.0, 3.0)]
     bag = bag_of(tmp_path, [*driving("/a"), *driving("/b", speed=0.7), *told])
-    motion, _ = read_motion(bag, Source(joints=RIGHT_LEFT, namespace="b"))
+    motion, _ = read_motion(bag, namespace="b")
     assert motion.rates[0, 0] == pytest.approx(0.7)
     assert motion.pressure == pytest.approx(1000.0 * TIMES)
 
@@ -116,14 +124,14 @@ def test_unfit_messages_are_left_out_and_counted(tmp_path):
         ("/odom", odometry(2.35, np.nan, 0.0, 0.5, 0.0)),
         ("/wheel_torques", joints(2.45, (np.inf, 0.0))),
     ]
-    motion, unfit = read_motion(bag_of(tmp_path, [*driving(), *bad]), Source(joints=RIGHT_LEFT))
+    motion, unfit = read_motion(bag_of(tmp_path, [*driving(), *bad]))
     assert unfit == 2
     assert motion.impulse[-1] == pytest.approx([1.0, 2.0])
 
 
 def test_missing_torques_are_a_gap(tmp_path):
     kept = [m for m in driving() if not (m[0] == "/wheel_torques" and 2.15 < stamp(m[1]) < 2.85)]
-    motion, _ = read_motion(bag_of(tmp_path, kept), Source(joints=RIGHT_LEFT))
+    motion, _ = read_motion(bag_of(tmp_path, kept))
     assert motion.stretch[0] == motion.stretch[1] != motion.stretch[5]
     assert motion.stretch[-1] not in (motion.stretch[5], motion.stretch[0])
 
@@ -137,4 +145,4 @@ def test_a_bag_without_torques_is_refused_by_name(tmp_path):
     with pytest.raises(
         ValueError, match="has no odometry on /odom at times that torques are known"
     ):
-        read_motion(bag, Source(joints=RIGHT_LEFT))
+        read_motion(bag)

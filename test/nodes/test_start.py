@@ -214,7 +214,7 @@ PAPER, CLIMBER = (
         (
             "uk_torque_controller",
             CLIMBER,
-            ["17 of ", "climber.yaml)", "at most 4 N m", "suction of 480 N", "safe output hold"],
+            ["18 of ", "climber.yaml)", "at most 4 N m", "suction of 480 N", "safe output hold"],
         ),
         (
             "uk_torque_controller",

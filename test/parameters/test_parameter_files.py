@@ -2,14 +2,13 @@
 
 import math
 import random
-from dataclasses import dataclass
 
 import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
-from climber_uk.parameters.declaration import check, parameter
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import Values, read_argument, read_file
 from climber_uk.ros.parameters import NodeParameters
 
@@ -33,14 +32,11 @@ def read_by_rcl(path):
         rclpy.shutdown(context=context)
 
 
-@dataclass(frozen=True)
+@parameters
 class Renamed:
     """A parameter that was called `size`."""
 
     length: float = parameter(1.0, "m", "length", formerly="size")
-
-    def __post_init__(self):
-        check(self)
 
 
 @pytest.mark.parametrize(("given", "length"), [(["size:=2"], 2.0), (["size:=2", "length:=3"], 3.0)])
@@ -60,7 +56,7 @@ def test_a_parameter_is_taken_under_its_former_name_with_a_remark(given, length)
     rclpy.shutdown(context=context)
 
 
-@dataclass(frozen=True)
+@parameters
 class Sized:
     """A parameter."""
 

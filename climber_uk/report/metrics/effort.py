@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from climber_uk.bags import topics
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import State
+from climber_uk.messages import topics
 from climber_uk.report.metrics.metric import GAP, NAN, Case, Metric, largest, mean, rms, share
 
 WHEELS = "right", "left"

@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from climber_uk.bags.topics import REFERENCE_TIME
 from climber_uk.mechanics import Array
+from climber_uk.messages.topics import REFERENCE_TIME
 from climber_uk.report.metrics.metric import (
     NAN,
     Case,

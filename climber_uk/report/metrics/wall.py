@@ -5,8 +5,8 @@ m Δv = ∫ (τR + τL)/r dt - m g_t ∫ sinθ dt - f ∫ σ dt        (11), int
 
 import numpy as np
 
-from climber_uk.bags import topics
 from climber_uk.mechanics import Array
+from climber_uk.messages import topics
 from climber_uk.report.metrics.metric import NAN, Case, Metric, largest, lowest, share
 
 WINDOW = 0.5  # [s] over which momentum is balanced

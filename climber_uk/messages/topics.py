@@ -1,0 +1,20 @@
+"""Names of the nodes and of their topics, relative to a climber's namespace; with / to none."""
+
+PLANNER, CONTROLLER, PLANT = NODES = (
+    "trajectory_publisher",
+    "uk_torque_controller",
+    "plant_simulator",
+)
+ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
+REFERENCE_TIME = "reference_time"  # where on the reference the climber was
+REFERENCE_PATH = "reference_path"  # all of it, for display
+TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
+JOINTS, PRESSURE, PUSH = "joint_states", "suction_pressure", "push"
+PARAMETERS, FORCE = f"{CONTROLLER}/parameters", f"{CONTROLLER}/constraint_force"
+MARGINS = f"{PLANT}/margins", f"{CONTROLLER}/margins"  # the plant knows better
+CLOCK, DIAGNOSTICS, LOG = "/clock", "/diagnostics", "/rosout"
+
+
+def private(topic: str) -> str:
+    """A node's own topic, as the node itself names it."""
+    return f"~/{topic.rpartition('/')[2]}"
