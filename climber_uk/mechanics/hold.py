@@ -167,7 +167,7 @@ class Hold:
         return self.adhesion.force(climber) + climber.mass * into_wall
 
     def wheel_load(self, climber: Climber, into_wall: Any) -> Any:
-        """N_w (...) [N]: what the seal does not carry. f is that of the suction alone (§1.2)."""
+        """N_w (...) [N]: what the seal does not carry. f is that of the suction alone (§2.2)."""
         held_by_seal = 0.0
         if isinstance(self.adhesion, Suction):
             held_by_seal = (1 - climber.wheel_load_share) * self.adhesion.force(climber)

@@ -17,8 +17,8 @@ from climber_uk.mechanics import Array, pack, solve, times, transpose, unpack
 from climber_uk.mechanics.climber import GRAVITY, Climber
 
 PAPER_CLIMBER = Climber()
-A = np.eye(2, 3)  # (24): the path asks for ẍ and ÿ
-d = np.array([[1.0, 1.0], [1.0, -1.0], [0.0, 0.0]])  # Qc = d τ (19)
+A = np.eye(2, 3)  # (23): the path asks for ẍ and ÿ
+d = np.array([[1.0, 1.0], [1.0, -1.0], [0.0, 0.0]])  # Qc = d τ (24)
 
 
 def _through_root(M: Array) -> Array:
@@ -110,7 +110,7 @@ class PrintedSystem:
         return pack(self.semi_axis_x * np.cos(time), -self.semi_axis_y * np.sin(time))
 
     def constraint_force(self, time: Array | float, q: Array, v: Array) -> Array:
-        """Qc (..., 3) of (23)."""
+        """Qc (..., 3) of (24)."""
         M = self.mass_matrix(q)
         a = solve(M, self.force(q, v))
         return times(GAINS[self.gain](M), self.b(time) - a[..., :2])

@@ -1,0 +1,109 @@
+"""What docs/theory.md, §5.4, says of the guidance law's stability."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from climber_uk.control.constraints import Guidance, demanded
+from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.reference import Reference
+
+CLIMBER_YAML = Guidance(cross_track_gain=3.0, fade_speed=0.1)
+
+
+def steering(gains, v_d):
+    return gains.cross_track_gain * v_d / np.hypot(v_d, gains.fade_speed)
+
+
+def on_a_circle(v_d, omega_d):
+    """Reference (N,) at the origin, along x, that goes round at constant speed."""
+    zero = 0.0 * (v_d + omega_d)
+    return Reference(
+        pose=np.stack([zero, zero, zero], axis=-1),
+        velocity=np.stack([v_d + zero, zero, omega_d + zero], axis=-1),
+        acceleration=np.stack([zero, v_d * omega_d + zero, zero], axis=-1),
+        jerk=np.stack([-v_d * omega_d**2 + zero, zero], axis=-1),
+    )
+
+
+def state_at(gains, v_d, e_x, e_y, speed, yaw_rate):
+    """State with the heading that leads back, ψ = 0."""
+    heading = -np.arctan(steering(gains, v_d) * e_y)
+    return State.rolling(np.stack([e_x, e_y, heading], axis=-1), speed, yaw_rate)
+
+
+def approach(gains, v_d, e_x, e_y, omega_d):
+    """d/dt of (e_x² + e_y²)/2 on ψ = 0, v = w: by kinematics, with the law's own w."""
+    reference = on_a_circle(v_d, omega_d)
+    still = state_at(gains, v_d, e_x, e_y, 0.0 * e_x, omega_d)
+    wanted = demanded(gains, still, reference)[2]
+    state = state_at(gains, v_d, e_x, e_y, wanted, omega_d)
+    v_x, v_y, _ = np.moveaxis(state.velocity, -1, 0)
+    return e_x * (v_x - v_d + omega_d * e_y) + e_y * (v_y - omega_d * e_x)
+
+
+def largest_approach(gains, slowest, fastest, radius, where=(-np.pi, np.pi)):
+    """Largest of it over a disc of `radius` over g, for references of v_s times these speeds."""
+    rng, n = np.random.default_rng(3), 300_000
+    v_d = gains.fade_speed * rng.uniform(slowest, fastest, n)
+    distance = radius / steering(gains, v_d) * np.sqrt(rng.uniform(1e-4, 1, n))
+    angle = rng.uniform(*where, n)
+    e_x, e_y = distance * np.cos(angle), distance * np.sin(angle)
+    return approach(gains, v_d, e_x, e_y, rng.normal(size=n)).max()
+
+
+@pytest.mark.parametrize(
+    ("gains", "slowest"),
+    [
+        (Guidance(), 1.0),
+        (Guidance(cross_track_gain=0.5), 1.0),  # k_y v_s / k_x = 0.1
+        (Guidance(cross_track_gain=3.0, fade_speed=0.2), 1.0),
+        (CLIMBER_YAML, 1.2),
+    ],
+)
+def test_the_distance_shrinks_within_twice_the_look_ahead(gains, slowest):
+    assert largest_approach(gains, slowest, 12.0, 2.0) < 0
+
+
+@pytest.mark.parametrize("gains", [Guidance(), CLIMBER_YAML, Guidance(cross_track_gain=9.0)])
+def test_behind_a_reference_of_any_speed_it_does_so_with_any_gains(gains):
+    assert largest_approach(gains, 0.05, 12.0, 2.0, (np.pi / 2, 3 * np.pi / 2)) < 0
+
+
+@pytest.mark.parametrize(("speed", "radius"), [(0.7, 1.4), (0.5, 0.7), (0.3, 0.32)])
+def test_ahead_of_a_slower_reference_the_disc_is_smaller(speed, radius):
+    assert largest_approach(Guidance(), speed, speed, radius) < 0
+    assert largest_approach(Guidance(), speed, speed, 1.1 * radius) > 0
+
+
+def excess(gains, radius, v_d, e_y):
+    """Speed along the circle that a climber going round inside needs, beyond what it is given."""
+    g, curvature = steering(gains, v_d), 1 / radius
+    e_x = -g * e_y * (1 - curvature * e_y) / curvature
+    needed = v_d * (1 - curvature * e_y) * np.hypot(1, g * e_y)
+    omega_d = v_d * curvature
+    state = state_at(gains, v_d, e_x, e_y, needed, omega_d)
+    return needed - demanded(gains, state, on_a_circle(v_d, omega_d))[2], state
+
+
+def test_a_false_equilibrium_keeps_a_climber_on_a_circle_within_the_circle():
+    gains, radius, v_d = Guidance(), 10.0, 10.0
+    e_y = np.linspace(0.01, 0.99 * radius, 500)
+    over = excess(gains, radius, v_d, e_y)[0]
+    assert over.max() > 0
+    last = np.flatnonzero(over > 0)[-1]
+    there = brentq(lambda e: excess(gains, radius, v_d, np.array(e))[0], e_y[last], e_y[last + 1])
+    _, state = excess(gains, radius, v_d, np.array(there))
+    v_1, theta_2, _ = demanded(gains, state, on_a_circle(v_d, v_d / radius))
+    assert abs(v_1) < 1e-9
+    assert abs(theta_2) < 1e-9
+    assert np.hypot(*state.pose[:2]) > 5
+
+
+@pytest.mark.parametrize("gains", [Guidance(), CLIMBER_YAML])
+def test_there_is_no_false_equilibrium_where_the_look_ahead_is_long_beside_the_radius(gains):
+    fastest = gains.catch_up_speed / gains.catch_up_share
+    for radius in np.geomspace(0.01, 4, 12) / gains.cross_track_gain:
+        for v_d in np.geomspace(0.01, fastest, 40):
+            e_y = np.linspace(0.01, 0.99, 100) * radius
+            assert excess(gains, radius, v_d, e_y)[0].max() < 0

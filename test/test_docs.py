@@ -1,0 +1,57 @@
+"""The docs lead from one page to the next, and docs/README.md to all of them."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
+
+
+def anchors(page):
+    """Ids of a page's headings, as GitHub makes them, and those that are written."""
+    text = page.read_text()
+    written = re.findall(r'<a id="([^"]+)">', text)
+    text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    for heading in re.findall(r"^#+ +(.*?) *$", text, re.MULTILINE):
+        words = re.sub(r"[^\w\- ]", "", heading.replace("`", "").lower())
+        written.append(words.replace(" ", "-"))
+    return written
+
+
+def links(page):
+    return re.findall(r"\]\(([^)\s]+)\)", CODE.sub("", page.read_text()))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    for link in links(page):
+        if re.match(r"\w+:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+def test_the_index_has_each_page_once_with_what_it_tells():
+    lines = (DOCS / "README.md").read_text().splitlines()
+    entries = [match for line in lines if (match := re.match(r"- \[.+\]\((\S+\.md)\): \S", line))]
+    listed = [entry[1] for entry in entries]
+    assert sorted(listed) == sorted(
+        page.name for page in DOCS.glob("*.md") if page.stem != "README"
+    )
+
+
+def test_figures_are_all_shown():
+    shown = {Path(link).name for page in PAGES for link in links(page)}
+    assert {figure.name for figure in (DOCS / "figures").iterdir()} <= shown
+
+
+def test_the_glossary_is_in_alphabetical_order():
+    terms = re.findall(r"^\*\*(.+?)\*\*", (DOCS / "glossary.md").read_text(), re.MULTILINE)
+    assert len(terms) > 40
+    assert terms == sorted(terms, key=str.casefold)
