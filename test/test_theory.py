@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[1]
 THEORY = (ROOT / "docs" / "theory.md").read_text()
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 MODULES = sorted((ROOT / "climber_uk").rglob("*.py"))
+BESIDE = [*sorted((ROOT / "bench").rglob("*.py")), *sorted((ROOT / "examples").rglob("*.py"))]
 
 # A number of one or two digits alone in brackets, from 1 on, that is not the argument of a call
 EQUATION = re.compile(r"(?<![\w\])\"'`])\(([1-9]\d?)\)(?!\w)")
@@ -46,7 +47,7 @@ def unresolved(file, text):
     return equations + [f"§{n}" for n in SECTION.findall(written) if n not in SECTIONS]
 
 
-@pytest.mark.parametrize("file", PAGES + MODULES, ids=lambda f: str(f.relative_to(ROOT)))
+@pytest.mark.parametrize("file", PAGES + MODULES + BESIDE, ids=lambda f: str(f.relative_to(ROOT)))
 def test_what_is_cited_stands_in_the_theory(file):
     assert not unresolved(file, file.read_text())
 
@@ -94,12 +95,10 @@ def test_names_of_the_symbols_are_those_of_the_code():
 
 
 def test_formulas_survive_markdown():
-    """A star, or a comma after a backslash, would be Markdown's own between dollar signs."""
+    """Between dollar signs a star, a comma after a backslash and a new line are Markdown's own."""
     inline = re.findall(r"\$([^$]+)\$", CODE.sub("", MATH.sub("", THEORY)))
     assert len(inline) > 100
-    assert not [
-        formula for formula in inline if "*" in formula or re.search(r"\\[^a-zA-Z]", formula)
-    ]
+    assert not [formula for formula in inline if re.search(r"\*|\n|\\[^a-zA-Z]", formula)]
     for formula in MATH.findall(THEORY):
         assert formula.count("{") == formula.count("}")
         assert formula.count(r"\begin") == formula.count(r"\end")
