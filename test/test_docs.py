@@ -37,6 +37,13 @@ def test_links_lead_somewhere(page):
         assert not anchor or anchor in anchors(target), link
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_that_are_named_are_there(page):
+    named = re.findall(r"(?<![\w/.])((?:[a-z_]+/)+[\w.]+\.(?:py|c|yaml|md))\b", page.read_text())
+    roots = ROOT, ROOT / "climber_uk", ROOT / "docs"
+    assert not [path for path in named if not any((root / path).exists() for root in roots)]
+
+
 def test_the_index_has_each_page_once_with_what_it_tells():
     lines = (DOCS / "README.md").read_text().splitlines()
     entries = [match for line in lines if (match := re.match(r"- \[.+\]\((\S+\.md)\): \S", line))]
