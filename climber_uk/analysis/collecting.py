@@ -3,20 +3,29 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tqdm import tqdm
 
 from climber_uk.analysis import events, topics
-from climber_uk.analysis.bag import Bag
+from climber_uk.analysis.bag import Bag, open_bag
 from climber_uk.analysis.batches import Batch, read_batches
 from climber_uk.analysis.events import Event
 from climber_uk.analysis.joints import Joints
 from climber_uk.analysis.recorded import Part, in_order
 from climber_uk.analysis.reference import Points
-from climber_uk.analysis.restarts import windows
-from climber_uk.analysis.taking import TAKEN
+from climber_uk.analysis.restarts import (
+    are_copies,
+    are_many,
+    are_strays,
+    disagreement,
+    windows,
+)
+from climber_uk.analysis.taking import STRAY, TAKEN
 from climber_uk.analysis.topics import Topics
+from climber_uk.mechanics import Array, Stamps
 
 PATIENCE = 2.0  # [s] after which progress is told
 
@@ -48,9 +57,35 @@ class Collected:
 
     def runs(self) -> list["Collected"]:
         """What belongs to each run: they differ where the odometry's time starts again."""
-        stamps, arrivals, _, faults = in_order(self.parts[topics.ODOMETRY])
-        found = windows(stamps[faults == 0], arrivals[faults == 0])
+        found = windows(*self._fit_odometry()[:2])
         return [self.within(*window) for window in found] if len(found) > 1 else [self]
+
+    def leave_out_strays(self) -> None:
+        """Mark odometry whose stamp cannot be as unfit, unless there is so much of it."""
+        if parts := self.parts[topics.ODOMETRY]:
+            stamps, arrivals, values, faults = in_order(parts)
+            fit = np.flatnonzero(faults == 0)
+            if not are_many(strays := are_strays(stamps[fit])):
+                faults[fit[strays]] = STRAY
+            self.parts[topics.ODOMETRY] = [(stamps, arrivals, values, faults)]
+
+    @property
+    def disagreement(self) -> str:
+        """Why the odometry is not of one run, in words; empty if it may be."""
+        stamps, _, values = self._fit_odometry()
+        return disagreement(stamps, values[:, :2])
+
+    @property
+    def contradictions(self) -> int:
+        """How many messages of odometry have the stamp of another, but not its values."""
+        stamps = self._fit_odometry()[0]
+        return len(stamps) - len(np.unique(stamps))
+
+    def _fit_odometry(self) -> tuple[Stamps, Stamps, Array]:
+        """Stamps, log times and values of what is fit, each message once."""
+        stamps, arrivals, values, faults = in_order(self.parts[topics.ODOMETRY])
+        fit = (faults == 0) & ~are_copies(stamps, values)
+        return stamps[fit], arrivals[fit], values[fit]
 
     def within(self, begin: float, end: float) -> "Collected":
         """What was recorded between two log times [ns], with the parameters known by the end."""
@@ -105,7 +140,23 @@ def collect(
                     found.take(name, batch)
             except (KeyError, IndexError, ValueError) as error:
                 bag.lose(f"{topic}: messages are not what they should be ({error})")
+    for found in collected.values():
+        found.leave_out_strays()
     return collected, told
+
+
+def check_one_run(path: Path, names: Topics, namespace: str) -> list[str]:
+    """Return what is to be said of a bag; raises `ValueError` if a climber has runs, not one."""
+    with open_bag(path) as bag:
+        found = collect(bag, names, [namespace])[0][namespace]
+        topic = names.full(topics.ODOMETRY, namespace)
+        if found.parts[topics.ODOMETRY]:
+            if (count := len(found.runs())) > 1:
+                said = f"time starts again, there are {count} runs: want one"
+                raise ValueError(f"{path}: {topic}: {said}")
+            if found.disagreement:
+                raise ValueError(f"{path}: no run on {topic}: {found.disagreement}")
+        return bag.losses
 
 
 def _parameters(batch: Batch) -> Iterator[tuple[int, dict[str, Any]]]:

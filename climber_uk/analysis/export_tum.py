@@ -34,7 +34,7 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
         if not found.parts[ODOMETRY]:
             raise ValueError("; ".join([f"{bag} has no message on {topic}", *opened.losses]))
         runs = []
-        for part in found.runs():
+        for part in reader.parts(found):
             try:
                 reader.check_agreement(part)
             except NoRunError as error:
@@ -76,8 +76,6 @@ def main() -> None:
     try:
         with output(options.bag, "tum", options.output) as directory:
             runs, losses = read_poses(options.bag, options.namespace.strip("/"))
-            if len(runs) > 1:
-                losses.append(f"time starts again, there are {len(runs)} runs")
             for loss in losses:
                 print(printable(f"export_tum: {options.bag}: {loss}"), file=sys.stderr)
             for number, found in enumerate(runs, start=1):

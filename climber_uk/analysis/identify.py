@@ -13,6 +13,7 @@ from typing import Any
 
 from climber_uk.analysis import excitation, identification_figure
 from climber_uk.analysis.changed_parameters import write_changed
+from climber_uk.analysis.collecting import check_one_run
 from climber_uk.analysis.identification import identify
 from climber_uk.analysis.identification_report import (
     CONTROLLER,
@@ -26,6 +27,7 @@ from climber_uk.analysis.identification_report import (
 )
 from climber_uk.analysis.identified import NAMES
 from climber_uk.analysis.integral_equations import Cut
+from climber_uk.analysis.outputs import printable
 from climber_uk.analysis.parameter_file import Values, read_file
 from climber_uk.analysis.recorded_motion import Source, read_motion
 from climber_uk.analysis.recorded_site import (
@@ -34,7 +36,7 @@ from climber_uk.analysis.recorded_site import (
     recorded_parameters,
     site_of,
 )
-from climber_uk.analysis.topics import PARAMETERS
+from climber_uk.analysis.topics import ODOMETRY, PARAMETERS, Topics
 from climber_uk.mechanics.climber import Climber
 from climber_uk.system.command_line import Parser
 
@@ -51,6 +53,9 @@ def tell(options: argparse.Namespace) -> None:
     recorded = recorded_parameters(options.bag, topic)
     parameters = {**recorded, **file}
     believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
+    names = Topics({ODOMETRY: options.odometry})
+    for loss in check_one_run(options.bag, names, options.namespace.strip("/")):
+        print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
     motion, unfit = read_motion(options.bag, source(options, {**file, **recorded}, believed))
     found = identify(motion, believed, cut, site)
     print(table(found, believed), end="")

@@ -12,7 +12,6 @@ import numpy as np
 
 from climber_uk.analysis.joints import wheel_names
 from climber_uk.analysis.publishing_order import read_published
-from climber_uk.analysis.restarts import restarts
 from climber_uk.analysis.topics import TORQUES
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
@@ -74,10 +73,7 @@ class RecordedController:
             self._set_before = self._setting
 
     def _take_torques(self, parameters: Mapping[str, Any]) -> None:
-        """Take the two wheels' torques; `ValueError` if that cannot be, or of more than one run."""
-        answers = [stamp for stamp, _ in self._efforts if stamp > 0]  # 0 answers no odometry
-        if again := len(restarts(np.array(answers, np.int64))):
-            raise ValueError(f"time starts again, there are {again + 1} runs: a replay is of one")
+        """Take the two wheels' torques; raises `ValueError` if that cannot be."""
         joints = {joint for _, efforts in self._efforts for joint in efforts}
         wheels = wheel_names(joints, parameters)
         for stamp, efforts in self._efforts:

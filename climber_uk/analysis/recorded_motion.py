@@ -1,6 +1,6 @@
 """How a climber moved and what drove it, as arrays, from the messages of a bag."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.even_time import lagging, rate
+from climber_uk.analysis.restarts import are_strays
+from climber_uk.analysis.taking import FAULTS, STRAY
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading
 
@@ -164,7 +166,17 @@ def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]],
         else:
             if content is not None:
                 found[name][reading.nanoseconds(message.header.stamp) / SECOND] = content
-    return [dict(sorted(contents.items())) for contents in found.values()], unfit
+    return [dict(sorted(_at_sound_times(contents, unfit))) for contents in found.values()], unfit
+
+
+def _at_sound_times(contents: dict[float, Any], unfit: list[str]) -> Iterator[tuple[float, Any]]:
+    """Contents without those whose stamps are far off those recorded around them."""
+    strays = are_strays(np.array([round(time * SECOND) for time in contents], np.int64))
+    for item, is_stray in zip(contents.items(), strays.tolist(), strict=True):
+        if is_stray:
+            unfit.append(FAULTS[STRAY])
+        else:
+            yield item
 
 
 def _wheels(message: Any, joints: Sequence[str]) -> Wheels | None:

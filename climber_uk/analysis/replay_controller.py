@@ -15,12 +15,13 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
+from climber_uk.analysis.collecting import check_one_run
 from climber_uk.analysis.outputs import output, printable
 from climber_uk.analysis.parameter_file import read_argument, read_file
 from climber_uk.analysis.publishing_order import are_known
 from climber_uk.analysis.recorded_controller import NODE, PARAMETERS, RecordedController
 from climber_uk.analysis.replay import DEFAULTS, Replay
-from climber_uk.analysis.topics import TORQUES
+from climber_uk.analysis.topics import TORQUES, Topics
 from climber_uk.analysis.torque_comparison import (
     WHEELS,
     Comparison,
@@ -49,6 +50,8 @@ def replayed(options: argparse.Namespace) -> Comparison:
         raise ValueError(
             f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
         )
+    for loss in check_one_run(options.bag, Topics(), namespace.strip("/")):
+        print(printable(f"replay_controller: {options.bag}: {loss}"), file=sys.stderr)
     if not are_known(options.bag, [f"{namespace}/{TORQUES}"]):
         print(
             f"replay_controller: {options.bag} does not tell when messages were published: they "

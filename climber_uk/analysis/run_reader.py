@@ -13,7 +13,7 @@ from climber_uk.analysis.collecting import Collected
 from climber_uk.analysis.events import Event
 from climber_uk.analysis.joints import Joints, of_both, of_one, wheel_names
 from climber_uk.analysis.parameter_file import Values
-from climber_uk.analysis.recorded import Recorded, in_order
+from climber_uk.analysis.recorded import Recorded
 from climber_uk.analysis.reference import poses_at
 from climber_uk.analysis.run import RecordedRun
 from climber_uk.analysis.taking import TAKEN
@@ -22,7 +22,6 @@ from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
-APART, OFTEN = 0.05, 5  # [m] and number of messages: from then on they are not of one climber
 NOTHING = Recorded.of([])
 NAMES = "left_wheel_joint", "right_wheel_joint", "adhesion"
 Told = Mapping[str, Any]  # parameters of a controller, by name
@@ -53,10 +52,7 @@ class RunReader:
             topic = self.topic(topics.REFERENCE)
             self.bag.lose(f"{topic}: {found.lost_previews} messages left out: a point is unfit")
         self.check_truth(found)
-        parts = found.runs()
-        if len(parts) > 1:
-            topic = self.topic(topics.ODOMETRY)
-            self.bag.lose(f"{topic}: time starts again, there are {len(parts)} runs")
+        parts = self.parts(found)
         runs, reasons = [], []
         for number, part in enumerate(parts, start=1):
             try:
@@ -70,6 +66,14 @@ class RunReader:
             self.bag.lose(reason)
         return runs
 
+    def parts(self, found: Collected) -> list[Collected]:
+        """What belongs to each run; says if there are several."""
+        parts = found.runs()
+        if len(parts) > 1:
+            topic = self.topic(topics.ODOMETRY)
+            self.bag.lose(f"{topic}: time starts again, there are {len(parts)} runs")
+        return parts
+
     def check_truth(self, found: Collected) -> None:
         """Do not use poses of which it is not known where they are to the odometry's."""
         here, there = (found.frames.get(name, "") for name in (topics.ODOMETRY, topics.TRUTH))
@@ -79,18 +83,13 @@ class RunReader:
             self.bag.lose(f"{topic}: not used, frame_id={there!r} is not the odometry's, {here!r}")
 
     def check_agreement(self, found: Collected) -> None:
-        """Raise `NoRunError` if the odometry tells of two places at one time, again and again.
-
-        As where two runs have the same log times too: their messages lie between each other.
-        """
-        stamps, _, values, faults = in_order(found.parts[topics.ODOMETRY])
-        stamps, place = stamps[faults == 0], values[faults == 0, :2]
-        _, first, same = np.unique(stamps, return_index=True, return_inverse=True)
-        apart = np.hypot(*(place - place[first[same]]).T) > APART
-        if (count := int(np.sum(apart))) >= OFTEN:
-            raise NoRunError(
-                f"no run on {self.topic(topics.ODOMETRY)}: {count} messages are more than "
-                f"{APART:g} m from another with the same stamp: two runs, or two publishers"
+        """Raise `NoRunError` if what is read as one run cannot be."""
+        if found.disagreement:
+            raise NoRunError(f"no run on {self.topic(topics.ODOMETRY)}: {found.disagreement}")
+        if count := found.contradictions:
+            self.bag.lose(
+                f"{self.topic(topics.ODOMETRY)}: {count} messages have the stamp of another, but "
+                "not its values: the first one counts"
             )
 
     def run(self, found: Collected, told: Collection[Event], part: str) -> RecordedRun:

@@ -19,7 +19,9 @@ FAULTS = (
     "orientation not finite",
     f"norm of the quaternion off 1 by more than {NORM_TOLERANCE:.0%}",
     f"not a turn about z: tilted by more than {degrees(2 * asin(MOST_TILT)):.1f}°",
+    "stamp far off those around it",
 )
+STRAY = len(FAULTS) - 1
 
 
 def heading(batch: Batch, path: str) -> tuple[Array, Faults]:

@@ -107,6 +107,7 @@ def test_changed_parameters_hold_in_every_namespace_and_leave_the_others(tmp_pat
 def test_the_table_is_written_as_json_and_drawn(monkeypatch, tmp_path, capsys):
     from test_identification import moved
 
+    monkeypatch.setattr(identify, "check_one_run", lambda *_: [])
     monkeypatch.setattr(identify, "read_motion", lambda *_: (moved(noise=1.0, wheels=True), 3))
     files = {name: tmp_path / f"a.{name}" for name in ("json", "figure", "output")}
     run(monkeypatch, "bag", *(part for name, file in files.items() for part in (f"--{name}", file)))
