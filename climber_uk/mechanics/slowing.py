@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives
@@ -16,6 +17,9 @@ from climber_uk.mechanics.elementary import Derivatives
 DEGREE = 4
 # cells of s are halved until none turns by more, and ρ is not much higher than in the next
 TURN, CONTRAST, HALVINGS = 0.15, 1.25, 24  # [rad], ratio
+FINEST = 2.0**-12  # of the spacing of knots, to which cells are halved for the contrast
+STEEPER = 1.2  # times as fast as foreseen that speed may change, before cells are halved for it
+MOST_CELLS = 800_000  # about 8000 sharp corners
 WITHIN = np.linspace(1e-6, 1 - 1e-6, 9)  # where a cell is looked at: beside ends that turn back
 MARGIN = 1.01  # for what peaks in between
 
@@ -70,13 +74,12 @@ def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: Limi
 
     # most d(σ²)/ds of σ = 1/ρ
     most = min(2**0.5 * limits.acceleration / max(limits.rate, 1e-9) ** 2, 4.0 / spacing)
-    size, needed = _cells(curve, length if closed else None, length, most, limits, spacing / 64)
+    size, needed = _cells(curve, length if closed else None, length, most, limits, FINEST * spacing)
     mode: Any = "wrap" if closed else "edge"
     steps = np.pad(size, DEGREE, mode)
     knots = np.concatenate([[0.0], np.cumsum(steps)]) - steps[:DEGREE].sum()
     knots[DEGREE], knots[-DEGREE - 1] = 0.0, length
-    reach = np.lib.stride_tricks.sliding_window_view(np.pad(needed, DEGREE, mode), DEGREE + 1)
-    slowness = BSpline(knots, reach.max(axis=1), DEGREE)
+    slowness = BSpline(knots, _reaching(needed, mode), DEGREE)
     parameter = slowness.antiderivative()
     parameter.c = parameter.c - parameter(0.0)
     cells = knots[DEGREE:-DEGREE]
@@ -89,26 +92,62 @@ def _cells(
     """Sizes (n,) of cells small enough to tell where it is how slow, and the ρ (n,) in each."""
     edges = np.unique(np.clip(curve.t, 0.0, length))
     start, size = edges[:-1], np.diff(edges)
+    _check_number(start)
     turning, needed = _look(curve, start, size, limits)
     mode: Any = "edge" if period is None else "wrap"
-    for _ in range(HALVINGS):
+    for number in range(2 * HALVINGS):
         foreseen = _foreseen(start + size / 2, needed, period, most)
         beside = np.pad(foreseen, 1, mode)
         contrast = np.maximum(beside[:-2], beside[2:]) / foreseen
         turns = turning * size > TURN
+        if number >= HALVINGS and turns.any():
+            break
         next_to = np.pad(size, 1, mode)
         wide = turns | ((contrast > CONTRAST) & (size > least))
         wide |= size > 2.1 * np.minimum(next_to[:-2], next_to[2:])
         if not wide.any():
+            wide = _beside_steep(size, foreseen, most, mode)
+        if not wide.any() or number == 2 * HALVINGS - 1:
             return size, foreseen
         parts = 1 + wide
         start, size, turns = (np.repeat(x, parts) for x in (start, size / parts, turns))
         turning, needed = np.repeat(turning, parts), np.repeat(needed, parts)
+        _check_number(start)
         second = np.flatnonzero(np.repeat(wide, parts))[1::2]
         start[second] += size[second]
         turning[turns], needed[turns] = _look(curve, start[turns], size[turns], limits)
     x, y = curve(start[np.argmax(turning)])
     raise ValueError(f"the path turns on the spot at ({x:.4g}, {y:.4g}) m: leave points out there")
+
+
+def _reaching(needed: Array, mode: Any) -> Array:
+    """Coefficients (n + 4,) of ρ: each the highest of the cells that its basis function reaches."""
+    return sliding_window_view(np.pad(needed, DEGREE, mode), DEGREE + 1).max(axis=1)
+
+
+def _beside_steep(size: Array, needed: Array, most: float, mode: Any) -> Any:
+    """Cells (n,) to halve, as they are larger than others where ρ rises or falls too steeply.
+
+    Where ρ leaves the reach of a large cell, it does so in the width of the small ones beside it.
+    """
+    coefficients = _reaching(needed, mode)
+    around = sliding_window_view(np.pad(size, DEGREE, mode), DEGREE + 2)
+    slope = DEGREE * np.diff(coefficients) / around[:, 1:-1].sum(axis=1)
+    rho = (coefficients[1:] + coefficients[:-1]) / 2
+    steep = np.flatnonzero(np.abs(slope) / rho**3 > STEEPER * most / 2)
+    largest = around[steep] > 0.9 * around[steep].max(axis=1, keepdims=True)
+    chosen = (steep[:, None] + np.arange(DEGREE + 2))[largest] - DEGREE
+    number, wide = len(size), np.zeros(len(size), bool)
+    wide[chosen % number if mode == "wrap" else np.clip(chosen, 0, number - 1)] = True
+    return wide
+
+
+def _check_number(cells: Array) -> None:
+    if len(cells) > MOST_CELLS:
+        raise ValueError(
+            f"too many bends: they take more than {MOST_CELLS} pieces, as about 8000 sharp "
+            "corners do: leave points out, or drive it in parts"
+        )
 
 
 def _look(curve: Any, start: Array, size: Array, limits: Limits) -> tuple[Array, Array]:
