@@ -67,7 +67,10 @@ class Section:
 
     @cached_property
     def is_shared(self) -> bool:
-        """Whether nodes of any name are meant: not each of them has all of these parameters."""
+        """Whether nodes of any name are meant: not each of them has all of these parameters.
+
+        `/**/x` means x, wherever it is: what x does not have can only be a mistake there.
+        """
         return self.name.endswith("*")
 
     def is_for(self, node: str) -> bool:
@@ -78,7 +81,7 @@ class Section:
 
 
 class Given(NamedTuple):
-    """A value, and whether nodes of any name are given it."""
+    """A value, and whether it is given to nodes of any name, and never to one by its name."""
 
     value: Any
     is_shared: bool
@@ -117,12 +120,12 @@ def read_file(path: Path, node: str) -> dict[str, Any]:
 
 def given(sections: Iterable[Section], node: str) -> dict[str, Given]:
     """What sections have for a node, of two entries the later one's."""
-    return {
-        name: Given(value, section.is_shared)
-        for section in sections
-        if section.is_for(node)
-        for name, value in section.values.items()
-    }
+    found: dict[str, Given] = {}
+    for section in sections:
+        for name, value in section.values.items() if section.is_for(node) else ():
+            is_shared = section.is_shared and (name not in found or found[name].is_shared)
+            found[name] = Given(value, is_shared)
+    return found
 
 
 def similar(name: str, known: Iterable[str]) -> str:

@@ -60,6 +60,68 @@ def test_a_parameter_is_taken_under_its_former_name_with_a_remark(given, length)
     rclpy.shutdown(context=context)
 
 
+@dataclass(frozen=True)
+class Sized:
+    """A parameter."""
+
+    length: float = parameter(1.0, "m", "length")
+
+
+def started(namespace, *arguments):
+    """Length, and remarks, of a node x in a namespace; raises `ValueError` if it does not start."""
+    arguments = ["--ros-args", *map(str, arguments)]
+    context = Context()
+    rclpy.init(args=arguments, context=context)
+    how = {"start_parameter_services": False, "enable_rosout": False}
+    node = Node("x", context=context, namespace=namespace, **how)
+    try:
+        parameters = Parameters(node, arguments)
+        parameters.declare(Sized)
+        parameters.refuse_unknown()
+        return parameters.read(Sized).length, parameters.remarks
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+SHARED = ["given to all nodes, but no parameter of this one: width"]
+
+
+@pytest.mark.parametrize(
+    ("namespace", "name", "is_shared"),
+    [
+        *(("", name, False) for name in ("x", "/x", "/**/x")),
+        *(("/a", name, False) for name in ("/a/x", "a/x", "/**/x", "/*/x", "/**/a/x")),
+        *(("/a/b", name, False) for name in ("/a/b/x", "/*/b/x", "/a/**/x", "/**/x")),
+        *(("", name, True) for name in ("/**", "/*")),
+        *(("/a", name, True) for name in ("/**", "/a/*", "/a/**", "/*/*", "/*/**", "/**/*")),
+    ],
+)
+def test_a_parameter_that_a_node_has_not_is_refused_by_its_name_and_remarked_if_all_are_meant(
+    tmp_path, namespace, name, is_shared
+):
+    file = tmp_path / "x.yaml"
+    file.write_text(f"{name}:\n  ros__parameters: {{length: 2, width: 3.0}}\n")
+    full = f"{namespace}/x"
+    assert read_file(file, full) == {"length": 2, "width": 3.0}
+    if is_shared:
+        assert started(namespace, "--params-file", file) == (2.0, SHARED)
+    else:
+        with pytest.raises(ValueError, match=r"^width is not a parameter of x$"):
+            started(namespace, "--params-file", file)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_one_that_is_given_by_name_as_well_is_refused(tmp_path, order):
+    file = tmp_path / "x.yaml"
+    sections = [f"{name}:\n  ros__parameters: {{width: 3.0}}\n" for name in ("/**", "/**/x")]
+    file.write_text("".join(sections[::order]))
+    with pytest.raises(ValueError, match=r"^width is not a parameter of x$"):
+        started("", "--params-file", file)
+    with pytest.raises(ValueError, match=r"^width is not a parameter of x$"):
+        started("", "-p", "width:=3.0")
+
+
 def same(one, other):
     return type(one) is type(other) and (
         one == other or (isinstance(one, float) and math.isnan(one) and math.isnan(other))
