@@ -44,8 +44,9 @@ class Bag:
 
     @property
     def types(self) -> dict[str, str]:
-        """Type of every topic."""
-        return {connection.topic: connection.msgtype for connection in self.connections}
+        """Type of every topic; of two the one with more messages."""
+        by_count = sorted(self.connections, key=attrgetter("msgcount"))
+        return {connection.topic: connection.msgtype for connection in by_count}
 
     def count(self, topics: Collection[str]) -> int:
         """Return how many messages of some topics there should be."""

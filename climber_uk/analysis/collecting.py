@@ -52,7 +52,9 @@ class Collected:
         elif name in (topics.TORQUES, topics.JOINTS):
             self.joints[name].append(Joints.of(batch))
         else:
-            self.frames.setdefault(name, batch.strings["header.frame_id"])
+            frame = batch.strings["header.frame_id"]
+            if frame != (first := self.frames.setdefault(name, frame)):
+                raise ValueError(f"frame_id={frame!r}, others have {first!r}")
             self.parts[name].append((batch.stamps, batch.log_times, *TAKEN[name](batch)))
 
     def runs(self) -> list["Collected"]:

@@ -6,7 +6,7 @@ publishing as well. Where there is none, as in sqlite3, or where a middleware or
 it 0, it is the log time.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from heapq import merge
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,14 @@ from typing import Any
 from climber_uk.analysis.bag import Bag, open_bag
 
 
-def read_published(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, publishing time [ns] and message; raises as `open_bag` does."""
+def read_published(path: Path, topics: Mapping[str, str]) -> Iterator[tuple[str, int, Any]]:
+    """Yield topic, publishing time [ns] and message; raises as `open_bag` does.
+
+    Messages are those of some topics that have the type which `topics` tells.
+    """
     with open_bag(path) as bag:
         known = _are_known(bag, topics)
-        streams = [_published(bag, topic, known) for topic in topics]
+        streams = [_published(bag, topic, of, known) for topic, of in topics.items()]
         yield from merge(*streams, key=lambda message: message[1])
 
 
@@ -32,6 +35,7 @@ def _are_known(bag: Bag, topics: Collection[str]) -> bool:
     return all(publish_time for _, _, publish_time, _ in bag.recorded(topics))
 
 
-def _published(bag: Bag, topic: str, known: bool) -> Iterator[tuple[str, int, Any]]:
-    for _, log_time, publish_time, message in bag.messages([topic]):
-        yield topic, publish_time if known else log_time, message
+def _published(bag: Bag, topic: str, of: str, known: bool) -> Iterator[tuple[str, int, Any]]:
+    for connection, log_time, publish_time, message in bag.messages([topic]):
+        if connection.msgtype == of:
+            yield topic, publish_time if known else log_time, message

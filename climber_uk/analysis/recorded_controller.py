@@ -12,7 +12,7 @@ import numpy as np
 
 from climber_uk.analysis.joints import wheel_names
 from climber_uk.analysis.publishing_order import read_published
-from climber_uk.analysis.topics import TORQUES
+from climber_uk.analysis.topics import TORQUES, types_of
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 from climber_uk.messages import reading
@@ -55,7 +55,7 @@ class RecordedController:
             CLOCK: self._on_clock,
             DIAGNOSTICS: self._on_diagnostics,
         }
-        for name, at, message in read_published(bag, takers):
+        for name, at, message in read_published(bag, types_of(takers)):
             takers[name](at, message)
         if not self._efforts:
             raise ValueError(f"{bag} has no message on {topic}")

@@ -13,6 +13,7 @@ from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.even_time import lagging, rate
 from climber_uk.analysis.restarts import are_strays
 from climber_uk.analysis.taking import FAULTS, STRAY
+from climber_uk.analysis.topics import ODOMETRY, TYPES
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages import reading
 
@@ -160,6 +161,8 @@ def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]],
     for topic, _, message in read_messages(bag, topics):
         name = topics[topic]
         try:
+            if message.__msgtype__ != (wanted := TYPES.get(name, TYPES[ODOMETRY])):
+                raise ValueError(f"type {message.__msgtype__} must be {wanted}")
             content = readers[name](message)
         except ValueError as error:
             unfit.append(str(error))

@@ -44,6 +44,7 @@ def read_runs(
                 if namespaces or all_of_them:
                     raise ValueError(f"{path}: {'; '.join(bag.losses)}") from None
         if not runs:
-            lost = "; ".join(bag.losses) or f"no odometry on a topic {topics.ODOMETRY}"
-            raise ValueError(f"{path}: {lost}")
+            if not collected:
+                bag.lose(f"no odometry on a topic {topics.ODOMETRY}")
+            raise ValueError(f"{path}: {'; '.join(bag.losses)}")
         return runs, bag.losses

@@ -13,6 +13,7 @@ from typing import Any
 from climber_uk.analysis.bag import read_messages
 from climber_uk.analysis.integral_equations import Site
 from climber_uk.analysis.parameter_file import Values
+from climber_uk.analysis.topics import PARAMETERS, TYPES
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.wall import WALLS
 from climber_uk.messages import reading
@@ -47,6 +48,8 @@ def recorded_parameters(bag: Path, topic: str) -> dict[str, Any]:
     """Those that a controller told first on a topic; none if it did not, or there is no bag."""
     with suppress(FileNotFoundError):  # `read_motion` says so
         for _, _, message in read_messages(bag, [topic]):
+            if message.__msgtype__ != TYPES[PARAMETERS]:
+                continue
             return dict(reading.parameters(message))
     return {}
 

@@ -13,7 +13,7 @@ from typing import Any
 from climber_uk.analysis.parameter_file import Values
 from climber_uk.analysis.publishing_order import read_published
 from climber_uk.analysis.recorded_controller import CLOCK, Modes, RecordedController
-from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TORQUES
+from climber_uk.analysis.topics import ODOMETRY, REFERENCE, TORQUES, types_of
 from climber_uk.control.follower import Answer
 from climber_uk.control.settings import KINDS, new_follower, settings
 from climber_uk.mechanics import SECOND, Array
@@ -21,6 +21,7 @@ from climber_uk.mechanics.motion import Torques
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.names import Names
 
+MOST_LOOKS = 10_000  # at inputs that have stopped: by then nothing changes any more
 PRESSURE = "suction_pressure"
 DEFAULTS = {
     prefix + field.name: field.default
@@ -72,7 +73,7 @@ class Replay:
             f"{namespace}/{PRESSURE}": self.on_pressure,
             f"{namespace}/{TORQUES}": self.on_torques,
         }
-        for topic, at, message in read_published(bag, takers):
+        for topic, at, message in read_published(bag, types_of(takers)):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
@@ -87,7 +88,7 @@ class Replay:
 
     def look_until(self, at: int) -> None:
         """Look, at the node's intervals of the wall clock, whether inputs have stopped."""
-        self.looked = self.looked or at
+        self.looked = max(self.looked or at, at - MOST_LOOKS * self.look_period)
         while self.looked + self.look_period <= at:
             self.looked += self.look_period
             self.pass_time(self.looked)

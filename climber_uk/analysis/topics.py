@@ -1,6 +1,6 @@
 """Which topics of a bag are a climber's."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
@@ -14,6 +14,16 @@ NAMES = (
     *(ODOMETRY, TRUTH, REFERENCE, REFERENCE_TIME, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE),
     *MARGINS,
 )
+CLOCK = "/clock"
+TYPES = {
+    **dict.fromkeys((ODOMETRY, TRUTH), "nav_msgs/msg/Odometry"),
+    **dict.fromkeys((TORQUES, JOINTS), "sensor_msgs/msg/JointState"),
+    REFERENCE: "trajectory_msgs/msg/MultiDOFJointTrajectory",
+    PRESSURE: "sensor_msgs/msg/FluidPressure",
+    PARAMETERS: "rcl_interfaces/msg/ParameterEvent",
+    CLOCK: "rosgraph_msgs/msg/Clock",
+    DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+}  # of those that are read message by message
 KNOWN = {*NAMES, DIAGNOSTICS, LOG}
 MOST_CLIMBERS = 100  # that are told of, unless they were chosen
 
@@ -58,10 +68,20 @@ class Topics:
         found = sorted(
             topic.removesuffix(name).strip("/")
             for topic, kind in types.items()
-            if kind == "nav_msgs/msg/Odometry" and topic.endswith(name)
+            if kind == TYPES[ODOMETRY] and topic.endswith(name)
         )
         if len(found) > MOST_CLIMBERS:
             raise ValueError(
                 f"odometry of {len(found)} climbers, more than {MOST_CLIMBERS}: choose by namespace"
             )
         return found
+
+
+def types_of(topics: Iterable[str]) -> dict[str, str]:
+    """Type that each of some topics should have, by their full names, which end in ours."""
+    return {
+        topic: of
+        for topic in topics
+        for name, of in TYPES.items()
+        if f"/{topic}".endswith(f"/{name.lstrip('/')}")
+    }

@@ -5,6 +5,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 PACKAGE = "climber_uk"
@@ -31,7 +32,19 @@ class Parser(argparse.ArgumentParser):
             sys.stdout = io.TextIOWrapper(
                 binary, out.encoding, out.errors, line_buffering=out.line_buffering
             )
-        return self.parse_args(given)
+        options = self.parse_args(given)
+        for name, value in vars(options).items():
+            setattr(options, name, self._at_home(value))
+        return options
+
+    def _at_home(self, value: Any) -> Any:
+        """The same, paths with the home directory for ~, which shells leave in `--output=~/x`."""
+        if isinstance(value, list):
+            return [self._at_home(one) for one in value]
+        try:
+            return value.expanduser() if isinstance(value, Path) else value
+        except RuntimeError:
+            self.error(f"{value}: there is no such user")
 
     def error(self, message: str) -> NoReturn:
         """Exit with one line."""
