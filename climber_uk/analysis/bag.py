@@ -131,7 +131,7 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
     """
     path = Path(path)
     if not path.exists():
-        raise FileNotFoundError(f"there is no bag {path}")
+        raise FileNotFoundError(f"there is no bag {one_line(str(path))}")
     losses: list[str] = []
     failures: list[str] = []
 
@@ -150,7 +150,7 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
                 tell_loss(failures, f"{file.name}: {_said(error)}")
         if not files:
             why = "; ".join(failures) or "neither metadata.yaml nor an .mcap or .db3 file in it"
-            raise ValueError(f"{path} is no readable bag: {why}{one_line(other_files(path))}")
+            raise ValueError(one_line(f"{path} is no readable bag: {why}{other_files(path)}"))
         for failure in failures:
             lose(f"{failure}: not read")
         yield Bag(path, sorted(files, key=attrgetter("start")), losses)

@@ -38,7 +38,7 @@ class Limits:
     size: float = parameter(2.0, "m", "side of the square that it stays in", above=0)
     speed: float = parameter(0.3, "m/s", "highest speed", above=0)
     torque: float = parameter(4.0, "N m", "highest torque of a wheel", above=0)
-    duration: float = parameter(60.0, "s", "longest time", above=0)
+    duration: float = parameter(60.0, "s", "longest time", above=0, at_most=3600)
 
     def __post_init__(self) -> None:
         check(self)

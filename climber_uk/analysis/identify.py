@@ -27,7 +27,7 @@ from climber_uk.analysis.identification_report import (
 )
 from climber_uk.analysis.identified import NAMES
 from climber_uk.analysis.integral_equations import Cut
-from climber_uk.analysis.outputs import printable
+from climber_uk.analysis.outputs import check_writable, printable
 from climber_uk.analysis.parameter_file import Values, read_file
 from climber_uk.analysis.recorded_motion import Source, read_motion
 from climber_uk.analysis.recorded_site import (
@@ -38,7 +38,7 @@ from climber_uk.analysis.recorded_site import (
 )
 from climber_uk.analysis.topics import ODOMETRY, PARAMETERS, Topics
 from climber_uk.mechanics.climber import Climber
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, between
 
 PUBLISHER = "trajectory_publisher"
 SIDES = "right", "left"
@@ -135,7 +135,7 @@ def main() -> None:
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument("--odometry", default="odom", help="topic (default: odom)")
     parser.add_argument(
-        "--delay", type=float, help="[s] of torques, unless joint_states tells them"
+        "--delay", type=between(0.0, 10.0), help="[s] of torques, unless joint_states tells them"
     )
     parser.add_argument("--output", "-o", type=Path, help="write a parameter file for the nodes")
     parser.add_argument("--json", type=Path, help="write the table as JSON")
@@ -152,6 +152,9 @@ def main() -> None:
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
     try:
+        for file in (options.output, options.json, options.figure, options.plan):
+            if file:
+                check_writable(file.parent)
         if options.plan:
             plan(options)
         else:

@@ -10,6 +10,8 @@ from itertools import count
 from pathlib import Path
 from tempfile import TemporaryFile
 
+from climber_uk.analysis.connection import one_line
+
 
 @contextmanager
 def output(bag: Path, name: str, given: Path | None) -> Iterator[Path]:
@@ -19,7 +21,7 @@ def output(bag: Path, name: str, given: Path | None) -> Iterator[Path]:
     line if there is no bag, or if nobody can write there.
     """
     if not bag.exists():
-        raise FileNotFoundError(f"there is no bag {bag}")
+        raise FileNotFoundError(f"there is no bag {one_line(str(bag))}")
     directory = given or new_directory(bag, name)
     made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:

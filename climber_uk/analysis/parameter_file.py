@@ -36,6 +36,7 @@ SPECIAL = re.compile(r"[-+]?(\.?(inf|nan)|infinity)", re.IGNORECASE)
 FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE)
 LEAST = sys.float_info.min
+LARGEST = 2**24  # [bytes] of a file
 
 
 @dataclass(frozen=True)
@@ -193,9 +194,9 @@ def _value(text: str, style: str | None) -> bool | int | float | str:
 
 def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Keys and value of each entry of a file, in its order."""
-    tables = _Tables()
+    tables, line = _Tables(), 1
     try:
-        for event in yaml.parse(path.read_text(encoding="utf-8"), PARSER):
+        for event in yaml.parse(_text(path), PARSER):
             line = event.start_mark.line + 1  # type: ignore[union-attr]
             for value in tables.take(event):
                 yield tuple(tables.keys), value
@@ -204,6 +205,17 @@ def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
         raise ValueError(f"{path} is no parameter file: {' '.join(str(error).split())}") from None
     except ValueError as error:
         raise ValueError(f"{path} is no parameter file: line {line}: {error}") from None
+
+
+def _text(path: Path) -> str:
+    with path.open("rb") as stream:
+        content = stream.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise ValueError(f"larger than {LARGEST >> 20} MiB")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise ValueError("not a text in UTF-8") from None
 
 
 class _Tables:

@@ -150,18 +150,19 @@ def _collected(bag: str | Path, source: Source) -> tuple[list[dict[float, Any]],
     """Contents by stamp [s] of odometry, commands, wheels and pressure; why others are unfit."""
     right, left = source.joints
     readers: dict[str, Callable[[Any], Any]] = {
-        source.odometry: lambda m: reading.state(m, m.header.frame_id, m.child_frame_id),
+        ODOMETRY: lambda m: reading.state(m, m.header.frame_id, m.child_frame_id),
         "wheel_torques": lambda m: reading.wheel_torques(m, left, right),
         "joint_states": lambda m: _wheels(m, source.joints),
         "suction_pressure": reading.pressure,
     }
-    topics = {source.topic(name): name for name in readers}
+    topics = {source.topic(source.odometry): ODOMETRY}
+    topics |= {source.topic(name): name for name in readers if name != ODOMETRY}
     found: dict[str, dict[float, Any]] = {name: {} for name in readers}
     unfit: list[str] = []
     for topic, _, message in read_messages(bag, topics):
         name = topics[topic]
         try:
-            if message.__msgtype__ != (wanted := TYPES.get(name, TYPES[ODOMETRY])):
+            if message.__msgtype__ != (wanted := TYPES[name]):
                 raise ValueError(f"type {message.__msgtype__} must be {wanted}")
             content = readers[name](message)
         except ValueError as error:

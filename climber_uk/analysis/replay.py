@@ -21,6 +21,7 @@ from climber_uk.mechanics.motion import Torques
 from climber_uk.messages import reading, reading_reference
 from climber_uk.messages.names import Names
 
+SHORTEST_LOOK = SECOND // 1000  # [ns] between two looks at whether inputs have stopped
 MOST_LOOKS = 10_000  # at inputs that have stopped: by then nothing changes any more
 PRESSURE = "suction_pressure"
 DEFAULTS = {
@@ -48,9 +49,8 @@ class Replay:
         self.modes: Modes = []
         self.clock = self.looked = 0  # times of the node's clock, and of the wall clock
         safety = self.follower.safety
-        self.look_period = round(
-            min(safety.odometry_timeout, safety.reference_timeout) / 2 * SECOND
-        )
+        timeout = min(safety.odometry_timeout, safety.reference_timeout)
+        self.look_period = max(round(timeout / 2 * SECOND), SHORTEST_LOOK)
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:

@@ -30,7 +30,7 @@ from climber_uk.analysis.torque_comparison import (
     table,
     write_csv,
 )
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, between
 
 
 def replayed(options: argparse.Namespace) -> Comparison:
@@ -99,7 +99,10 @@ def main() -> None:
         help="directory (default: a new one, replay, in the bag or beside it)",
     )
     parser.add_argument(
-        "--fail-above", type=float, metavar="TORQUE", help="status 1 if a torque differs more [N m]"
+        "--fail-above",
+        type=between(0.0, 1e6),
+        metavar="TORQUE",
+        help="status 1 if a torque differs more [N m]",
     )
     options = parser.arguments()
     try:

@@ -17,7 +17,7 @@ from climber_uk.analysis.recorded_run import read_runs
 from climber_uk.analysis.tables import Column, text, to_csv, to_json
 from climber_uk.analysis.topics import Topics
 from climber_uk.mechanics.climber import Climber
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, between
 
 NODE = "uk_torque_controller"
 OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
@@ -56,7 +56,7 @@ def parser(name: str, description: str | None) -> Parser:
     )
     made.add_argument(
         "--settled",
-        type=float,
+        type=between(0.0, 1e6),
         default=0.01,
         metavar="METRES",
         help="distance from the reference below which a run has settled (default: %(default)s)",

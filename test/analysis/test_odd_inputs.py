@@ -1,0 +1,239 @@
+"""Odd bags and odd words on the command lines: the right result, or a line that says why not."""
+
+import sqlite3
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hostile_bags import coded, mcap, sqlite
+from made_bag import BEGAN, SECOND, STORE, Made, a_run, blank, message, write
+
+from climber_uk.analysis import analyze_bag, export_tum, figures, identify, replay_controller
+from climber_uk.analysis.bag import open_bag
+from climber_uk.analysis.parameter_file import read_sections
+from climber_uk.analysis.recorded_run import read_runs
+from climber_uk.analysis.topics import Topics
+
+TOOLS = {
+    "analyze_bag": analyze_bag,
+    "export_tum": export_tum,
+    "replay_controller": replay_controller,
+    "identify": identify,
+}
+POSE, STRING = "geometry_msgs/msg/PoseStamped", "std_msgs/msg/String"
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run a tool without its figures; return its exit status and what it said of what is wrong."""
+    monkeypatch.setattr(figures, "draw", lambda *_: {})
+    monkeypatch.setattr(replay_controller, "draw", lambda *_: None)
+    monkeypatch.chdir(tmp_path)
+
+    def run(tool, *arguments):
+        monkeypatch.setattr(sys, "argv", [tool, *map(str, arguments)])
+        status = None
+        try:
+            TOOLS[tool].main()
+        except SystemExit as ended:
+            status = ended.code
+        said = capsys.readouterr().err + (status if isinstance(status, str) else "")
+        assert "Warning" not in said
+        return bool(status), said
+
+    return run
+
+
+def a_whole_run():
+    """A run that all tools read but identify, which wants a longer one."""
+    made = a_run(100)
+    made.add_parameters(left_wheel_joint="left", right_wheel_joint="right")
+    for stamp in made.stamps:
+        clock = blank("rosgraph_msgs/msg/Clock")
+        clock.clock.sec, clock.clock.nanosec = divmod(int(stamp), SECOND)
+        made.add("/clock", "rosgraph_msgs/msg/Clock", made.arrival(stamp) - 1, clock)
+    return made
+
+
+def raw(made):
+    return [(topic, kind, log, coded(kind, sent)) for topic, kind, log, sent in made.messages]
+
+
+def with_others_on_every_topic(kind):
+    """A second type on the name of each topic."""
+
+    def make(bag):
+        made = a_whole_run()
+        odd = message(POSE, BEGAN) if kind == POSE else blank(kind)
+        names = {topic for topic, *_ in made.messages}
+        others = [(topic, kind, BEGAN + 1, coded(kind, odd)) for topic in sorted(names)]
+        sqlite(bag, raw(made))
+        with closing(sqlite3.connect(bag / "bag_0.db3")) as database:
+            for number, (topic, kind_, log, data) in enumerate(others, start=90):
+                row = (number, topic, kind_)
+                database.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')", row)
+                row = (number, log, data)
+                database.execute("INSERT INTO messages VALUES (NULL, ?, ?, ?)", row)
+            database.commit()
+
+    return make
+
+
+def of_wrong_types(bag):
+    """On the names of topics is nothing but poses."""
+    made, pose = a_whole_run(), message(POSE, BEGAN)
+    write(bag, [(topic, POSE, log, pose) for topic, _, log, _ in made.messages])
+
+
+def after_years(bag):
+    """The recorder's clock is set forward by 30 years in the middle."""
+    late = BEGAN + SECOND // 4
+    write(
+        bag,
+        [(*m[:2], m[2] + (m[2] > late) * 10**9 * SECOND, m[3]) for m in a_whole_run().messages],
+    )
+
+
+def of_two_frames(bag):
+    made = a_whole_run()
+    for topic, _, log, sent in made.messages:
+        if topic == "/odom" and log > BEGAN + SECOND // 4:
+            sent.header.frame_id = "map"
+    made.write(bag)
+
+
+def without_a_topic(bag):
+    sqlite(bag, raw(a_whole_run()), change="DELETE FROM topics WHERE name = '/odom'")
+
+
+def with_negative_rows(bag):
+    sqlite(bag, raw(a_whole_run()), change="UPDATE messages SET id = id - 10000")
+
+
+def in_utf_16(bag):
+    bag.mkdir()
+    with closing(sqlite3.connect(bag / "bag_0.db3")) as database:
+        database.execute("PRAGMA encoding = 'UTF-16'")
+        database.execute("CREATE TABLE other (x)")
+    sqlite(bag, raw(a_whole_run()))
+
+
+GOOD = ""
+BAGS = {
+    "a second type, string": (with_others_on_every_topic(STRING), GOOD),
+    "a second type, pose": (with_others_on_every_topic(POSE), GOOD),
+    "big endian": (
+        lambda bag: mcap(bag, [(*m[:3], swapped(m)) for m in a_whole_run().messages]),
+        GOOD,
+    ),
+    "UTF-16": (in_utf_16, GOOD),
+    "wrong types": (of_wrong_types, "no odometry on|no message on|are not what they should be"),
+    "the clock set by years": (after_years, GOOD),
+    "two frames": (of_two_frames, "frame_id='map', others have 'odom'"),
+    "a topic without a name": (without_a_topic, "no odometry on|has no message on /odom"),
+    "negative rows": (with_negative_rows, "with numbers below 1 are left out|has no message on"),
+}
+
+
+def swapped(of):
+    _, kind, _, sent = of
+    return bytes(STORE.serialize_cdr(sent, kind, little_endian=False))
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize(("make", "said"), BAGS.values(), ids=BAGS)
+def test_an_odd_bag_is_read_or_refused_in_words(tmp_path, run, tool, make, said):
+    make(tmp_path / "bag")
+    failed, err = run(tool, tmp_path / "bag")
+    if said:
+        assert any(part in err for part in said.split("|")), err
+    else:
+        assert failed == (tool == "identify"), err
+        assert not failed or "windows of 1.0 s in motion must be >= 5" in err
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["a\nb"], "there is no bag a b"),
+        (["a\x1b[2Jb"], r"there is no bag a\x1b[2Jb"),
+        (["x" * 5000], "File name too long|there is no bag"),
+        (["/dev/null"], "/dev/null is no readable bag: null: no regular file"),
+        (["~/run"], "there is no bag {home}/run"),
+        (["~nobody-of-this-name/x"], "~nobody-of-this-name/x: there is no such user"),
+        (["bag", "--output=~nobody-of-this-name/x"], "there is no such user"),
+        (["bag", "--output=/proc/x"], "cannot write into /proc"),
+        (["bag", "--output=file/x"], "cannot write into file"),
+    ],
+)
+def test_odd_paths_are_told_in_one_line(tmp_path, run, monkeypatch, tool, words, said):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "file").write_text("kept")
+    (tmp_path / "bag").mkdir()
+    failed, err = run(tool, *words)
+    assert failed
+    assert any(part.format(home=tmp_path / "home") in err for part in said.split("|")), err
+    assert len(err.strip().splitlines()) == 1
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        *(
+            (["analyze_bag", "bag", "--settled", value], "must be a number from 0 to 1e+06")
+            for value in ("nan", "-1", "inf", "x", "1e999")
+        ),
+        *(
+            (["replay_controller", "bag", "--fail-above", value], "must be a number from 0 to")
+            for value in ("nan", "-1", "inf", "")
+        ),
+        *(
+            (["identify", "bag", "--delay", value], "must be a number from 0 to 10")
+            for value in ("nan", "-1", "inf", "1e300")
+        ),
+        (["identify", "--plan", "p", "--duration", "1e300"], "duration=1e+300 must be <= 3600"),
+        (["identify", "--plan", "/proc/x"], "cannot write into /proc"),
+        (["identify", "bag", "--odometry", "joint_states"], "has no odometry on /joint_states"),
+    ],
+)
+def test_odd_values_are_refused_in_one_line(tmp_path, run, words, said):
+    a_whole_run().write(tmp_path / "bag")
+    failed, err = run(*words)
+    assert failed
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_replay_with_a_timeout_of_no_time_ends(tmp_path, run):
+    a_whole_run().write(tmp_path / "bag")
+    run("replay_controller", tmp_path / "bag", "-p", "odometry_timeout:=1e-9")
+
+
+def test_what_is_no_text_is_no_parameter_file(tmp_path):
+    (tmp_path / "x.yaml").write_bytes(b"\xff\xfea\0")
+    with pytest.raises(
+        ValueError, match=r"/x.yaml is no parameter file: line 1: not a text in UTF"
+    ):
+        read_sections(tmp_path / "x.yaml")
+
+
+def test_a_parameter_file_without_end_is_refused():
+    with open("/dev/zero", "rb") as endless:  # as a process gets it that is given <(…)
+        with pytest.raises(ValueError, match="larger than 16 MiB"):
+            read_sections(Path(f"/dev/fd/{endless.fileno()}"))
+
+
+def test_an_odd_number_in_a_few_odometries_costs_these_at_most(tmp_path):
+    for number, odd in enumerate([np.inf, -np.inf, np.nan, 1e308, 1e9]):
+        made = Made(100)
+        made.pose[::20, 0] = odd
+        made.add_odometry()
+        (one,), said = read_runs(made.write(tmp_path / str(number)), Topics())
+        assert len(one.time) == 95
+        assert len(said) == 1
+        with open_bag(tmp_path / str(number)) as bag:
+            assert bag.types["/odom"] == "nav_msgs/msg/Odometry"
