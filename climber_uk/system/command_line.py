@@ -78,12 +78,17 @@ class _Version(argparse.Action):
 
 
 class _Output(io.FileIO):
-    """Drops what is written after its reader has gone: files and exit status stay the same."""
+    """Drops what is written after its reader has gone, or the disk is full, which it says.
+
+    Files and exit status stay the same.
+    """
 
     def write(self, data: Any) -> int:
         try:
             return super().write(data) or 0
-        except BrokenPipeError:
+        except OSError as error:
+            if not isinstance(error, BrokenPipeError):
+                print(f"the output is not written: {error.strerror}", file=sys.stderr)
             with open(os.devnull, "wb") as nowhere:
                 os.dup2(nowhere.fileno(), self.fileno())
             return memoryview(data).nbytes

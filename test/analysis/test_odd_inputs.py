@@ -1,6 +1,7 @@
 """Odd bags and odd words on the command lines: the right result, or a line that says why not."""
 
 import sqlite3
+import subprocess
 import sys
 from contextlib import closing
 from pathlib import Path
@@ -222,9 +223,11 @@ def test_what_is_no_text_is_no_parameter_file(tmp_path):
 
 
 def test_a_parameter_file_without_end_is_refused():
-    with open("/dev/zero", "rb") as endless:  # as a process gets it that is given <(…)
-        with pytest.raises(ValueError, match="larger than 16 MiB"):
-            read_sections(Path(f"/dev/fd/{endless.fileno()}"))
+    with (
+        open("/dev/zero", "rb") as endless,  # as a process gets it that is given <(…)
+        pytest.raises(ValueError, match="larger than 16 MiB"),
+    ):
+        read_sections(Path(f"/dev/fd/{endless.fileno()}"))
 
 
 def test_an_odd_number_in_a_few_odometries_costs_these_at_most(tmp_path):
@@ -237,3 +240,15 @@ def test_an_odd_number_in_a_few_odometries_costs_these_at_most(tmp_path):
         assert len(said) == 1
         with open_bag(tmp_path / str(number)) as bag:
             assert bag.types["/odom"] == "nav_msgs/msg/Odometry"
+
+
+def test_an_output_that_cannot_be_written_is_said(tmp_path):
+    bag = a_whole_run().write(tmp_path / "bag")
+    command = [sys.executable, "-c", "from climber_uk.analysis.export_tum import main; main()"]
+    with open("/dev/full", "w") as full:
+        ran = subprocess.run([*command, bag], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (ran.returncode, ran.stderr) == (
+        0,
+        "the output is not written: No space left on device\n",
+    )
+    assert (bag / "tum" / "odom.tum").exists()
