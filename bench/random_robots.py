@@ -20,6 +20,7 @@ from climber_uk.analysis.driver.evidence import Arrival, motion_of
 from climber_uk.analysis.driver.response import respond
 from climber_uk.analysis.driver.trial import Bounds, Trial
 from climber_uk.control.follower import Answer
+from climber_uk.control.guard import UNGUARDED, GuardOptions
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Stribeck
@@ -47,6 +48,7 @@ class Result(NamedTuple):
     distance: float  # RMS [m]
     chatter: float  # RMS change of a torque from tick to tick [N m]
     learnt: float  # delay [s]
+    stopped: bool  # by the guard
 
     @property
     def cycles(self) -> bool:
@@ -108,10 +110,11 @@ def told(of: Robot) -> float:
     return respond(motion_of(trying.heard), record, BUILT).delay if record.pulses else 0.0
 
 
-def driven(seed: int, delay_of: Callable[[Robot], float]) -> Result:
+def driven(seed: int, delay_of: Callable[[Robot], float], guard: GuardOptions) -> Result:
     """How the robot of a seed drives, told of a delay."""
     of = robot(seed)
     follower = ours(BUILT, SLOW_GUIDANCE, delay_of(of))
+    follower.guard.options = guard
     run = simulate(
         EIGHT,
         AT_REST,
@@ -122,7 +125,8 @@ def driven(seed: int, delay_of: Callable[[Robot], float]) -> Result:
         plant_of=partial(Plant, contact=of.contact),
     )
     late = DURATION / 2
-    return Result(run.rms(late), run.chatter(late), follower.tracker.latency.delay)
+    stopped = bool(follower.guard.faults)
+    return Result(run.rms(late), run.chatter(late), follower.tracker.latency.delay, stopped)
 
 
 def untold(_: Robot) -> float:
@@ -136,15 +140,20 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="seed of the first one")
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--guard", action="store_true", help="with the guard: whom does it stop?")
     options = parser.parse_args()
+    guard = GuardOptions() if options.guard else UNGUARDED
     seeds = range(options.first, options.first + options.robots)
     with Pool(options.processes) as pool:
         for name, delay_of in (("told nothing", untold), ("told by check_driver", told)):
-            results = pool.map(partial(driven, delay_of=delay_of), seeds, chunksize=1)
+            results = pool.map(partial(driven, delay_of=delay_of, guard=guard), seeds, chunksize=1)
             cycles = [seed for seed, result in zip(seeds, results, strict=True) if result.cycles]
             worst = 1e3 * max(result.distance for result in results)
             said = f"{name}: {len(cycles)} of {len(seeds)} in a limit cycle {cycles or ''}"
             print(f"{said}; largest RMS distance {worst:.2g} mm", flush=True)
+            stopped = [seed for seed, result in zip(seeds, results, strict=True) if result.stopped]
+            if options.guard:
+                print(f"{name}: {len(stopped)} stopped by the guard {stopped or ''}", flush=True)
 
 
 if __name__ == "__main__":

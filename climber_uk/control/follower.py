@@ -223,7 +223,7 @@ class Follower:
         if self._fault is None:
             if self.mode in (Mode.FOLLOWING, Mode.APPROACHING) and time > 0:
                 acted, disturbance = tracker.mean_torques(stamp), tracker.disturbance
-                observed = Observed(last, motion, time, acted, disturbance)
+                observed = Observed(last, motion, time, acted, disturbance, tracker.reaction)
                 self._fault, self._rested = trouble or self._find_fault(observed), 0.0
                 if self._fault is not None:
                     guard.fault(stamp)

@@ -17,12 +17,15 @@ from climber_uk.mechanics.motion import Motion, Torques, Wrench
 from climber_uk.mechanics.parameter import check, parameter
 
 IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
-MOVES = 0.02  # [m/s] from which it is known how much the seal rubs, and against what
+MOVES = 0.02  # [m/s] from which a climber does not rest
+SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
 EXCITED = 0.12  # of the largest torque: standard deviation that tells whether a wheel answers
+LETS_GO = 0.15  # [s] after rest, in which friction that lets go may make it faster
+UNTOLD = 0.012  # [s] that a loop may take longer to answer than it knows
 SUSPECTED = 0.4  # of both is enough where the climber runs away
 
 
@@ -77,6 +80,7 @@ class Observed(NamedTuple):
     time: float  # [s] between them
     torques: Torques  # their mean
     disturbance: Wrench
+    reaction: float  # [s] in which a torque can answer
 
 
 class Expected(NamedTuple):
@@ -143,6 +147,7 @@ class Guard:
         """Watch from now on."""
         self._too_fast = 0
         self._stalled = 0.0  # [s]
+        self._since_rest = math.inf  # [s]
         self._forget_wheels()
 
     def _forget_wheels(self) -> None:
@@ -154,7 +159,7 @@ class Guard:
     ) -> tuple[Mode, str] | None:
         """What is wrong with what is observed; None if all is well."""
         self._add_to_wheels(climber, observed)
-        too_fast = self._watch_rates(observed.after, expected.allowed)
+        too_fast = self._watch_rates(climber, observed, expected.allowed)
         return (
             self._watch_wheels(climber, observed.torques, SUSPECTED if too_fast else 1.0)
             or too_fast
@@ -162,9 +167,11 @@ class Guard:
             or self._watch_disturbance(climber, observed.disturbance)
         )
 
-    def _watch_rates(self, motion: Motion, allowed: Rates) -> tuple[Mode, str] | None:
-        options = self.options
-        fastest = allowed.speed + options.speed_margin
+    def _watch_rates(
+        self, climber: Climber, observed: Observed, allowed: Rates
+    ) -> tuple[Mode, str] | None:
+        options, motion = self.options, observed.after
+        fastest = allowed.speed + options.speed_margin + self._let_go(climber, observed)
         fastest_turn = allowed.yaw_rate + options.yaw_rate_margin
         is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
         is_turning = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_turn
@@ -176,6 +183,15 @@ class Guard:
             told, most, unit = motion.yaw_rate, fastest_turn, "rad/s"
         return Mode.TOO_FAST, f"{told:.2f} {unit}, at most {most:.2f} are asked for"
 
+    def _let_go(self, climber: Climber, observed: Observed) -> float:
+        """Speed [m/s] at which friction may let go of it before a torque can answer."""
+        before, after = observed.before.speed, observed.after.speed
+        rests = abs(after) < MOVES or before * after < 0
+        self._since_rest = 0.0 if rests else self._since_rest + observed.time
+        if self._since_rest > LETS_GO:
+            return 0.0
+        return climber.seal_friction / climber.mass * (observed.reaction + UNTOLD)
+
     def _watch_limit(
         self, climber: Climber, observed: Observed, expected: Expected
     ) -> tuple[Mode, str] | None:
@@ -185,11 +201,15 @@ class Guard:
             stands = abs(motion.speed) < STANDS * wanted.speed
         else:  # it turns in place, or rests
             stands = abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
-        is_stalled = (stands and share >= STRONG) or (expected.waits and share >= AT_LIMIT)
-        self._stalled = self._stalled + observed.time if is_stalled else 0.0
+        effort = 0.0
+        if stands and share >= STRONG:
+            effort = share / STRONG  # it shows the sooner, the stronger it is
+        elif expected.waits and share >= AT_LIMIT:
+            effort = 1.0
+        self._stalled = self._stalled + effort * observed.time if effort else 0.0
         if not 0 < self.options.stall_time < self._stalled:
             return None
-        return Mode.STALLED, f"{largest:.2f} N m for {self._stalled:.2f} s"
+        return Mode.STALLED, f"{largest:.2f} N m"
 
     def _watch_disturbance(self, climber: Climber, disturbance: Wrench) -> tuple[Mode, str] | None:
         explained = self.adhesion.force(climber) + climber.mass * GRAVITY
@@ -204,9 +224,9 @@ class Guard:
 
     def _add_to_wheels(self, climber: Climber, observed: Observed) -> None:
         """See `Wheel`; (11) and (15) tell the force that acted on each."""
-        before, after, time, torques, _ = observed
+        before, after, time, torques = observed[:4]
         response_time = self.options.response_time
-        if response_time == 0 or min(abs(before.speed), abs(after.speed)) < MOVES:
+        if response_time == 0 or min(abs(before.speed), abs(after.speed)) < SLIDES:
             self._forget_wheels()
             return
         self._moved += time

@@ -114,4 +114,5 @@ def guided(gains: "Guidance", track: Track, motion: Motion) -> Demand:
     turning_back = led_1 + fastest * part  # 0 when it turns back as fast as it should
     theta_2 = omega_d1 - led_2 - omega_n * (inside * led_1 + turning_back)
     theta_2 = theta_2 - fastest_1 * (part - u * inside)
-    return v_1, theta_2, wanted
+    # ahead of a reference that comes it waits, and overcomes no friction to go back
+    return v_1, theta_2, select(wanted * v_d < 0.0, 0.0, wanted)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import (
+    anywhere,
     clipped,
     everywhere,
     exp,
@@ -45,8 +46,14 @@ def rolled(climber: Climber, motion: Motion, drive: Any, turn: Any, time: float)
     if not (slides is True or everywhere(slides)):
         rubbing = select(slides, rubbing, clipped(push, -friction, friction))
     v_1 = (push - rubbing) / mass
-    way = time * (v + half * v_1)
-    v, omega = v + time * v_1, omega + time * omega_1
+    way, end = time * (v + half * v_1), v + time * v_1
+    stops = v * end < 0
+    if anywhere(stops):  # friction ends a motion, and does not reverse it
+        left = time + v / select(stops, v_1, 1.0)
+        back_1 = (push - clipped(push, -friction, friction)) / mass
+        way = select(stops, 0.5 * (v * (time - left) + left * left * back_1), way)
+        end = select(stops, left * back_1, end)
+    v, omega = end, omega + time * omega_1
     return named(Motion, (x + way * c, y + way * s, heading, cosine, sine, v, omega))
 
 

@@ -110,6 +110,11 @@ class Tracker:
     def disturbance(self, disturbance: Wrench) -> None:
         self.learnt = Learnt(*disturbance)
 
+    @property
+    def reaction(self) -> float:
+        """From an odometry to the middle of the period in which a torque answers it [s]."""
+        return self._delay + self.period / 2
+
     def retune(
         self, controller: Controller, observer: Observer, timing: Timing, pacing: Pacing
     ) -> None:

@@ -67,6 +67,11 @@ def everywhere(condition: Any) -> Any:
     return condition if condition is True or condition is False else bool(condition.all())
 
 
+def anywhere(condition: Any) -> Any:
+    """Whether `condition` holds for the one, or for any of many."""
+    return condition if condition is True or condition is False else bool(condition.any())
+
+
 def either(condition: Any, these: tuple[Any, Any], those: tuple[Any, Any]) -> tuple[Any, Any]:
     """`select` of two at once."""
     if isinstance(condition, np.ndarray):

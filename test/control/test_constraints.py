@@ -12,6 +12,7 @@ from climber_uk.control.constraints import (
     tracking_error,
 )
 from climber_uk.mechanics.climber import Climber, State, across
+from climber_uk.mechanics.motion import Motion, Target
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
@@ -50,6 +51,18 @@ def differences(function, state, demand, time):
     """Value, first and second time derivative of function(state, time) along the motion."""
     before, here, after = (function(rolled(state, demand, h), time + h) for h in (-H, 0.0, H))
     return here, (after - before) / (2 * H), (after - 2 * here + before) / H**2
+
+
+@pytest.mark.parametrize(
+    ("speed", "ahead", "sign"),
+    [(0.05, 0.5, 0), (0.05, -0.5, 1), (-0.05, -0.5, 0), (-0.05, 0.5, -1), (0.0, 0.5, -1)],
+)
+def test_ahead_of_a_reference_that_comes_it_overcomes_no_friction_to_go_back(speed, ahead, sign):
+    target = Target(0.0, 0.0, 0.0, speed, *(7 * [0.0]))
+    motion, gains = Motion(ahead, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), Guidance()
+    slower, _, wanted = gains.demand(gains.track(target), motion)
+    assert np.sign(wanted) == sign
+    assert np.sign(slower) == -np.sign(ahead)
 
 
 @settings(deadline=None)

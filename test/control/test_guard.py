@@ -1,14 +1,19 @@
 from copy import deepcopy
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 import pytest
 from climbs import LIMIT, Climb
 
+from climber_uk.analysis.closed_loop import Link, simulate
 from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.friction import Stribeck
+from climber_uk.simulation.plant import Plant
 
 pytestmark = pytest.mark.slow
 
@@ -104,6 +109,44 @@ def test_each_check_can_be_switched_off(option, switched_off):
     climb = Climb(**{f"guard.{option}": 0.0}).run(2.0)
     climb.run(0.02, odometry=lambda _, state: State.rolling(state.pose, 0.8, state.yaw_rate))
     assert (climb.follower.mode is not Mode.TOO_FAST) == switched_off
+
+
+@pytest.mark.parametrize(
+    ("link", "share_of_friction", "share_of_mass", "breakaway"),
+    [
+        (Link(period=0.02, torque_lag=0.0192, delay=0.0075, encoder_counts=8192), 0.65, 0.86, 1.2),
+        (Link(period=0.02, torque_lag=0.0188, delay=0.0075, encoder_counts=2048), 0.54, 0.93, 1.15),
+        (Link(period=0.02, torque_lag=0.0128, encoder_counts=4096), 1.29, 0.95, 1.54),
+        (Link(period=0.01, torque_lag=0.0143, delay=0.0075, encoder_counts=4096), 1.49, 1.0, 1.4),
+        (Link(torque_lag=0.0068, delay=0.0075, encoder_counts=4096), 1.45, 0.96, 1.55),
+    ],
+    ids=["slips away", "slips most", "sticks", "sticks most", "sticks at 200 Hz"],
+)
+def test_friction_that_is_not_as_believed_is_no_runaway_however_late_the_loop_answers(
+    link, share_of_friction, share_of_mass, breakaway
+):
+    climb = Climb()
+    follower, believed = climb.follower, climb.follower.tracker.controller.climber
+    true = replace(
+        believed,
+        mass=share_of_mass * believed.mass,
+        seal_friction_coefficient=share_of_friction * believed.seal_friction_coefficient,
+    )
+    contact = Contact(friction=Stribeck(ratio=breakaway))
+    run = simulate(
+        climb.trajectory,
+        climb.state,
+        4.0,
+        follower,
+        true,
+        link,
+        plant_of=partial(Plant, contact=contact),
+    )
+    assert not follower.guard.faults
+    assert follower.mode is Mode.FOLLOWING
+    speed = np.hypot(run.velocity[:, 0], run.velocity[:, 1])
+    assert speed.max() < 2.4 * climb.reference_speed
+    assert run.distance[-1] < 5e-3
 
 
 def test_faults_count_for_a_while_only():

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.control.model import Learnt, Observer, rolled
+from climber_uk.control.model import SLOW, Learnt, Observer, rolled
 from climber_uk.mechanics.climber import Climber, State
 from climber_uk.mechanics.motion import Torques, Wrench, forces, torques
 from climber_uk.simulation.plant import Plant
@@ -89,3 +89,30 @@ def test_switched_off_it_forgets(source):
     rolling = State.rolling(np.zeros(3), 1.0, 0.0)
     _, _, found = learn(observer, SLIPPERY, SLIPPERY, rolling, STILL, Learnt(9.0, 1.0), 400)
     np.testing.assert_allclose(found, 0, atol=1e-3)
+
+
+@given(
+    st.floats(-3, 3),
+    st.floats(-0.3, 0.3),
+    st.floats(-120, 120),
+    st.sampled_from([0.005, 0.02, 0.05]),
+)
+def test_friction_ends_a_motion_and_does_not_reverse_it(heading, v, drive, time):
+    """As the plant finds it in fifty steps."""
+    start = State.rolling(np.array([0.0, 0.0, heading]), v, 0.0)
+    wheels = np.array(torques(CLIMBER, drive, 0.0))
+    expected = Plant(CLIMBER, time / 50).advance(start, wheels, 50)
+    got = rolled(CLIMBER, start.motion, drive, 0.0, time)
+    # up to `SLOW` it may as well be at rest
+    atol = 1e-6 if abs(v) > SLOW else 1.001 * SLOW
+    assert got.speed == pytest.approx(expected.forward_speed, abs=atol)
+    assert np.hypot(got.x - expected.pose[0], got.y - expected.pose[1]) < atol * time + 1e-7
+
+
+def test_many_that_stop_roll_as_each_of_them_does():
+    speeds, drives = np.array([0.02, -0.02, 0.02, 0.3, 0.005]), np.array([0, 0, -90, 30, 0.0])
+    states = State.rolling(np.zeros((5, 3)), speeds, np.zeros(5))
+    many = rolled(CLIMBER, states.motion, drives, np.zeros(5), 0.01)
+    for i, (speed, drive) in enumerate(zip(speeds, drives, strict=True)):
+        one = rolled(CLIMBER, State.rolling(np.zeros(3), speed, 0.0).motion, drive, 0.0, 0.01)
+        assert (many.speed[i], many.x[i]) == pytest.approx((one.speed, one.x), abs=1e-15)

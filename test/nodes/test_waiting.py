@@ -2,6 +2,7 @@
 
 import math
 import signal
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -24,9 +25,9 @@ FASTEST = 0.26  # [m/s] of the reference in config/climber.yaml
 class Waiting(Climb):
     """A climb of which is heard where on its reference it is."""
 
-    def __init__(self, world, changed=None):
+    def __init__(self, world, changed=None, usual=LOCK_STEP):
         changed = changed or {}
-        parameters = {name: [*LOCK_STEP[name], *changed.get(name, [])] for name in LOCK_STEP}
+        parameters = {name: [*usual[name], *changed.get(name, [])] for name in usual}
         self.positions = []
         super().__init__(world, parameters)
         world.node.create_subscription(TimeReference, "reference_time", self.positions.append, 1000)
@@ -121,6 +122,26 @@ def test_a_process_that_was_stopped_goes_on_where_it_was(world, name):
     climb.passes(5.0)
     assert climb.fastest() <= 1.3 * FASTEST
     climb.is_on_path()
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", [CONTROLLER, PLANNER])
+def test_a_process_that_was_stopped_for_long_on_the_wall_clock_goes_on_where_it_was(world, name):
+    climb = Waiting(world, usual={PLANT: [], CONTROLLER: ["guard.attempts:=1000"], PLANNER: []})
+    climb.is_in("following")
+    climb.passes(5.0)
+    world.processes[name].send_signal(signal.SIGSTOP)
+    climb.passes(5.0)  # a planner has given a second of its path
+    waits_at, begin = climb.position, len(climb.positions)
+    climb.passes(15.0)
+    assert climb.position == waits_at
+    world.processes[name].send_signal(signal.SIGCONT)
+    world.wait(lambda: climb.position > waits_at + 3.0, "3 s more of the reference")
+    times = [reading.nanoseconds(m.time_ref) / SECOND for m in climb.positions[begin:]]
+    assert waits_at - 0.1 < min(times)
+    assert max(later - time for time, later in pairwise(times)) < 0.5
+    assert climb.fastest() <= 1.3 * FASTEST
+    assert climb.off_the_path(0.0) < 0.02
 
 
 def test_a_new_controller_goes_on_where_the_old_one_was(world):
