@@ -289,6 +289,50 @@ def test_a_reference_far_away_is_refused_in_words_until_one_is_near(loop):
     assert loop.tell() is Mode.FOLLOWING
 
 
+def runs_away(loop):
+    """It is too fast for a moment, and rests from then on where it is."""
+    pose = loop.state(loop.now).pose
+    loop.state = lambda _: State.rolling(pose, 1.5, 0.5)
+    assert loop.tell(times=3) is Mode.TOO_FAST
+    assert is_safe(loop)
+    loop.state = lambda _: State(pose, np.zeros(3))
+
+
+def test_what_the_guard_found_is_over_when_the_climber_has_rested(loop):
+    runs_away(loop)
+    assert loop.tell(times=98) is Mode.TOO_FAST  # half a second
+    loop.state = lambda _, rest=loop.state: State.rolling(rest(0).pose, 0.021, 0.0)
+    assert loop.tell(times=200) is Mode.TOO_FAST  # it creeps
+    loop.state = lambda _, creeps=loop.state: State(creeps(0).pose, np.zeros(3))
+    assert loop.tell(times=98) is Mode.TOO_FAST
+    assert loop.tell(times=4) is Mode.FOLLOWING
+
+
+def test_after_the_third_fault_somebody_has_to_look(loop):
+    for _ in range(2):
+        runs_away(loop)
+        assert not loop.follower.detail.endswith("~/enable to go on")
+        assert loop.tell(times=120) is Mode.FOLLOWING
+    runs_away(loop)
+    assert loop.tell(times=1000) is Mode.TOO_FAST
+    assert loop.follower.detail.endswith("~/enable to go on")
+    loop.follower.enable(False)
+    loop.tell()
+    loop.follower.enable(True)
+    assert loop.tell() is Mode.FOLLOWING
+    runs_away(loop)  # and what was is forgiven
+    assert loop.tell(times=120) is Mode.FOLLOWING
+
+
+@pytest.mark.parametrize(("period", "mode"), [(79, Mode.FOLLOWING), (81, Mode.SELDOM)])
+def test_odometry_of_a_period_near_its_timeout_comes_too_seldom(period, mode):
+    loop = Loop()
+    loop.plan()
+    loop.tell()
+    loop.now += period * MILLISECOND - PERIOD
+    assert loop.tell() is mode
+
+
 size = st.one_of(st.floats(-10, 10), st.floats(-1e6, 1e6))
 vector = st.tuples(size, size, size).map(np.array)
 event = st.one_of(
