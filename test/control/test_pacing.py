@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from climber_uk.analysis.closed_loop import sampled
-from climber_uk.control.pacing import Pace, Pacing
+from climber_uk.control.pacing import Pace, Pacing, Progress
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.reference import Reference
@@ -72,3 +72,25 @@ def test_time_never_runs_backwards_and_a_reference_at_rest_is_not_waited_for():
     still = type(PREVIEW)(PREVIEW.times, 0 * PREVIEW.pose, 0 * PREVIEW.pose, 0 * PREVIEW.pose)
     assert Pace().slowed(5.0, still, 3 * SECOND, STEP) == Pace()
     assert Pace().slowed(-5.0, PREVIEW, 3 * SECOND, STEP) == Pace()  # braking is not missing
+
+
+@pytest.mark.parametrize(
+    ("progress", "lag", "waited"),
+    [
+        (Progress(SECOND, 0, Pace(lag=6.0)), 5.0, 1.0),  # a longer lag shifts the rest
+        (Progress(SECOND, 2 * SECOND, Pace(lag=4.0)), 4.0, 2.0),
+        (Progress(SECOND, 0, Pace(lag=0.5, rate=0.5), is_restarting=True), 0.0, 0.5),
+    ],
+)
+def test_time_that_is_not_made_up_for_is_waited(progress, lag, waited):
+    later = progress.advanced(SECOND + 1, Pacing())
+    assert later.pace.lag == pytest.approx(lag, abs=1e-6)
+    assert later.waited / SECOND == pytest.approx(waited, abs=1e-6)
+    assert later.at(SECOND) == pytest.approx(progress.at(SECOND), abs=10)  # [ns]
+
+
+@pytest.mark.parametrize(("passed", "goes_on"), [(0.29, True), (0.31, False), (-0.1, False)])
+def test_over_a_gap_the_reference_stands_still(passed, goes_on):
+    time = SECOND + round(passed * SECOND)
+    later = Progress(SECOND, 0).advanced(time, Pacing())
+    assert later.position == (time if goes_on else SECOND)

@@ -1,0 +1,68 @@
+import itertools
+import math
+
+import pytest
+
+from climber_uk.control.twist_check import TwistCheck
+from climber_uk.mechanics.motion import Motion
+
+TIME = 0.1  # [s] from one odometry to the next
+LARGEST = 0.05  # [m] by which ways may differ
+
+
+def on_a_circle(speed, yaw_rate, heading, told):
+    """Motion of ten odometry messages; `told` makes the twist of speed and yaw rate."""
+    x, y, motions = 1.0, -2.0, []
+    for _ in range(10):
+        cosine, sine = math.cos(heading), math.sin(heading)
+        motions.append(Motion(x, y, heading, cosine, sine, *told(speed, yaw_rate)))
+        turned = yaw_rate * TIME
+        chord = speed * TIME * (math.sin(turned / 2) / (turned / 2) if turned else 1.0)
+        x += chord * math.cos(heading + turned / 2)
+        y += chord * math.sin(heading + turned / 2)
+        heading = math.remainder(heading + turned, math.tau)
+    return motions
+
+
+def troubles(motions, half_track=0.3):
+    check, found = TwistCheck(), []
+    for last, motion in itertools.pairwise(motions):
+        check.add(last, motion, TIME, half_track)
+        found.append(check.trouble(LARGEST))
+    return found
+
+
+@pytest.mark.parametrize("heading", [0.3, 1.8, -2.5])
+@pytest.mark.parametrize(("speed", "yaw_rate"), [(1.0, 0.0), (2.0, 9.0), (-2.0, -9.0), (0.0, 3.0)])
+def test_a_twist_that_is_the_rate_of_its_pose_is_no_trouble(heading, speed, yaw_rate):
+    found = troubles(on_a_circle(speed, yaw_rate, heading, lambda *twist: twist))
+    assert set(found) == {("", False)}
+
+
+@pytest.mark.parametrize(
+    ("told", "name"),
+    [
+        (lambda v, turn: (-v, turn), "twist.linear.x"),
+        (lambda v, turn: (v, -turn), "twist.angular.z"),
+    ],
+    ids=["speed", "yaw rate"],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_wrong_sign_is_told_the_third_time_in_a_row(told, name, sign):
+    found = troubles(on_a_circle(sign * 0.11, sign * 0.5, 0.3, told))
+    assert [is_sign for _, is_sign in found[:3]] == [False, False, True]
+    assert found[2] == (name, True)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 2.0])
+def test_a_twist_that_is_off_by_much_is_told_with_the_length(share):
+    found = troubles(on_a_circle(1.0, 0.0, 0.3, lambda v, turn: (share * v, turn)))
+    detail, is_sign = found[0]  # 0.1 m by pose, and as much as the share by twist
+    off = abs(1 - share) * 0.1 - 0.3 * max(1, share) * 0.1
+    assert (detail, is_sign) == ((f"by {off:.2f} m" if off > LARGEST else ""), False)
+    assert all(detail for detail, _ in found[3:])
+
+
+def test_a_twist_that_is_off_by_a_little_is_slip():
+    found = troubles(on_a_circle(1.0, 0.0, 0.3, lambda v, turn: (1.3 * v, turn)))
+    assert set(found) == {("", False)}
