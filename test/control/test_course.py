@@ -200,3 +200,16 @@ def test_a_reference_that_nobody_follows_is_kept_in_part_only(steps, with_odomet
             now = SECOND + shift
             climb.follower.on_odometry(now, now, climb.state)
     assert len(course.preview.times) <= 5000
+
+
+@slow
+@pytest.mark.parametrize("turned", [-1.9, 0.45, -0.29])
+def test_a_climber_that_has_turned_while_nobody_answered_goes_on_along_its_path(turned):
+    climb = Climb().run(5.0)
+    begin, before = climb.time, climb.position
+    climb.run(0.5, odometry=lambda *_: None)
+    climb.state = State(climb.state.pose + np.array([0.0, 0.0, turned]), np.zeros(3))
+    climb.run(9.0)
+    assert climb.off_the_path(begin) < 0.02
+    assert climb.fastest() <= 1.3 * climb.reference_speed
+    assert climb.position > before + 1.0
