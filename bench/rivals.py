@@ -102,7 +102,7 @@ class AdaptiveRobust(Tracker):
         self, preview: Preview, age: float, constraints: ConstraintSet | None = None
     ) -> Command | None:
         """Torques for the last odometry, by its own constraints."""
-        reference = preview.at(self.stamp)
+        reference = preview.at(self.progress.at(self.stamp))
         if reference is not None and self.motion is not None:
             state = State.moving(self.motion)
             errors = constraint_errors(self.controller.constraints, state, reference)

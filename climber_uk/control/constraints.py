@@ -117,7 +117,7 @@ class Exact:
     """
 
     natural_frequency: float = parameter(
-        5.0, "rad/s", "ω_n: K_p = ω_n², K_d = 2 ω_n", above=0, runtime=True
+        6.0, "rad/s", "ω_n: K_p = ω_n², K_d = 2 ω_n", above=0, runtime=True
     )
     hidden_rate: float = parameter(10.0, "1/s", "λ, decay of φ", above=0, runtime=True)
 
@@ -151,7 +151,10 @@ class Exact:
         turning = u_y1 * cosine - u_x1 * sine - 2 * v_1 * omega - self.hidden_rate * phi
         at_rest = abs(v) < REST_SPEED
         theta_2 = select(at_rest, 0.0, turning / select(at_rest, 1.0, v))
-        return v_1, theta_2, v_x * cos(heading_d) + v_y * sin(heading_d)
+        # friction is that of the speed at which the error along the track goes as exp(-ω_n t)
+        wanted_x = v_x + self.natural_frequency * (x_d - x)
+        wanted_y = v_y + self.natural_frequency * (y_d - y)
+        return v_1, theta_2, wanted_x * cos(heading_d) + wanted_y * sin(heading_d)
 
 
 CONSTRAINTS: dict[str, type[Guidance] | type[Exact]] = {"guidance": Guidance, "exact": Exact}

@@ -153,6 +153,16 @@ def test_the_exact_set_asks_no_turn_of_a_climber_at_rest():
     assert turning == 0
 
 
+def test_the_exact_set_overcomes_friction_towards_a_reference_that_has_come_to_its_end():
+    reference = Trajectory(Circle(), RestToRest(rate=1.0)).at(1e3)
+    behind = reference.pose - 0.01 * np.array(
+        [np.cos(reference.heading), np.sin(reference.heading), 0.0]
+    )
+    state = State(behind, np.zeros(3))
+    _, _, wanted = demanded(Exact(natural_frequency=5.0), state, reference)
+    assert wanted == pytest.approx(0.05, abs=1e-12)  # ω_n times the distance
+
+
 def test_tracking_error_is_ahead_left_and_anticlockwise():
     reference = Trajectory(Circle(), ConstantRate()).at(0.0)  # at (1, 0), heading up
     error = tracking_error(np.array([0.7, 0.2, np.pi / 2 + 0.1 - 4 * np.pi]), reference)
