@@ -10,6 +10,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.motion import Motion, Target
+from climber_uk.mechanics.preview import Preview
 
 slow = pytest.mark.slow
 
@@ -61,6 +62,32 @@ def test_enabled_again_in_mid_course_it_goes_on_where_it_is():
     assert stopped == pytest.approx(12.0, abs=0.1)
     climb.follower.enable(True)
     climb.run(10.0)
+    assert climb.position == pytest.approx(stopped + 10.0, abs=0.5)
+    assert climb.fastest() <= 1.3 * climb.reference_speed
+    assert climb.off_the_path() < 0.005
+
+
+@slow
+def test_a_reference_that_is_not_held_back_is_kept_over_a_long_wait():
+    """By a planner that does not listen: it tells the next second, and never again what was."""
+    climb = Climb().run(12.0)
+    whole = climb.follower.course.preview
+    climb.follower.enable(False)
+    climb.run(3.0)
+    stopped = climb.position
+    for begin in range(15, 55):
+        times = slice(*np.searchsorted(whole.times, [begin * SECOND, (begin + 2) * SECOND]))
+        told = (whole.times, whole.pose, whole.velocity, whole.acceleration)
+        climb.time += 1.0
+        now = SECOND + round(climb.time * SECOND)
+        climb.follower.on_reference(now, Preview(*(values[times] for values in told)))
+    climb.run(0.5)
+    assert climb.position == stopped
+    here = SECOND + round(stopped * SECOND)
+    np.testing.assert_array_equal(climb.follower.course.preview.at(here).pose, whole.at(here).pose)
+    climb.follower.enable(True)
+    climb.run(10.0)
+    assert climb.follows()
     assert climb.position == pytest.approx(stopped + 10.0, abs=0.5)
     assert climb.fastest() <= 1.3 * climb.reference_speed
     assert climb.off_the_path() < 0.005

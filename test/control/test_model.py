@@ -89,3 +89,24 @@ def test_switched_off_it_forgets(source):
     rolling = State.rolling(np.zeros(3), 1.0, 0.0)
     _, _, found = learn(observer, SLIPPERY, SLIPPERY, rolling, STILL, Learnt(9.0, 1.0), 400)
     np.testing.assert_allclose(found, 0, atol=1e-3)
+
+
+@pytest.mark.parametrize(("bandwidth", "order"), [(14.0, 3), (0.0, 2)], ids=["learning", "off"])
+@pytest.mark.parametrize("part", ["speed", "yaw_rate"])
+def test_errors_of_the_pose_filter_decay_with_all_poles_at_one_place(bandwidth, order, part):
+    """With memory z = exp(-ω T): (1 - z B)ⁿ e = 0, where B takes the error of a period before."""
+    h, rubs_nothing = 0.005, Climber(seal_friction_coefficient=0.0, **FLOOR)
+    observer = Observer(bandwidth=bandwidth, velocity_source="pose")
+    turns = part == "yaw_rate"
+    true = State.rolling(np.zeros(3), 0.0 if turns else 1.0, 0.3 if turns else 0.0).motion
+    seen, learnt = true._replace(**{part: 0.9 * getattr(true, part)}), Learnt()
+    errors = []
+    for _ in range(20):
+        expected = after(rubs_nothing, seen, STILL, learnt, h)
+        true = after(rubs_nothing, true, STILL, NONE, h)
+        shares = observer.shares(h, delay=0.0)
+        seen, learnt = observer.corrected(rubs_nothing, learnt, expected, true, h, shares)
+        errors.append(getattr(seen, part) - getattr(true, part))
+    decays = np.poly([np.exp(-observer.pose_bandwidth * h)] * order)
+    np.testing.assert_allclose(np.convolve(errors, decays, mode="valid"), 0, atol=1e-12)
+    assert abs(errors[0]) > 0.01
