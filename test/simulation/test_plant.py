@@ -259,8 +259,8 @@ def test_lugre_gives_way_a_little_and_then_does_not_drift(heading, slip):
     # break-away the bristles slip meanwhile
     spring = 49.05 * np.sin(heading) / law.stiffness(PAPER.seal_friction)
     assert spring <= bent < (2 * spring if heading < 1 else 0.01)
-    end = plant.advance(settled, np.zeros(2), steps=20_000)  # 50 s
-    assert np.abs(end.pose - settled.pose).max() < 1e-9
+    end = plant.advance(settled, np.zeros(2), steps=4000)  # 10 s
+    assert np.abs(end.pose - settled.pose).max() < 2e-10
 
 
 def driven(state, random, climber, demand):
@@ -305,12 +305,13 @@ def energy(plant, state):
     return speeds / 2 + climber.mass * 9.81 * height
 
 
+@pytest.mark.parametrize("seconds", [20, pytest.param(60, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("name", BALANCES)
-def test_over_a_minute_of_random_driving_not_a_millionth_of_the_energy_is_lost(name):
+def test_over_some_random_driving_not_a_millionth_of_the_energy_is_lost(name, seconds):
     plant, random = BALANCES[name], np.random.default_rng(5)
     climber, state = plant.climber, State(np.array([0.0, 6.0, 0.3]), np.zeros(3))
     start, work, done = energy(plant, state), 0.0, 0.0
-    for number in range(600):  # of 100 ms
+    for number in range(10 * seconds):  # of 100 ms
         if number % 20 == 0:
             demand = random.uniform(0.2, 1.0) * random.choice([-1, 1]), random.uniform(-1, 1)
             push = random.normal(size=3) * [3.0, 3.0, 0.3]
@@ -326,7 +327,7 @@ def test_over_a_minute_of_random_driving_not_a_millionth_of_the_energy_is_lost(n
             end = plant.advance(middle, torques, 1, push)
             parts = plant.step / 3 * (powers(state) + 4 * powers(middle) + powers(end))
             work, done, state = work + parts.sum(), done + np.abs(parts).sum(), end
-    assert done > 1000  # [J]
+    assert done > 20 * seconds  # [J]
     assert energy(plant, state) - start == pytest.approx(work, abs=1e-6 * done)
 
 
