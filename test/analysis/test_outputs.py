@@ -54,9 +54,7 @@ def a_bag(path, *, as_file=False, storage="mcap"):
 
 
 @each_tool
-@pytest.mark.parametrize(
-    ("as_file", "storage"), [(False, "mcap"), (True, "mcap"), (True, "sqlite3")]
-)
+@pytest.mark.parametrize(("as_file", "storage"), [(False, "sqlite3"), (True, "mcap")])
 def test_each_run_of_a_tool_writes_into_a_new_directory(tmp_path, run, tool, as_file, storage):
     bag = a_bag(tmp_path / "run", as_file=as_file, storage=storage)
     name, file = TOOLS[tool]

@@ -154,7 +154,11 @@ def start(world, name, *arguments):
     world.wait(lambda: node in world.node.get_node_names_and_namespaces(), name)
     world.wait(lambda: "INFO" in world.log(name), "what it is")
     assert world.end(name) == 0
-    lines = [line for line in world.log(name).splitlines() if "safe output: " not in line]
+    # a slow machine may hold up a plant in the wall's time
+    others = "safe output: ", " behind: left out"
+    lines = [
+        line for line in world.log(name).splitlines() if not any(text in line for text in others)
+    ]
     return [line.split(f"[{name}]: ")[1] for line in lines]
 
 
@@ -260,11 +264,11 @@ def test_what_can_hardly_be_meant_is_doubted_at_the_start(world, parameter, mean
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("name", NODES)
-def test_a_signal_ends_a_node_cleanly_even_if_it_comes_twice(world, name, number):
-    process = world.start_node(name)
-    node = (name, "/")
-    world.wait(lambda: node in world.node.get_node_names_and_namespaces(), name)
-    process.send_signal(number)
-    assert world.end(name, number) == 0
-    assert "Traceback" not in world.log(name)
+def test_a_signal_ends_a_node_cleanly_even_if_it_comes_twice(world, number):
+    processes = [world.start_node(name) for name in NODES]
+    world.wait(lambda: set(NODES) <= set(world.node.get_node_names()), "nodes")
+    for process in processes:
+        process.send_signal(number)
+    for name in NODES:
+        assert world.end(name, number) == 0
+        assert "Traceback" not in world.log(name)
