@@ -276,8 +276,8 @@ class StandIn:
             f"initial_heading:={heading}",
         ]
         self.start_driver()
-        self.odometry = []  # all of it, even if this test is slower than the driver
-        world.node.create_subscription(Odometry, "odom", self.odometry.append, 20_000)
+        # all of it, even if this test is slower than the driver
+        self.odometry = world.hear(Odometry, "odom", 20_000)
 
     def start_driver(self):
         self.world.start_node(DRIVER, *self.driver, config="climber.yaml")

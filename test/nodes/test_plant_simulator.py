@@ -1,4 +1,6 @@
+import re
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -107,13 +109,19 @@ def test_a_stale_torque_acts_no_more_and_a_new_one_does(world):
     world.start_node("plant_simulator", "inclination:=0.0", "command_timeout:=1.0")
     joints = world.listen(JointState, "joint_states")
     commands = world.speak(JointState, "wheel_torques")
-    for _ in range(2):
+
+    def acts():
+        # again and again: a slow machine may take longer to hear of it than it is valid
         commands.publish(torques(2.0, 2.0))
-        world.wait(lambda: joints and joints[-1].effort[0] == 2.0, "torque to act")
+        return joints and joints[-1].effort[0] == 2.0
+
+    for _ in range(2):
+        world.wait(acts, "torque to act")
         world.wait(lambda: joints[-1].effort[0] == 0.0, "torque to become stale")
-    log = world.log("plant_simulator")
-    assert log.count("torque command: stale") == 2
-    assert log.count("torque command: ok again") == 1
+    said = re.findall("torque command: (stale|ok again)", world.log("plant_simulator"))
+    assert said[0] == said[-1] == "stale"
+    assert len(said) >= 3
+    assert all(one != other for one, other in pairwise(said))  # each change once
 
 
 def test_torques_beyond_the_limit_are_cut(world):
@@ -241,7 +249,8 @@ def test_on_the_wall_clock_a_pause_is_left_out(world):
     seen = len(odometry)
     world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False))
     world.wait(lambda: len(odometry) > seen + 50, "odometry again")
-    assert "behind" not in world.log("plant_simulator")
+    behind = re.findall(r"([\d.]+) s behind", world.log("plant_simulator"))
+    assert all(float(seconds) < 1.0 for seconds in behind)  # what a slow machine is, at most
     gaps = np.diff([stamp(m) for m in odometry])
     assert gaps.max() > 1_000_000_000  # the pause, of which nothing was told
     assert (gaps > 0).all()

@@ -131,10 +131,25 @@ class World:
                 raise AssertionError(f"no {what} within {TIMEOUT} s\n{logs}")
         return value
 
-    def listen(self, kind, topic):
-        """List that fills with the messages of a topic, once there is a publisher."""
+    def hear(self, kind, topic, depth=100):
+        """List that fills with the messages of a topic.
+
+        All that have come are taken at once: the executor takes ten times as long for each.
+        """
         received = []
-        self.node.create_subscription(kind, topic, received.append, 100)
+
+        def take(message):
+            received.append(message)
+            with subscription.handle:
+                while found := subscription.handle.take_message(kind, False):
+                    received.append(found[0])
+
+        subscription = self.node.create_subscription(kind, topic, take, depth)
+        return received
+
+    def listen(self, kind, topic):
+        """The same, once there is a publisher."""
+        received = self.hear(kind, topic)
         self.wait(lambda: self.node.count_publishers(topic), f"publisher of {topic}")
         return received
 
