@@ -50,14 +50,16 @@ lint: $(SET_UP)
 # Three processes for two cores, as tests of nodes mostly wait; each has a ROS domain for each test.
 # They begin with a third of the tests each, in their order; whichever is ready first helps another.
 TESTS := -m pytest --numprocesses 3 --dist worksteal
+# Of many hundred processes each would compile the package again
+KEEPING_BYTECODE := env -u PYTHONDONTWRITEBYTECODE
 
 unit: $(SET_UP)
-	$(BIN)/python $(TESTS)
+	$(KEEPING_BYTECODE) $(BIN)/python $(TESTS)
 
 # Which lines of the package the same tests go through, in all processes that they start
 coverage: $(SET_UP)
 	rm -f .coverage .coverage.*
-	$(BIN)/coverage run $(TESTS)
+	$(KEEPING_BYTECODE) $(BIN)/coverage run $(TESTS)
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --sort cover --fail-under 95
 
@@ -69,7 +71,7 @@ soak: $(SET_UP)
 colcon: $(SET_UP)
 	rm -rf build install log
 	. $(BIN)/activate && for how in "--symlink-install" ""; do rm -rf build install log && \
-		env -u PYTHONDONTWRITEBYTECODE colcon build --packages-select climber_uk $$how \
+		$(KEEPING_BYTECODE) colcon build --packages-select climber_uk $$how \
 		--event-handlers console_cohesion+ && ! grep . log/latest_build/climber_uk/stderr.log \
 		|| exit 1; done
 	. $(BIN)/activate && . install/setup.sh && colcon test --packages-select climber_uk \
