@@ -23,7 +23,7 @@ def run(world, name, *arguments):
         env=world.environment,
         capture_output=True,
         text=True,
-        timeout=150,
+        timeout=500,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

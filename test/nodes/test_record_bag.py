@@ -511,7 +511,7 @@ def run_record_bag(*options):
         env={**os.environ, "ROS_DOMAIN_ID": str(new_domain())},
         capture_output=True,
         text=True,
-        timeout=TIMEOUT,
+        timeout=10 * TIMEOUT,
         check=False,
     )
 

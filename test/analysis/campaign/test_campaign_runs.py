@@ -15,7 +15,7 @@ from climber_uk.analysis.campaign.parts import Store, computed
 
 COMMAND = Path(sys.executable).parent / "campaign"
 PLANT, CONTROLLER = "plant_simulator.", "uk_torque_controller."
-TIMEOUT = 120.0  # [s]
+TIMEOUT = 500.0  # [s]
 # some spin, some are too weak, some lose their suction, all err
 ALL_SORTS = {
     PLANT + "initial_yaw_rate": {"uniform": [-9.0, 9.0]},
