@@ -41,12 +41,12 @@ def said(world, name, subject="safe output"):
 
 
 def is_told_and_over(lines, text):
-    """Whether this trouble is among what a node has said, each change once, and all is over.
+    """Whether a node has said this trouble, and later that all is over; each change once.
 
     Other troubles may have come and gone: on the wall clock the machine may be slow.
     """
-    changes = all(line != next_one for line, next_one in pairwise(lines))
-    return text in lines and lines[-1] == "ok again" and changes
+    assert all(line != next_one for line, next_one in pairwise(lines))
+    return text in lines and "ok again" in lines[lines.index(text) :]
 
 
 class Climb:
@@ -87,8 +87,9 @@ class Climb:
 
     def recovers(self, name, text, subject="safe output", begin=0):
         """A node has told of this trouble and that all is over."""
-        self.world.wait(lambda: said(self.world, name, subject)[-1:] == ["ok again"], "ok again")
-        assert is_told_and_over(said(self.world, name, subject)[begin:], text)
+        self.world.wait(
+            lambda: is_told_and_over(said(self.world, name, subject)[begin:], text), "ok again"
+        )
 
     def is_told(self, name, text, subject="safe output", begin=0):
         self.world.wait(lambda: text in said(self.world, name, subject)[begin:], text)
@@ -126,8 +127,7 @@ def test_odometry_that_jumps_gets_the_safe_output_for_a_few_messages(world):
     efforts = [list(m.effort) for m in loop.torques[begin:]]
     assert 0 < efforts.count([0.0, 0.0]) <= 5
     assert all(abs(torque) <= 20.0 for effort in efforts for torque in effort)
-    world.wait(lambda: "ok again" in said(world, CONTROLLER)[-1:], "word of the recovery")
-    assert is_told_and_over(said(world, CONTROLLER), "odometry jumped")
+    world.wait(lambda: is_told_and_over(said(world, CONTROLLER), "odometry jumped"), "its end")
 
 
 def test_odometry_of_the_future_is_refused(world):
@@ -136,11 +136,10 @@ def test_odometry_of_the_future_is_refused(world):
     loop.follows()
     loop.is_safe(age=-5 * SECOND)
     loop.follows()
-    world.wait(lambda: "ok again" in said(world, CONTROLLER)[-1:], "word of the recovery")
-    # by as much as it was then, when the node heard of it
+    # by as much as it was when the node heard of it
     refused = re.compile(r"bad odometry \(stamp is -[1-5]\.\d\d s from the clock, too far\)")
     (line,) = filter(refused.fullmatch, said(world, CONTROLLER))
-    assert is_told_and_over(said(world, CONTROLLER), line)
+    world.wait(lambda: is_told_and_over(said(world, CONTROLLER), line), "its end")
 
 
 def test_odometry_that_was_overtaken_is_ignored(world):
@@ -159,7 +158,8 @@ def test_odometry_that_was_overtaken_is_ignored(world):
     world.wait(lambda: last in answered(), "answer to the last one")
     assert newer in answered()
     assert overtaken not in answered()
-    assert said(world, CONTROLLER) == before
+    # of a slow machine's
+    assert set(said(world, CONTROLLER)[len(before) :]) <= {"no odometry", "ok again"}
 
 
 def test_a_reference_that_stops_gets_the_safe_output_until_a_new_one_comes(world):
