@@ -88,7 +88,7 @@ def check(world, *arguments, parameters=PARAMETERS):
         env=world.environment,
         capture_output=True,
         text=True,
-        timeout=8 * TIMEOUT,
+        timeout=4 * TIMEOUT,
     )
     rows = json.loads(done.stdout)["rows"] if done.stdout else []
     return done.returncode, {row["check"]: row for row in rows}, done.stderr

@@ -17,7 +17,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 OPTION = {False: "-p", True: "-r"}
-TIMEOUT = 60.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
+TIMEOUT = 120.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # above 101, ports may be taken by others
