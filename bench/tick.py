@@ -29,7 +29,6 @@ from climber_uk.mechanics.quantities import (
     State,
     Torques,
     Wrench,
-    across,
     along,
 )
 from climber_uk.mechanics.shapes import Ellipse
@@ -57,14 +56,14 @@ class WithMatrices(ControlLaw):
 
     solve: Callable[[Array, Array, Array, Array], Array] = as_the_paper
 
-    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
+    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
         """See `ControlLaw.generic`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
         demand = self.constraints.desired_acceleration(prepared, motion)
         direction = np.tanh(demand.speed / self.options.friction_speed)
         Q = climber.applied_force(heading, direction)
         Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
-        return float(along(heading, Qc)), float(Qc[2]), float(across(heading, Qc))
+        return float(along(heading, Qc)), float(Qc[2])
 
 
 def motions_on_the_way(number: int) -> list[Motion]:

@@ -14,9 +14,9 @@ class ByInverseDynamics(ControlLaw):
         """What gives v̇ and θ̈ without friction: forward [N], to the left [N], about z [N m]."""
         raise NotImplementedError
 
-    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
+    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
         """See `ControlLaw`."""
         v_1, theta_2, speed = self.constraints.desired_acceleration(prepared, motion)
-        drive, lateral, turn = self.needed(v_1, theta_2, motion)
+        drive, _, turn = self.needed(v_1, theta_2, motion)
         rubbing = self.climber.seal_friction * tanh(speed / self.options.friction_speed)
-        return drive + rubbing, turn, lateral
+        return drive + rubbing, turn

@@ -24,14 +24,13 @@ from climber_uk.mechanics.quantities import (
     State,
     Torques,
     Wrench,
-    across,
     along,
 )
 from climber_uk.mechanics.udwadia_kalaba import constraint_force
 from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
-Solve = Callable[[Any, Motion], tuple[Any, Any, Any]]  # force, moment and lateral reaction
+Solve = Callable[[Any, Motion], tuple[Any, Any]]  # force and moment
 
 
 @parameters(slots=True)
@@ -51,7 +50,7 @@ class ControlOptions:
     solver: str = parameter(
         "closed_form",
         "",
-        "of the Udwadia-Kalaba equation; generic: by matrices, the same, and 12 times slower",
+        "of the Udwadia-Kalaba equation; generic: by matrices, the same to rounding, and slower",
         choices=("closed_form", "generic"),
     )
 
@@ -140,24 +139,24 @@ class ControlLaw:
         drive, turn = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
             predicted = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
-            drive, turn, lateral = solve(prepared, predicted)
-            wanted = Wrench(drive - r_drive, turn - r_turn)
-            drive, turn, tau_r, tau_l, fits = climber.saturate(*wanted, right, left)
-        lost = NOTHING if fits else Wrench(wanted.force - drive, wanted.moment - turn)
-        return Command(Torques(tau_r, tau_l), wanted, lateral, lost)
+            force, moment = solve(prepared, predicted)
+            force, moment = force - r_drive, moment - r_turn
+            drive, turn, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
+        lost = NOTHING if fits else Wrench(force - drive, moment - turn)
+        lateral = climber.lateral_reaction(predicted)
+        return Command(Torques(tau_r, tau_l), Wrench(force, moment), lateral, lost)
 
-    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
+    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
         """Qc = M Aᵀ b - Q (docs/theory.md, §4.2) in the climber's frame.
 
-        Forward [N], about z [N m] and to the left [N]; floats, or arrays (N,) of many climbers.
+        Forward [N] and about z [N m]; floats, or arrays (N,) of many climbers.
         """
         v_1, yaw_acceleration, speed = self.constraints.desired_acceleration(prepared, motion)
         mass, inertia, friction, weight = self.climber.inertial
         rubbing = friction * tanh(speed / self.options.friction_speed)
-        force = mass * v_1 + rubbing + weight * motion.sine
-        return force, inertia * yaw_acceleration, self.climber.lateral_reaction(motion)
+        return mass * v_1 + rubbing + weight * motion.sine, inertia * yaw_acceleration
 
-    def generic(self, prepared: Any, motion: Motion) -> tuple[Any, Any, Any]:
+    def generic(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
         """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
 
         Rows that constraints give themselves need no closed form.
@@ -170,14 +169,12 @@ class ControlLaw:
             (A, b), speed = rows(state, desired), desired.speed
         Q = self.climber.applied_force(heading, tanh(speed / self.options.friction_speed))
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
-        return along(heading, Qc), unpack(Qc)[2], across(heading, Qc)
+        return along(heading, Qc), unpack(Qc)[2]
 
-    def of_forces(self, target: ReferencePoint, motion: Motion) -> tuple[Any, Any, Any]:
-        """Those of another law, and the reaction of wheels that do not slip."""
+    def of_forces(self, target: ReferencePoint, motion: Motion) -> Wrench:
+        """Force and moment of another law."""
         assert self.other is not None
-        return *self.other.wrench(self.climber, target, motion), self.climber.lateral_reaction(
-            motion
-        )
+        return self.other.wrench(self.climber, target, motion)
 
     def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

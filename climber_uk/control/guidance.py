@@ -115,21 +115,8 @@ class Guidance:
             select(is_slower, v * v_1 / (root * self.turn_radius), 0.0),
         )
         gain = k_y * share, k_y * share_1, k_y * share_2
-        return PreparedTarget(
-            x=x,
-            y=y,
-            heading=heading,
-            cosine=cosine,
-            sine=sine,
-            speed=v,
-            acceleration=v_1,
-            yaw_rate=omega,
-            yaw_acceleration=omega_1,
-            slow_down=slow_down,
-            catch_up=catch_up,
-            turn_rate=turn_rate,
-            gain=gain,
-        )
+        limits = slow_down, catch_up, turn_rate
+        return PreparedTarget(x, y, heading, cosine, sine, v, v_1, omega, omega_1, *limits, gain)
 
     def desired_acceleration(self, prepared: PreparedTarget, motion: Motion) -> DesiredAcceleration:
         """v̇ [m/s²] and θ̈ [rad/s²] of a climber in `motion`, and the speed wanted [m/s]."""
