@@ -34,6 +34,7 @@ def test_in_simulated_time_it_steps_once_for_each_torque_that_answers_it(world):
     world.start_node("plant_simulator", "simulated_time:=true", "initial_speed:=1.0")
     odometry, clock = world.listen(Odometry, "odom"), world.listen(Clock, "/clock")
     answers = world.speak(JointState, "wheel_torques")
+    world.wait(lambda: clock, "clock to be heard")  # while time stands still it is repeated
     for step in range(5):
         now = 1_000_000_000 + step * 5_000_000
         world.wait(lambda now=now: odometry and stamp(odometry[-1]) == now, f"odometry {step}")
