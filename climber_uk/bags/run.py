@@ -20,6 +20,10 @@ from climber_uk.parameters.parameter_file import Values
 
 REACH = 0.1  # [s] to either side, over which a speed is taken from poses
 LEAST = 1e-3  # [m/s, rad/s] that poses have to tell, for zeros to be no rate
+# [s] between poses whose straight connections bound a way: noise makes the ones longer than it,
+# bends make the others shorter
+OFTEN, SELDOM = 0.2, 1.0
+MISSING = 3.0  # typical times from one odometry to the next, from which on nobody knows the speed
 SLIP_REACH = 0.25  # [s] likewise a speed to the side: slow, and to be told from the poses' noise
 
 
@@ -71,6 +75,32 @@ class RecordedRun:
         are_zeros = ~twist.any(axis=0) & (np.abs(by_pose).max(axis=0) > LEAST)
         are_zeros[1] &= are_zeros[0]
         return np.where(is_told & ~are_zeros, twist, by_pose)
+
+    @cached_property
+    def travelled(self) -> float:
+        """Way of the centre [m]: by the speeds, or by the poses where these contradict them."""
+        return self._chords(OFTEN) if self.contradiction else self._way(self.rates[:, 0])
+
+    @cached_property
+    def contradiction(self) -> str:
+        """What the speeds say of the way, and what the poses say; empty if they may be of one."""
+        way = self._way(np.hypot(self.rates[:, 0], self.rates[:, 1]))
+        if 0.7 * self._chords(SELDOM) - 0.1 <= way <= 1.3 * self._chords(OFTEN) + 0.05:
+            return ""
+        return f"its speeds make a way of {way:.4g} m, its poses one of {self._chords(OFTEN):.4g} m"
+
+    def _way(self, speed: Array) -> float:
+        """∫ |v| dt [m] of speeds (n,); straight on where odometry is missing."""
+        steps = np.diff(self.time)
+        way = (abs(speed[1:]) + abs(speed[:-1])) / 2 * steps
+        straight = np.hypot(*np.diff(self.pose[:, :2], axis=0).T)
+        is_gap = steps > max(OFTEN, MISSING * float(np.median(steps)))
+        return float(np.where(is_gap, straight, way).sum())
+
+    def _chords(self, step: float) -> float:
+        """Way [m] by straight connections of the poses, one every `step` [s]."""
+        marks = [0, *(np.flatnonzero(np.diff(np.floor(self.time / step))) + 1), len(self.time) - 1]
+        return float(np.hypot(*np.diff(self.pose[marks, :2], axis=0).T).sum())
 
     @property
     def side_slip(self) -> Array:

@@ -141,7 +141,7 @@ class RunReader:
             if events.is_of(event, self.namespace) and found.begin <= event.arrival < found.end
         ]
         news = [(_seconds(event, whole, start), event) for event in events.changes(own)]
-        return RecordedRun(
+        run = RecordedRun(
             name=self.namespace,
             start=start,
             odometry=odometry,
@@ -155,6 +155,9 @@ class RunReader:
             parameters=parameters,
             part=part,
         )
+        if run.contradiction:
+            self.bag.lose(f"{self.topic(topics.ODOMETRY)}: {run.contradiction}")
+        return run
 
     def reference(self, found: Collected, stamps: Stamps) -> Array:
         """Reference (n, 3) at stamps (n,) [ns]: where it waited for the climber, that place.

@@ -1,7 +1,7 @@
 """State and reference in, wheel torques out: the path as a constraint, solved by Udwadia-Kalaba.
 
-The rows of `constraints.rows` are orthonormal and M weighs x and y alike, so that the force of the
-constraints (8) is M Aᵀ b - Q. It splits uniquely into the wheels' lateral reaction and the two
+The rows of `constraint_set.rows` are orthonormal and M weighs x and y alike, so that the force of
+the constraints (8) is M Aᵀ b - Q. It splits uniquely into the wheels' lateral reaction and the two
 torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 """
 

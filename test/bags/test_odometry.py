@@ -220,6 +220,53 @@ def test_a_climber_that_stands_has_not_travelled_whatever_its_odometry_tells(tmp
     assert evaluate(Case(run))["travelled"] == 0.0
 
 
+WAY = RADIUS * RATE * 799 * 0.005  # [m] of 800 messages
+
+
+@pytest.mark.parametrize("scale", [0.0625, 0.5, 2.0, -3.0, 1e6], ids=str)
+def test_a_twist_that_contradicts_the_poses_is_said_and_makes_no_way(tmp_path, scale):
+    made = a_run(800)
+    made.edit("odom", lambda sent: setattr(sent.twist.twist.linear, "x", scale))
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert evaluate(Case(run))["travelled"] == pytest.approx(WAY, rel=0.01)
+    (line,) = said
+    assert line.startswith("/odom: its speeds make a way of ")
+    assert line.endswith(f"m, its poses one of {run.travelled:.4g} m")
+
+
+def test_one_speed_that_cannot_be_makes_no_way(tmp_path):
+    made = a_run(800)
+    odometry = [sent for topic, *_, sent in made.messages if topic == "/odom"]
+    odometry[400].twist.twist.linear.x = 1e6
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert run.travelled == pytest.approx(WAY, rel=0.01)
+    assert "its speeds make a way of" in said[0]
+
+
+@pytest.mark.parametrize("gap", [0.3, 1.0, 3.0])
+def test_over_a_gap_the_way_is_straight(tmp_path, gap):
+    made = a_run(800)
+    stamps = sorted(
+        {
+            sent.header.stamp.sec + sent.header.stamp.nanosec / SECOND
+            for topic, *_, sent in made.messages
+            if topic == "/odom"
+        }
+    )
+    lacks = stamps[40] + gap
+    made.messages = [
+        message
+        for message in made.messages
+        if message[0] != "/odom"
+        or not stamps[40]
+        < message[-1].header.stamp.sec + message[-1].header.stamp.nanosec / SECOND
+        < lacks
+    ]
+    (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    chord = 2 * RADIUS * math.sin(RATE * gap / 2)
+    assert run.travelled == pytest.approx(WAY - RADIUS * RATE * gap + chord, abs=0.01)
+
+
 def test_poses_with_noise_make_the_way_no_longer(tmp_path):
     """1 mm of it, 200 times a second: 0.4 m/s were each step counted."""
     made = pose_only(2001)

@@ -8,8 +8,9 @@ RUN = (
     Metric(
         "travelled",
         "m",
-        "way of the centre, by the speed in the odometry, or by its poses if it tells no twist",
-        effort.travelled,
+        "way of the centre, by the speed in the odometry, or by its poses if it tells no twist, "
+        "or one that contradicts them; straight over gaps in the recording",
+        lambda case: case.run.travelled,
     ),
 )
 GROUPS: dict[str, tuple[Metric, ...]] = {

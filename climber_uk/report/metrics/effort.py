@@ -70,13 +70,8 @@ def changes(case: Case) -> Array:
 
 def energy_per_metre(case: Case) -> float:
     """Work of both motors on each metre of the way [J/m]."""
-    way = travelled(case)
+    way = case.run.travelled
     return (energy(case, 0) + energy(case, 1)) / way if way > 0 else NAN
-
-
-def travelled(case: Case) -> float:
-    """Way of the centre [m], from the speed, which noise makes no longer."""
-    return float(np.trapezoid(np.abs(case.run.rates[:, 0]), case.run.time))
 
 
 def _of_power(statistic: Callable[[Array], float], wheel: int, case: Case) -> float:
