@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from climber_uk.closed_loop.simulate import sampled
+from climber_uk.control.approach import Approach
 from climber_uk.control.build import build_controller
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import ADHESION
@@ -60,3 +61,11 @@ def test_plant_and_controller_have_the_same_friction(adhesion):
     believed = build_controller(values, pressure=None).sampled_controller.law.climber
     assert believed.seal_friction == plant.contact.seal_friction(plant.climber)
     assert (believed.seal_friction > 0) is (adhesion == "suction")
+
+
+@pytest.mark.parametrize("file", ["climber.yaml", "four_climbers.yaml", "magnetic.yaml"])
+def test_our_crawlers_turn_and_drive_back_before_they_go_on(file):
+    """One that turned by less than the default while nothing answered left its path by 12 cm."""
+    approach = Values(read_file(CONFIG / file, "/climber_1/uk_torque_controller")).read(Approach)
+    assert approach.max_heading <= 0.3
+    assert approach.max_distance <= 0.1
