@@ -53,10 +53,11 @@ class Collected:
         elif name in (topics.TORQUES, topics.JOINTS):
             self.joints[name].append(Joints.of(batch))
         else:
+            taken = TAKEN[name](batch)  # first, as what is of another type has no say in the frame
             frame = batch.strings["header.frame_id"]
             if frame != (first := self.frames.setdefault(name, frame)):
                 raise ValueError(f"frame_id={frame!r}, others have {first!r}")
-            self.parts[name].append((batch.stamps, batch.log_times, *TAKEN[name](batch)))
+            self.parts[name].append((batch.stamps, batch.log_times, *taken))
 
     @property
     def first_parameters(self) -> dict[str, Any]:

@@ -64,14 +64,16 @@ def raw(made):
     return [(topic, kind, log, coded(kind, sent)) for topic, kind, log, sent in made.messages]
 
 
-def with_others_on_every_topic(kind):
+def with_others_on_every_topic(kind, at=BEGAN + 1, frame=None):
     """A second type on the name of each topic."""
 
     def make(bag):
         made = a_whole_run()
         odd = message(POSE, BEGAN) if kind == POSE else blank(kind)
+        if frame:
+            odd.header.frame_id = frame
         names = {topic for topic, *_ in made.messages}
-        others = [(topic, kind, BEGAN + 1, coded(kind, odd)) for topic in sorted(names)]
+        others = [(topic, kind, at, coded(kind, odd)) for topic in sorted(names)]
         sqlite(bag, raw(made))
         with closing(sqlite3.connect(bag / "bag_0.db3")) as database:
             for number, (topic, kind_, log, data) in enumerate(others, start=90):
@@ -127,6 +129,10 @@ GOOD = ""
 BAGS = {
     "a second type, string": (with_others_on_every_topic(STRING), GOOD),
     "a second type, pose": (with_others_on_every_topic(POSE), GOOD),
+    "a second type, of another frame, first": (
+        with_others_on_every_topic(POSE, at=BEGAN - 1, frame="map"),
+        GOOD,
+    ),
     "big endian": (
         lambda bag: mcap(bag, [(*m[:3], swapped(m)) for m in a_whole_run().messages]),
         GOOD,
