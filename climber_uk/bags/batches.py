@@ -4,7 +4,7 @@ They are the rows of one table (see `Layout`), and a topic hardly ever has more 
 """
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -95,6 +95,10 @@ def decode(
 ) -> tuple[list[Batch], str]:
     """Batches of some messages, and what is wrong with the last one that cannot be read."""
     batches, spoilt = [], ""
+
+    def fields_of(name: str) -> Iterable[tuple[str, Any]]:
+        return store.fielddefs[name][1]
+
     by_size = defaultdict(list)
     for log_time, data in messages:
         by_size[len(data)].append((log_time, data))
@@ -105,7 +109,7 @@ def decode(
         rows = np.frombuffer(b"".join(data for _, data in alike), np.uint8).reshape(-1, size)
         alone = 0  # in a row, that have no others like them
         while len(rows):
-            layout = Layout(rows[0].tobytes(), store)
+            layout = Layout(rows[0].tobytes(), fields_of)
             same = np.arange(len(rows)) == 0
             try:
                 layout.walk(type_name)

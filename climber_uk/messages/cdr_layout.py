@@ -4,16 +4,19 @@ CDR puts a field where the strings and lengths before it leave it. So all messag
 have the same strings and the same lengths have their numbers in the same places.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.interfaces import Nodetype
-from rosbags.typesys.store import Typestore
 
 HEADER = 4  # bytes before the fields: how they are encoded
 MOST_PARTS = 100_000  # fields, and elements that are no numbers
+BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4  # kinds of fields, as `rosbags.interfaces.Nodetype`
+# Name and description of each field of a type: (BASE, (kind of number or "string", ...)),
+# (NAME, type), (ARRAY or SEQUENCE, (description of an element, length))
+FieldsOf = Callable[[str], Iterable[tuple[str, Any]]]
 FORMATS = {
     **dict.fromkeys(("bool", "byte", "char", "uint8"), "u1"),
     **{"int8": "i1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
@@ -29,7 +32,7 @@ class Layout:
     """
 
     data: bytes
-    store: Typestore
+    fields_of: FieldsOf
     place: int = HEADER  # of the next byte
     fields: dict[str, tuple[Any, int]] = field(default_factory=dict)  # format and place by path
     # begin and end of all strings and lengths
@@ -37,6 +40,7 @@ class Layout:
     strings: dict[str, str] = field(default_factory=dict)
     lengths: dict[str, int] = field(default_factory=dict)
     parts: int = 0
+    most_parts: int = MOST_PARTS
 
     @property
     def order(self) -> str:
@@ -48,15 +52,27 @@ class Layout:
     @property
     def numbers(self) -> "np.dtype[Any]":
         """All numbers of a message as one type; raises `ValueError` if they go beyond its end."""
-        formats, places = zip(*self.fields.values(), strict=True) if self.fields else ((), ())
-        return np.dtype(
-            {
-                "names": list(self.fields),
-                "formats": list(formats),
-                "offsets": list(places),
-                "itemsize": len(self.data),
-            }
+        return self.chosen(self.fields)
+
+    def chosen(self, paths: Iterable[str]) -> "np.dtype[Any]":
+        """The numbers at some paths as one type, as `numbers`; `KeyError` if there is no such."""
+        names = list(paths)
+        formats, places = (
+            zip(*(self.fields[name] for name in names), strict=True) if names else ((), ())
         )
+        return np.dtype(
+            {"names": names, "formats": formats, "offsets": places, "itemsize": len(self.data)}
+        )
+
+    @property
+    def spans(self) -> list[tuple[int, int]]:
+        """As `fixed`, those that follow each other as one."""
+        begins = [begin for begin, _ in self.fixed]
+        ends = [end for _, end in self.fixed]
+        apart = [i for i in range(1, len(begins)) if begins[i] != ends[i - 1]]
+        return [
+            (begins[i], ends[j - 1]) for i, j in zip([0, *apart], [*apart, len(ends)], strict=True)
+        ]
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool]:
         """Which messages, as rows (n, size) of bytes, have the strings and lengths of the first."""
@@ -68,29 +84,29 @@ class Layout:
 
     def walk(self, type_name: str, path: str = "") -> None:
         """Find the fields of a type, from `place` on; `path` is what their names begin with."""
-        for name, description in self.store.fielddefs[type_name][1]:
+        for name, description in self.fields_of(type_name):
             self._find(description, f"{path}.{name}" if path else name)
 
     def _find(self, description: Any, path: str) -> None:
         """Find one field, of a `description` as rosbags has it, and go behind it."""
         kind, what = description
         self.parts += 1
-        if self.parts > MOST_PARTS:
-            raise ValueError(f"it has more than {MOST_PARTS} fields")
-        if kind == Nodetype.NAME:
+        if self.parts > self.most_parts:
+            raise ValueError(f"it has more than {self.most_parts} fields")
+        if kind == NAME:
             self.walk(what, path)
-        elif kind == Nodetype.BASE and what[0] == "string":
+        elif kind == BASE and what[0] == "string":
             start, size = self._length()
             self.strings[path] = self.data[start : start + size - 1].decode()
             self._keep(start, size)
-        elif kind == Nodetype.BASE:
+        elif kind == BASE:
             self._number(path, what[0])
         else:
             element, length = what
-            if kind == Nodetype.SEQUENCE:
+            if kind == SEQUENCE:
                 _, length = self._length()
                 self.lengths[path] = length
-            if element[0] == Nodetype.BASE and element[1][0] != "string":
+            if element[0] == BASE and element[1][0] != "string":
                 self._number(path, element[1][0], length)
                 return
             for i in range(length):

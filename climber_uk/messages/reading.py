@@ -5,7 +5,9 @@ Stamps are integers in nanoseconds. Messages have wheels by name; arrays have (r
 """
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,12 +17,13 @@ from climber_uk.mechanics.quantities import State, Torques
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
-    from geometry_msgs.msg import Quaternion, WrenchStamped
+    from geometry_msgs.msg import WrenchStamped
     from nav_msgs.msg import Odometry
     from rcl_interfaces.msg import ParameterEvent
     from sensor_msgs.msg import FluidPressure, JointState
 
 
+STAMP = "header.stamp.sec", "header.stamp.nanosec"
 LARGEST = 1e6  # of any quantity of a climber, in SI units
 NORM_TOLERANCE = 0.01  # of a quaternion's norm, which is 1; the same as tf2's
 MOST_TILT = 0.1  # of a unit quaternion's hypot(x, y): 11.5° off a rotation about z
@@ -31,34 +34,95 @@ def nanoseconds(time: "Time | Duration") -> int:
     return int(time.sec) * SECOND + int(time.nanosec)
 
 
+class OdometryFields(NamedTuple):
+    """What is read of an Odometry; pose and twist in the frames that the strings name."""
+
+    sec: int
+    nanosec: int
+    x: float  # [m]
+    y: float
+    q_x: float  # orientation, a quaternion
+    q_y: float
+    q_z: float
+    q_w: float
+    v_x: float  # [m/s] forwards
+    v_y: float
+    yaw_rate: float  # [rad/s]
+    frame: str
+    child_frame: str
+
+    @property
+    def stamp(self) -> int:
+        """In nanoseconds."""
+        return self.sec * SECOND + self.nanosec
+
+
+class JointFields(NamedTuple):
+    """What is read of a JointState."""
+
+    sec: int
+    nanosec: int
+    efforts: Sequence[float]  # [N m]
+    names: Sequence[str]  # of their joints
+
+    @classmethod
+    def of(cls, message: "JointState") -> "JointFields":
+        """Those of a message."""
+        return cls(*_joint_state(message))
+
+    @property
+    def stamp(self) -> int:
+        """In nanoseconds."""
+        return self.sec * SECOND + self.nanosec
+
+
+# the paths of these fields: numbers, then strings
+ODOMETRY = (
+    (
+        *STAMP,
+        *(f"pose.pose.position.{axis}" for axis in "xy"),
+        *(f"pose.pose.orientation.{axis}" for axis in "xyzw"),
+        *("twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z"),
+    ),
+    ("header.frame_id", "child_frame_id"),
+)
+JOINT_STATE = (*STAMP, "effort"), ("name",)
+_odometry, _joint_state = (attrgetter(*sum(paths, ())) for paths in (ODOMETRY, JOINT_STATE))
+
+
 def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
+    """State of a message, as `state_of`."""
+    return state_of(OdometryFields(*_odometry(message)), odom_frame, base_frame)
+
+
+def state_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> State:
     """State in `odom_frame`, the wall's; the twist is rotated into it from `base_frame`."""
     for name, frame, wanted in (
-        ("frame_id", message.header.frame_id, odom_frame),
-        ("child_frame_id", message.child_frame_id, base_frame),
+        ("frame_id", fields.frame, odom_frame),
+        ("child_frame_id", fields.child_frame, base_frame),
     ):
         if frame != wanted:
             raise ValueError(f"{name}={frame!r} must be {wanted!r}")
-    position, twist = message.pose.pose.position, message.twist.twist
-    heading = heading_of(message.pose.pose.orientation)
-    v_x, v_y, omega = twist.linear.x, twist.linear.y, twist.angular.z
+    heading = heading_of(fields.q_x, fields.q_y, fields.q_z, fields.q_w)
+    v_x, v_y, omega = fields.v_x, fields.v_y, fields.yaw_rate
     cosine, sine = math.cos(heading), math.sin(heading)
-    pose = np.array([position.x, position.y, heading])
+    pose = np.array([fields.x, fields.y, heading])
     velocity = np.array([v_x * cosine - v_y * sine, v_x * sine + v_y * cosine, omega])
     check_size(pose=pose, velocity=velocity)
     return State(pose, velocity)
 
 
-def wheel_torques(message: "JointState", left_joint: str, right_joint: str) -> Array:
+def wheel_torques(fields: JointFields, left_joint: str, right_joint: str) -> Array:
     """Torques (2,) (right, left) [N m]."""
-    if sorted(message.name) != sorted([left_joint, right_joint]):
-        raise ValueError(f"names {list(message.name)} must be {left_joint!r} and {right_joint!r}")
-    if len(message.effort) != 2:
-        raise ValueError(f"{len(message.effort)} efforts must be 2")
-    efforts = dict(zip(message.name, message.effort, strict=True))
-    torques = np.array(Torques(right=efforts[right_joint], left=efforts[left_joint]))
+    names, efforts = list(fields.names), list(fields.efforts)
+    if sorted(names) != sorted([left_joint, right_joint]):
+        raise ValueError(f"names {names} must be {left_joint!r} and {right_joint!r}")
+    if len(efforts) != 2:
+        raise ValueError(f"{len(efforts)} efforts must be 2")
+    by_name = dict(zip(names, efforts, strict=True))
+    torques = np.array(Torques(right=by_name[right_joint], left=by_name[left_joint]))
     if not np.isfinite(torques).all():
-        raise ValueError(f"efforts {list(message.effort)} must be finite")
+        raise ValueError(f"efforts {efforts} must be finite")
     return torques
 
 
@@ -88,16 +152,15 @@ def parameters(message: "ParameterEvent") -> dict[str, bool | int | float | str]
     return {name: getattr(value, kinds[value.type]) for name, value in pairs if value.type in kinds}
 
 
-def check_size(**vectors: "Array | list[list[float]]") -> None:
+def check_size(**vectors: "Array | Sequence[Sequence[float]]") -> None:
     """Raise `ValueError` naming the vector that is not finite, or beyond ± `LARGEST`."""
     for name, vector in vectors.items():
         if not (np.abs(vector) <= LARGEST).all():
             raise ValueError(f"{name} {vector} is not finite, or above {LARGEST:g} in SI units")
 
 
-def heading_of(orientation: "Quaternion") -> float:
+def heading_of(x: float, y: float, z: float, w: float) -> float:
     """Heading in [-π, π] [rad]; `ValueError` unless it is a unit quaternion (nearly) about z."""
-    x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
     heading, norm, tilted, is_unit, is_planar = turn_about_z(x, y, z, w)
     if not (is_unit and is_planar):
         raise ValueError(

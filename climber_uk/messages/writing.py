@@ -42,19 +42,37 @@ def time(nanoseconds: int) -> Time:
     return Time(sec=nanoseconds // SECOND, nanosec=nanoseconds % SECOND)
 
 
+# paths of the numbers in messages whose others stay the same; their strings do, too
+ODOMETRY = (
+    *("pose.pose.position.x", "pose.pose.position.y"),
+    *("pose.pose.orientation.z", "pose.pose.orientation.w"),
+    *("twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z"),
+)
+EFFORT = ("effort",)
+JOINT_STATE = "position", "velocity", "effort"
+VECTOR = "vector.x", "vector.y", "vector.z"
+WRENCH = "wrench.force.x", "wrench.force.y", "wrench.torque.z"
+
+
 def odometry(state: State, stamp: int, odom_frame: str, base_frame: str) -> Odometry:
     """Odometry of a state that is known exactly, but for rounding: covariances 1e-12."""
     message = Odometry(child_frame_id=base_frame)
     message.header.stamp = time(stamp)
     message.header.frame_id = odom_frame
-    message.pose.pose.position.x = float(state.pose[0])
-    message.pose.pose.position.y = float(state.pose[1])
-    message.pose.pose.orientation = quaternion(float(state.heading))
-    message.twist.twist.linear.x = float(state.forward_speed)
-    message.twist.twist.linear.y = float(state.side_slip)
-    message.twist.twist.angular.z = float(state.velocity[2])
+    position, orientation = message.pose.pose.position, message.pose.pose.orientation
+    linear, angular = message.twist.twist.linear, message.twist.twist.angular
+    position.x, position.y, orientation.z, orientation.w, *twist = odometry_numbers(state)
+    linear.x, linear.y, angular.z = twist
     message.pose.covariance = message.twist.covariance = ROUNDING_COVARIANCE
     return message
+
+
+def odometry_numbers(state: State) -> tuple[float, ...]:
+    """Numbers of a state, for the paths of `ODOMETRY`."""
+    x, y, heading = state.pose.tolist()
+    yaw_rate = float(state.velocity[2])
+    speed, slip = float(state.forward_speed), float(state.side_slip)
+    return x, y, math.sin(heading / 2), math.cos(heading / 2), speed, slip, yaw_rate
 
 
 def transform(odometry: Odometry) -> TransformStamped:
@@ -80,15 +98,25 @@ def left_right(pair: Array) -> list[float]:
     return [left, right]
 
 
+def reference_numbers(reference: "Reference", time: float) -> tuple[float, ...]:
+    """Numbers of a reference `time` [s] after its start, for the paths of `references.POINT`."""
+    x, y, heading = reference.pose.tolist()
+    rotation = 0.0, 0.0, math.sin(heading / 2), math.cos(heading / 2)
+    twists = *reference.velocity.tolist(), *reference.acceleration.tolist()
+    return x, y, *rotation, *twists, *divmod(round(time * SECOND), SECOND)
+
+
 def reference_point(reference: "Reference", time: float) -> MultiDOFJointTrajectoryPoint:
     """Point of a trajectory message: a reference `time` [s] after the trajectory's start."""
-    x, y, heading = reference.pose.tolist()
+    x, y, *rotation, v_x, v_y, v_yaw, a_x, a_y, a_yaw, sec, nanosec = reference_numbers(
+        reference, time
+    )
+    turned = Quaternion(**dict(zip("xyzw", rotation, strict=True)))
     point = MultiDOFJointTrajectoryPoint()
-    point.transforms = [Transform(translation=Vector3(x=x, y=y), rotation=quaternion(heading))]
-    point.velocities = [_twist(reference.velocity)]
-    point.accelerations = [_twist(reference.acceleration)]
-    since = round(time * SECOND)
-    point.time_from_start = Duration(sec=since // SECOND, nanosec=since % SECOND)
+    point.transforms = [Transform(translation=Vector3(x=x, y=y), rotation=turned)]
+    point.velocities = [Twist(linear=Vector3(x=v_x, y=v_y), angular=Vector3(z=v_yaw))]
+    point.accelerations = [Twist(linear=Vector3(x=a_x, y=a_y), angular=Vector3(z=a_yaw))]
+    point.time_from_start = Duration(sec=int(sec), nanosec=int(nanosec))
     return point
 
 
@@ -167,8 +195,3 @@ def parameters(values: Mapping[str, object], node: str, stamp: int) -> Parameter
 def quaternion(heading: float) -> Quaternion:
     """Quaternion of a rotation about z by `heading` [rad]."""
     return Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
-
-
-def _twist(planar: Array) -> Twist:
-    x, y, yaw = planar.tolist()
-    return Twist(linear=Vector3(x=x, y=y), angular=Vector3(z=yaw))

@@ -16,7 +16,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.messages import reading, reading_reference
+from climber_uk.messages import reading, references
 from climber_uk.messages.drawing import WALL, Drawing, Place, colour_of, place
 from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, REFERENCE, TORQUES
 from climber_uk.parameters.declaration import parameter, parameters
@@ -123,7 +123,7 @@ class Markers(ClimberNode):
         message, odom_frame = self.latest.get(REFERENCE), self.names.odom_frame
         if message is None:
             return
-        preview = self.read(REFERENCE, message, lambda m: reading_reference.preview(m, odom_frame))
+        preview = self.read(REFERENCE, message, lambda m: references.preview(m, odom_frame))
         desired = preview.at(stamp) if preview is not None else None
         if desired is not None:
             drawing.outline(REFERENCE, desired.pose, self.options.half_track, VIOLET)
@@ -132,7 +132,9 @@ class Markers(ClimberNode):
         """Draw torques at the wheels, and drive and lateral force at the centre."""
         names, options = self.names, self.options
         left, right = names.left_wheel_joint, names.right_wheel_joint
-        torques = self.read_latest(TORQUES, stamp, lambda m: reading.wheel_torques(m, left, right))
+        torques = self.read_latest(
+            TORQUES, stamp, lambda m: reading.wheel_torques(reading.JointFields.of(m), left, right)
+        )
         if torques is not None:
             for side, torque in zip((-1, 1), torques.tolist(), strict=True):
                 start = (0.0, side * options.half_track, ABOVE)

@@ -10,6 +10,7 @@ from std_srvs.srv import SetBool, Trigger
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.adhesion import Alarm
 from climber_uk.messages import reading
+from climber_uk.messages.in_place import NumberReader
 from climber_uk.messages.topics import JOINTS, ODOMETRY, PLANT, PUSH, REFERENCE, TORQUES
 from climber_uk.ros import plant_parts
 from climber_uk.ros.margins import Margins
@@ -42,7 +43,8 @@ class PlantSimulator(ClimberNode):
         self.place_at_start()
 
         self.topics = PlantTopics(self)
-        self.subscription(JointState, TORQUES, self.on_torques)
+        self.read_torques = NumberReader(JointState, *reading.JOINT_STATE)
+        self.subscription(JointState, TORQUES, self.on_torques, raw=True)
         self.subscription(WrenchStamped, PUSH, self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
         self.create_service(SetBool, "~/pause", self.on_pause)
@@ -119,23 +121,23 @@ class PlantSimulator(ClimberNode):
         begin = reading.nanoseconds(message.header.stamp) or self.time.stamp
         self.pushes.add(begin, Push(*wrench))
 
-    def on_torques(self, message: JointState) -> None:
+    def on_torques(self, serialized: bytes) -> None:
         """Let torques act from now on; in lock-step only if they answer the last odometry."""
-        names = self.names
+        names, stamp = self.names, None
+        torques: Array = np.zeros(2)
         try:
-            torques = reading.wheel_torques(
-                message, names.left_wheel_joint, names.right_wheel_joint
-            )
+            fields = reading.JointFields(*self.read_torques(serialized))
+            stamp = fields.stamp
+            torques = reading.wheel_torques(fields, names.left_wheel_joint, names.right_wheel_joint)
             self.report(TORQUES, "")
         except ValueError as error:
             self.report(TORQUES, "refused, zero torque instead", str(error))
-            torques = np.zeros(2)
         limit = self.robot.plant.climber.max_wheel_torque
         torques = np.clip(torques, -limit, limit)
         self.waits = self.waits and not torques.any()
         if not self.options.simulated_time:
             self.commands.add(self.get_clock().now().nanoseconds, torques)
-        elif reading.nanoseconds(message.header.stamp) == self.asked and not self.answered:
+        elif stamp == self.asked and not self.answered:
             self.commands.add(self.time.stamp, torques)
             self.answered = True
             self.report("lock-step", "")

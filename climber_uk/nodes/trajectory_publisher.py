@@ -12,13 +12,14 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import TimeReference
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import Stopping
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
+from climber_uk.messages.references import ReferenceWriter, Row
 from climber_uk.messages.topics import ODOMETRY, PLANNER, REFERENCE, REFERENCE_PATH, REFERENCE_TIME
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
@@ -60,10 +61,11 @@ class TrajectoryPublisher(ClimberNode):
         self.start: int | None = None  # [ns] stamp of the trajectory's time 0
         self.followed: int | None = None  # [ns] how far a controller has come
         self.last_look = self.stood_at = 0  # [ns] of the clock
-        self.points: deque[MultiDOFJointTrajectoryPoint] = deque()
+        self.points: deque[Row] = deque()
         self.next_point = 0  # every point is computed once: previews agree to the last bit
 
         self.reference = self.publisher(MultiDOFJointTrajectory, REFERENCE)
+        self.serialized = ReferenceWriter(self.names.odom_frame, self.names.base_frame)
         self.path = self.publisher(Path, REFERENCE_PATH, LATCHED)
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.create_service(Trigger, "~/start", self.on_start)
@@ -181,14 +183,11 @@ class TrajectoryPublisher(ClimberNode):
         self.next_point = max(self.next_point, int(oldest / options.point_period))
         while self.next_point * options.point_period < time + options.preview:
             at = self.next_point * options.point_period
-            self.points.append(writing.reference_point(self.trajectory.at(at), at))
+            self.points.append(writing.reference_numbers(self.trajectory.at(at), at))
             self.next_point += 1
-        while reading.nanoseconds(self.points[0].time_from_start) < oldest * SECOND:
+        while self.points[0][-2] * SECOND + self.points[0][-1] < oldest * SECOND:
             self.points.popleft()
-        names = self.names
-        self.reference.publish(
-            writing.reference(self.points, self.start, names.odom_frame, names.base_frame)
-        )
+        self.reference.publish(self.serialized(self.points, self.start))
 
 
 def main() -> None:

@@ -8,7 +8,6 @@ import math
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import FluidPressure, JointState, TimeReference
 from std_msgs.msg import Float64MultiArray
@@ -23,7 +22,9 @@ from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.reference import tracking_error
-from climber_uk.messages import reading, reading_reference, writing
+from climber_uk.messages import reading, writing
+from climber_uk.messages.in_place import NumberReader
+from climber_uk.messages.references import PreviewReader
 from climber_uk.messages.topics import (
     CONTROLLER,
     FORCE,
@@ -38,6 +39,7 @@ from climber_uk.messages.topics import (
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.managed import ManagedNode
 from climber_uk.ros.margins import Margins
+from climber_uk.ros.output import Output
 from climber_uk.ros.running import (
     BEST_EFFORT,
     LATCHED,
@@ -83,11 +85,20 @@ class UkTorqueController(ManagedNode):
         self.is_position_due = Throttle(PUBLISH_PERIOD)
         self.last_mode = Mode.WAITING
 
-        self.torques = self.publisher(JointState, TORQUES)
+        self.read_odometry = NumberReader(Odometry, *reading.ODOMETRY)
+        self.read_reference = PreviewReader()
+        joints = [self.names.left_wheel_joint, self.names.right_wheel_joint]
+        torques = JointState(name=joints, effort=[0.0, 0.0])
+        self.torques = Output(self.publisher(JointState, TORQUES), torques, writing.EFFORT)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
-        self.error = self.publisher(Vector3Stamped, "~/tracking_error")
-        self.force = self.publisher(WrenchStamped, private(FORCE))
-        self.disturbance = self.publisher(WrenchStamped, "~/disturbance")
+        zero, base_frame = (0.0, 0.0, 0.0), self.names.base_frame
+        error = self.publisher(Vector3Stamped, "~/tracking_error")
+        self.error = Output(error, writing.vector(zero, 0, base_frame), writing.VECTOR)
+        wrench = writing.wrench(zero, 0, base_frame)
+        force = self.publisher(WrenchStamped, private(FORCE))
+        self.force = Output(force, wrench, writing.WRENCH)
+        disturbance = self.publisher(WrenchStamped, "~/disturbance")
+        self.disturbance = Output(disturbance, wrench, writing.WRENCH)
         self.reference_time = self.publisher(TimeReference, REFERENCE_TIME)
         self.parameter_values = self.publisher(ParameterEvent, private(PARAMETERS), LATCHED)
         self.publish_parameters()
@@ -115,7 +126,7 @@ class UkTorqueController(ManagedNode):
         self.controller = build_controller(self.parameters, self.pressure)
         self.controller.enable(False)
         return [
-            self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT),
+            self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT, raw=True),
             self.subscription(
                 MultiDOFJointTrajectory, REFERENCE, self.on_reference, RELIABLE, raw=True
             ),
@@ -152,23 +163,22 @@ class UkTorqueController(ManagedNode):
 
     # Messages
 
-    def on_odometry(self, message: Odometry) -> None:
+    def on_odometry(self, serialized: bytes) -> None:
         """Answer an odometry with torques, or a bad one with the safe output."""
-        stamp = reading.nanoseconds(message.header.stamp)
         try:
-            state = reading.state(message, self.names.odom_frame, self.names.base_frame)
+            fields = reading.OdometryFields(*self.read_odometry(serialized))
+            state = reading.state_of(fields, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
             self.publish(self.controller.on_bad_odometry(self.now(), str(error)))
             return
-        self.publish(self.controller.on_odometry(self.now(), stamp, state))
+        self.publish(self.controller.on_odometry(self.now(), fields.stamp, state))
 
     def on_reference(self, serialized: bytes) -> None:
         """Check and keep a reference; answer an odometry that waits for it."""
         try:
             if len(serialized) > LARGEST_REFERENCE:
                 raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
-            message = deserialize_message(serialized, MultiDOFJointTrajectory)
-            preview = reading_reference.preview(message, self.names.odom_frame)
+            preview = self.read_reference(serialized, self.names.odom_frame)
             preview.check_heading()
         except ValueError as error:
             self.report(REFERENCE, "refused", str(error))
@@ -235,11 +245,9 @@ class UkTorqueController(ManagedNode):
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
-        left_joint, right_joint = self.names.left_wheel_joint, self.names.right_wheel_joint
-        message = writing.wheel_torques(answer.torques, answer.stamp, left_joint, right_joint)
-        self.torques.publish(message)
+        left, right = efforts = writing.left_right(answer.torques)
+        self.torques.publish(answer.stamp, efforts)
         if self.options.effort_commands:
-            left, right = message.effort
             ordered = [left, right] if self.options.effort_order == "left_right" else [right, left]
             self.efforts.publish(Float64MultiArray(data=ordered))
 
@@ -247,16 +255,18 @@ class UkTorqueController(ManagedNode):
         """Publish constraint force, disturbance and tracking error behind an answer."""
         self.answers += 1
         self.saturations += int(command.missing.any())
-        controller, base_frame = self.controller, self.names.base_frame
-        self.force.publish(writing.wrench(command.constraint_force, stamp, base_frame))
+        controller = self.controller
+        if self.force.is_heard:
+            self.force.publish(stamp, *command.constraint_force)
         if self.is_due(stamp):
             force, moment = controller.sampled_controller.disturbance
-            self.disturbance.publish(writing.wrench((force, 0.0, moment), stamp, base_frame))
+            self.disturbance.publish(stamp, force, 0.0, moment)
+        if not self.error.is_heard:
+            return
         followed = controller.preview
         desired = followed.at(controller.active.time_followed(stamp)) if followed else None
         if state is not None and desired is not None:
-            error = tracking_error(state.pose, desired)
-            self.error.publish(writing.vector(error, stamp, base_frame))
+            self.error.publish(stamp, *tracking_error(state.pose, desired))
 
     def add_margins(self, answer: Answer, state: State) -> None:
         """Add the slip margin under an answer's torques, and the tip margin."""

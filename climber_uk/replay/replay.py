@@ -16,7 +16,7 @@ from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import Torques
-from climber_uk.messages import reading, reading_reference
+from climber_uk.messages import reading, references
 from climber_uk.messages.names import Names
 from climber_uk.messages.topics import CLOCK, ODOMETRY, PRESSURE, REFERENCE, TORQUES
 from climber_uk.parameters.parameter_file import Values
@@ -118,7 +118,7 @@ class Replay:
     def on_reference(self, _: int, message: Any) -> None:
         """Keep a reference, unless it is one that the node refuses."""
         try:
-            preview = reading_reference.preview(message, self.names.odom_frame)
+            preview = references.preview(message, self.names.odom_frame)
             preview.check_heading()
         except ValueError:
             return

@@ -5,6 +5,7 @@ from geometry_msgs.msg import Vector3Stamped
 from climber_uk.mechanics.adhesion import MAX_MARGIN, Alarm
 from climber_uk.messages import writing
 from climber_uk.messages.topics import MARGINS, private
+from climber_uk.ros.output import Output
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 
 STATUS_LEVELS = writing.OK, writing.WARN, writing.ERROR
@@ -15,7 +16,9 @@ class Margins:
 
     def __init__(self, node: ClimberNode, alarm: Alarm) -> None:
         self.node, self.alarm = node, alarm
-        self.publisher = node.publisher(Vector3Stamped, private(MARGINS[0]))
+        margins = writing.vector((0.0, 0.0, 0.0), 0, node.names.base_frame)
+        publisher = node.publisher(Vector3Stamped, private(MARGINS[0]))
+        self.topic = Output(publisher, margins, writing.VECTOR)
         self.is_due = Throttle(PUBLISH_PERIOD)
         self.last = self.lowest = self.unpublished = MAX_MARGIN, MAX_MARGIN  # slip, tip
         self.level = 0  # of the alarm, as published last
@@ -26,8 +29,7 @@ class Margins:
         self.lowest = min(slip, self.lowest[0]), min(tip, self.lowest[1])
         self.unpublished = min(slip, self.unpublished[0]), min(tip, self.unpublished[1])
         if self.is_due(stamp):
-            frame = self.node.names.base_frame
-            self.publisher.publish(writing.vector((*self.unpublished, load), stamp, frame))
+            self.topic.publish(stamp, *self.unpublished, load)
             self.unpublished = MAX_MARGIN, MAX_MARGIN
         if self.alarm.level(min(self.last)) > self.level:
             self.node.diagnose()

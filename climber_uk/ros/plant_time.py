@@ -9,8 +9,8 @@ from typing import Protocol
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from climber_uk.mechanics import SECOND
-from climber_uk.messages import writing
 from climber_uk.messages.topics import CLOCK
+from climber_uk.ros.output import Output
 from climber_uk.ros.running import WALL_CLOCK, ClimberNode, Throttle
 from climber_uk.simulation.options import SimulationOptions
 
@@ -63,13 +63,15 @@ class PlantTime:
         # 0 would mean that there is no time yet
         self.stamp: int = SECOND if options.simulated_time else self.clock.now().nanoseconds
         self.stepped_at = self.due = WALL_CLOCK.now().nanoseconds
-        self.topic, self.is_due = None, Throttle(TICK)
+        self.topic: Output | None = None
+        self.is_due = Throttle(TICK)
         self.waits, self.looks = bool(options.wait_for), 0
         if self.waits:
             self.log.info(f"time does not run until {options.wait_for} listens")
             node.create_timer(LOOK_PERIOD, self.check_listener, clock=WALL_CLOCK)
         if options.simulated_time:
-            self.topic = node.publisher(ClockMessage, CLOCK)
+            publisher = node.publisher(ClockMessage, CLOCK)
+            self.topic = Output(publisher, ClockMessage(), (), ("clock.sec", "clock.nanosec"))
             node.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
             if options.real_time_factor > 0:
                 node.create_timer(self.pace / SECOND, self.step_if_due, clock=WALL_CLOCK)
@@ -201,4 +203,4 @@ class PlantTime:
     def publish_time(self) -> None:
         """Publish /clock if time is simulated."""
         if self.topic is not None:
-            self.topic.publish(ClockMessage(clock=writing.time(self.stamp)))
+            self.topic.publish(self.stamp)

@@ -53,7 +53,7 @@ TOPICS = {
 def filled(type_name, sample, stamps, **columns):
     """Messages as the sample, with stamps and some columns of numbers of their own."""
     data = bytes(STORE.serialize_cdr(sample, type_name))
-    layout = Layout(data, STORE)
+    layout = Layout(data, lambda name: STORE.fielddefs[name][1])
     layout.walk(type_name)
     rows = np.tile(np.frombuffer(data, np.uint8), (len(stamps), 1)).view(layout.numbers)[:, 0]
     rows["header.stamp.sec"], rows["header.stamp.nanosec"] = divmod(stamps, SECOND)

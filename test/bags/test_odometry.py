@@ -143,7 +143,7 @@ def test_many_orientations_are_judged_as_the_controller_judges_one(parts):
     (batch,), _ = decode([(0, bytes(STORE.serialize_cdr(stamped, kind)))], kind, STORE)
     (found,), (fault,) = heading(batch, "quaternion")
     try:
-        expected = heading_of(sent)
+        expected = heading_of(sent.x, sent.y, sent.z, sent.w)
     except ValueError:
         assert fault
     else:
