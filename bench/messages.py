@@ -104,7 +104,9 @@ def processor(process: subprocess.Popen[bytes]) -> float:
 def ours(kind: str, seconds: float) -> list[float]:
     """Steps a second of the three nodes, and µs of the processor for each: controller and plant."""
     lock_step = ["-p", "simulated_time:=true", "-p", "real_time_factor:=0.0"]
-    settings = dict.fromkeys(NODES, ["-p", "use_sim_time:=true"]) | {"plant_simulator": lock_step}
+    settings = {name: ["-p", "use_sim_time:=true"] for name in NODES} | {
+        "plant_simulator": lock_step
+    }
     options = ["--ros-args", "--params-file", CONFIG]
     scratch = tempfile.mkdtemp()
     nodes = [

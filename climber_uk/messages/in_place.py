@@ -87,14 +87,21 @@ class NumberWriter:
     """Writes numbers at some paths into the bytes of a message, which else stays as it is."""
 
     def __init__(self, message: Any, numbers: Iterable[str]) -> None:
-        self._data = bytearray(serialize_message(message))
-        layout = laid_out(bytes(self._data), type(message))
+        self._data, layout = serialized(message)
         self._row = np.frombuffer(self._data, layout.chosen(numbers))
 
     def __call__(self, *numbers: Any) -> bytes:
         """The serialised message with these numbers, in the order of their paths."""
         self._row[0] = numbers
         return bytes(self._data)
+
+
+def serialized(message: Any) -> tuple[bytearray, Layout]:
+    """A message's bytes, without those that rclpy may leave behind its end, and their layout."""
+    data = serialize_message(message)
+    layout = laid_out(data, type(message))
+    layout.data = data[: layout.place]
+    return bytearray(layout.data), layout
 
 
 def laid_out(data: bytes, kind: type) -> Layout:

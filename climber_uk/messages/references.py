@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Transform, Twist
-from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.preview import Preview
 from climber_uk.messages import writing
 from climber_uk.messages.cdr_layout import Layout
-from climber_uk.messages.in_place import Layouts, laid_out
+from climber_uk.messages.in_place import Layouts, serialized
 from climber_uk.messages.reading import STAMP, check_size, heading_of, nanoseconds
 
 PARTS = "transforms", "velocities", "accelerations"  # of a point
@@ -70,9 +69,8 @@ class ReferenceWriter:
         point = MultiDOFJointTrajectoryPoint(
             transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()]
         )
-        serialized = serialize_message(writing.reference([point] * number, 0, *self.frames))
-        _, stamp, (_, row, begin, stride) = _points(laid_out(serialized, MultiDOFJointTrajectory))
-        data = bytearray(serialized)
+        data, layout = serialized(writing.reference([point] * number, 0, *self.frames))
+        _, stamp, (_, row, begin, stride) = _points(layout)
         return data, np.frombuffer(data, stamp), np.ndarray(number, row, data, begin, stride)
 
 
