@@ -7,6 +7,7 @@ simulator ends, all do.
 
 import re
 import shutil
+import tempfile
 from pathlib import Path
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
@@ -108,13 +109,23 @@ def described(
     ]
     seen = viewers(time, namespace, config, prefix) if on["rviz"] else []
     recorder = ExecuteProcess(
-        cmd=["ros2", "bag", "record", "--all", "--storage", "mcap"],
+        cmd=["ros2", "bag", "record", "--all", "--storage", "mcap", *qos(namespace)],
         name="recorder",
         output="screen",
         prefix=prefix,
     )
     group = GroupAction([PushRosNamespace(namespace), *climber, *seen])
     return [*[recorder] * on["record"], group]
+
+
+def qos(namespace: str) -> list[str]:
+    """Options of `ros2 bag record` that let more messages wait than it does by itself."""
+    file = SHARE / "config" / "rosbag2_qos.yaml"
+    if namespace:
+        text = re.sub(r"^/(?!clock)", f"/{namespace}/", file.read_text(), flags=re.MULTILINE)
+        file = Path(tempfile.mkdtemp()) / file.name
+        file.write_text(text)
+    return ["--qos-profile-overrides-path", str(file)]
 
 
 def viewers(

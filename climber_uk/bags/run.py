@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from climber_uk.bags.body_rates import body_rates
 from climber_uk.bags.events import Event
 from climber_uk.bags.recorded import TimeSeries
-from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.reference import Reference, tracking_error
 from climber_uk.messages import topics
@@ -41,6 +41,7 @@ class RecordedRun:
     )
     reference: Array  # (n, 3) the pose there should have been; nan where there is no reference
     commands: TimeSeries  # torques right, left [N m] that answer these odometry messages
+    unanswerable: Stamps  # [ns] of torques that answer no odometry of the bag
     wheels: tuple[
         TimeSeries, TimeSeries
     ]  # right, left: rates [rad/s] and torques [N m] at the joints

@@ -147,6 +147,7 @@ class RunReader:
             odometry=odometry,
             reference=reference,
             commands=commands.where(np.isin(commands.stamps, odometry.stamps)),
+            unanswerable=np.setdiff1d(commands.stamps, whole.stamps),
             wheels=(right, left),
             truth_reference=self.reference(found, recorded[topics.TRUTH].stamps),
             recorded=recorded,

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from made_bag import RADIUS, RATE, START, Made, a_run, message
+from made_bag import JOINTS, RADIUS, RATE, START, Made, a_run, message
 
 from climber_uk.bags.events import is_fault
 from climber_uk.bags.recorded_run import read_runs
@@ -194,12 +194,27 @@ def test_what_is_missing_repeated_late_or_unfit_is_counted(tmp_path):
     same(
         got,
         odometry_count=95.0,
-        odometry_lost=5.0,  # 10, 11, 12, and the two that are unfit
+        odometry_unrecorded=3.0,  # 10, 11, 12, which torques answer
+        odometry_lost=2.0,  # those that are unfit
         odometry_unfit=2.0,
         odometry_repeated=2.0,
         odometry_late=1.0,
         odometry_unanswered=3.0,
     )
+
+
+def test_what_a_recorder_lost_is_told_from_what_never_came(tmp_path):
+    """The controller answers what it got; of one with stamps of its own, nothing is known."""
+    there = [i for i in range(100) if i not in (20, 21, 22, 40, 41, 60)]
+    for name, off, unrecorded in (("answers", 0, 3.0), ("own stamps", 1, 0.0)):
+        made = Made(100)
+        made.add_odometry(there)
+        made.add_torques([i for i in range(100) if i not in (40, 41, 60)])
+        for _, kind, _, sent in made.messages:
+            if kind == JOINTS:
+                sent.header.stamp.nanosec += off
+        got = metrics_of(made, tmp_path / name)
+        same(got, odometry_lost=6.0 - unrecorded, odometry_unrecorded=unrecorded)
 
 
 def test_modes_give_stops_and_the_share_that_was_followed(tmp_path):

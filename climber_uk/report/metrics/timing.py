@@ -13,6 +13,10 @@ from climber_uk.report.metrics.metric import (
     percentile,
 )
 
+STAMPED = (
+    0.5  # of the torques have stamps of odometry, at least, where these tell what was answered
+)
+
 
 def periods(case: Case) -> Array:
     """Times between stamps of odometry (n - 1,) [s]."""
@@ -24,11 +28,28 @@ def period(case: Case) -> float:
     return percentile(periods(case), 50)
 
 
-def lost(case: Case) -> float:
+def missing(case: Case) -> float:
     """Number of odometry messages that are missing between the others."""
     usual = period(case)
     gaps = periods(case)[periods(case) > GAP * usual]
     return float(np.sum(np.round(gaps / usual) - 1))
+
+
+def unrecorded(case: Case) -> float:
+    """Number of those that torques answer all the same: a controller has got them."""
+    run = case.run
+    if len(run.unanswerable) > len(run.commands):
+        return 0.0  # torques have stamps of their own
+    (between,) = np.nonzero(
+        (run.odometry.stamps[0] < run.unanswerable) & (run.unanswerable < run.odometry.stamps[-1])
+    )
+    unfit = sum(run.odometry.unfit.values())  # which are in the bag
+    return float(min(max(0, len(between) - unfit), missing(case)))
+
+
+def lost(case: Case) -> float:
+    """Number of those that nobody got."""
+    return missing(case) - unrecorded(case)
 
 
 def unanswered(case: Case) -> float:
@@ -77,8 +98,14 @@ METRICS = (
     Metric(
         "odometry_lost",
         "",
-        "odometry messages missing in gaps of more than 1.5 periods between stamps",
+        "unanswered odometry messages missing in gaps of more than 1.5 periods between stamps",
         lost,
+    ),
+    Metric(
+        "odometry_unrecorded",
+        "",
+        "odometry messages missing there that torques answer: the recorder lost them",
+        unrecorded,
     ),
     Metric(
         "odometry_unanswered",
