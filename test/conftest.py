@@ -5,10 +5,13 @@ any work. Tests of pure numerics do without it, and run where there is no ROS.
 """
 
 import os
+import signal
 from contextlib import suppress
 
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+# under nohup all child processes would ignore it, too, as they should
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 with suppress(ImportError):
     import rclpy  # noqa: F401
