@@ -10,8 +10,6 @@ from contextlib import suppress
 
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-# under nohup all child processes would ignore it, too, as they should
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 with suppress(ImportError):
     import rclpy  # noqa: F401
@@ -27,3 +25,6 @@ settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any machine")
+
+# under nohup all child processes would ignore it, too, as they should
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
