@@ -26,5 +26,10 @@ settings.register_profile(
 )
 settings.load_profile("any machine")
 
-# under nohup all child processes would ignore it, too, as they should
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+# under nohup, and in the background of a script, child processes would ignore these, as they should
+for number, handler in (
+    (signal.SIGHUP, signal.SIG_DFL),
+    (signal.SIGINT, signal.default_int_handler),
+):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, handler)
