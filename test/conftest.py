@@ -5,6 +5,7 @@ any work. Tests of pure numerics do without it, and run where there is no ROS.
 """
 
 import os
+import signal
 from contextlib import suppress
 
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
@@ -24,3 +25,11 @@ settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any machine")
+
+# under nohup, and in the background of a script, child processes would ignore these, as they should
+for number, handler in (
+    (signal.SIGHUP, signal.SIG_DFL),
+    (signal.SIGINT, signal.default_int_handler),
+):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, handler)

@@ -23,8 +23,12 @@ LIMIT = 4.0  # [N m] of the configuration
 ON_PATH = 0.02  # [m]
 WALL_CLOCK = {  # patient: what is slow here is the machine
     PLANT: ["command_timeout:=1.0"],
-    # a torque that is held up acts for too long: the guard is right, and has to forgive it
-    CONTROLLER: ["odometry_timeout:=1.0", "reference_timeout:=1.0", "guard.attempts:=1000"],
+    # a torque that is held up acts for too long: the guard is right, and has to forgive it, and the
+    # climber to come back from wherever it is then
+    CONTROLLER: [
+        *("odometry_timeout:=1.0", "reference_timeout:=1.0"),
+        *("guard.attempts:=1000", "max_start_distance:=1000.0"),
+    ],
     PLANNER: ["rest_to_rest.ramp_time:=1.0"],
 }
 LOCK_STEP = {
