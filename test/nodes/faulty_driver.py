@@ -8,9 +8,11 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading, writing
 from climber_uk.nodes.plant_simulator import PlantSimulator
 from climber_uk.ros.running import BEST_EFFORT, run
@@ -20,7 +22,7 @@ from climber_uk.simulation.command_buffer import CommandBuffer
 class Driver(PlantSimulator):
     """Spoils what comes in and what goes out, or itself."""
 
-    publish = None  # until all is in place: the first odometry, too, has the fault
+    is_ready = False  # until all is in place: the first odometry, too, has the fault
 
     def __init__(self, fault):
         super().__init__()
@@ -29,23 +31,29 @@ class Driver(PlantSimulator):
         self.into, self.out = TORQUES.get(fault), ODOMETRY.get(fault)
         if fault in SELF:
             SELF[fault](self)
-        self.publish, self.topics.odometry.publish = self.topics.odometry.publish, self.spoil
+        self.topics.odometry.publish, self.is_ready = self.spoil, True
 
-    def on_torques(self, message):
+    def on_torques(self, serialized):
         if self.into is not None:
+            message = deserialize_message(serialized, JointState)
             left, right = message.effort
             message.effort = [float(torque) for torque in self.into(self, left, right)]
-        super().on_torques(message)
+            serialized = serialize_message(message)
+        super().on_torques(serialized)
 
     def publish_odometry(self):
-        if self.publish is not None:
+        if self.is_ready:
             super().publish_odometry()
 
-    def spoil(self, message):
+    def spoil(self, stamp, *numbers):
         self.count += 1
+        odometry = self.topics.odometry
+        message = deserialize_message(
+            odometry.serialized(*divmod(stamp, SECOND), *numbers), Odometry
+        )
         said = None if self.out is None else self.out(self, message)
         for one in [message] if said is None else said:
-            self.publish(one)
+            odometry.publisher.publish(one)
 
 
 def heading(message):
@@ -166,8 +174,8 @@ def no_watchdog(driver):
 
 
 def wrong_type(driver):
-    driver.destroy_publisher(driver.topics.odometry)
-    driver.topics.odometry = driver.create_publisher(PoseStamped, "odom", 10)
+    driver.destroy_publisher(driver.topics.odometry.publisher)
+    driver.topics.odometry.publisher = driver.create_publisher(PoseStamped, "odom", 10)
     driver.out = lambda driver, message: [PoseStamped()]
 
 
@@ -176,8 +184,8 @@ def two_publishers(driver):
 
 
 def best_effort(driver):
-    driver.destroy_publisher(driver.topics.odometry)
-    driver.topics.odometry = driver.create_publisher(Odometry, "odom", BEST_EFFORT)
+    driver.destroy_publisher(driver.topics.odometry.publisher)
+    driver.topics.odometry.publisher = driver.create_publisher(Odometry, "odom", BEST_EFFORT)
 
 
 def listens_to(kind, **qos):
