@@ -6,9 +6,9 @@ import numpy as np
 
 from climber_uk.closed_loop.simulate import Controlling, Link, Run, simulate
 from climber_uk.control.control_law import ControlLaw
-from climber_uk.control.controller import Answer, Controller
+from climber_uk.control.controller import Answer, Controller, Settings
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.sampled_controller import SampledController, Timing
+from climber_uk.control.timing import Timing
 from climber_uk.identification.estimation import CUT, identify
 from climber_uk.identification.identified import NAMES, Choice, Identified
 from climber_uk.identification.integral_equations import Cut
@@ -52,7 +52,7 @@ class Scenario:
         """Run of a controller that believes in a climber, and what it was told."""
         law = ControlLaw(believed, self.guidance)
         timing = Timing(control_period=self.period)
-        ear = Ear(Controller(SampledController(law, timing=timing)))
+        ear = Ear(Controller(Settings(law, timing=timing)))
         link = replace(link, step=self.period / 2, period=self.period)
         loop = self.trajectory, self.start, self.duration, ear, true, link
         return simulate(*loop, seed=seed, plant_of=self.plant), ear

@@ -28,12 +28,12 @@ from scipy.linalg import expm
 from climber_uk.closed_loop.simulate import Link
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.control_law import ControlLaw
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
+from climber_uk.control.timing import Timing
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
@@ -119,8 +119,8 @@ def stands(channel: Channel, observer: Observer, period: float, delay: float, la
 def simulated(scenario: Scenario, observer: Observer, learns: bool, link: Link) -> bool:
     """Whether the loop of the nodes stands."""
     law = ControlLaw(scenario.climber, scenario.gains)
-    sampled_controller = SampledController(law, observer, Timing(learn_delay=learns))
-    controller = Controller(sampled_controller, Safety(), ANYWHERE, UNGUARDED)
+    settings = Settings(law, observer, Timing(learn_delay=learns))
+    controller = Controller(settings, Safety(), ANYWHERE, UNGUARDED)
     run = run_of(scenario.trajectory, scenario.start, 15.0, controller, scenario.climber, link)
     return run.rms(7.5) < OFF and run.chatter() < CHATTER
 

@@ -131,9 +131,7 @@ def driven(seed: int, delay_of: Callable[[Robot], float], guard: GuardOptions) -
     )
     late = DURATION / 2
     stopped = bool(controller.guard.faults)
-    return Result(
-        run.rms(late), run.chatter(late), controller.sampled_controller.latency.delay, stopped
-    )
+    return Result(run.rms(late), run.chatter(late), controller.estimator.latency.delay, stopped)
 
 
 def untold(_: Robot) -> float:

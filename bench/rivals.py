@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.closed_loop.simulate import Link
-from climber_uk.control.constraint_set import ConstraintSet, demanded
+from climber_uk.control.constraint_set import demanded
 from climber_uk.control.control_law import Command
-from climber_uk.control.controller import Answer
+from climber_uk.control.controller import Answer, Controller
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.sampled_controller import SampledController
+from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import arctan, cos, sin
@@ -81,7 +81,7 @@ class AdaptiveGains:
     layer: float  # ε
 
 
-class AdaptiveRobust(SampledController):
+class AdaptiveRobust(Controller):
     """Adaptive robust UK control with leakage in the observer's place.
 
     As Udwadia, Wanichanon & Cho (2014) and Zhen, Chen et al. do: the nominal UK force, and against
@@ -94,19 +94,17 @@ class AdaptiveRobust(SampledController):
     drive_gains = AdaptiveGains(23_200.0, 4.06, 4.57)
     turn_gains = AdaptiveGains(732.0, 3.55, 0.558)
 
-    def forget(self) -> None:
-        """Forget what was learnt."""
-        super().forget()
-        self.bounds = np.zeros(2)
+    bounds: Array = np.zeros(2)
 
-    def answer(
-        self, preview: Preview, age: float, constraints: ConstraintSet | None = None
-    ) -> Command | None:
+    def _follow(self, age: float) -> tuple[Mode, str, Command | None]:
         """Torques for the last odometry, by its own constraints."""
-        reference = preview.at(self.progress.at(self.stamp))
-        if reference is not None and self.motion is not None:
-            state = State.moving(self.motion)
-            errors = constraint_errors(self.law.constraints, state, reference)
+        estimator, active = self.estimator, self.active
+        if not any(estimator.disturbance):
+            self.bounds = np.zeros(2)  # it starts anew
+        preview, motion = active.preview, estimator.motion
+        reference = preview.at(active.progress.at(estimator.stamp)) if preview else None
+        if reference is not None and motion is not None:
+            errors = constraint_errors(self.law.constraints, State.moving(motion), reference)
             forces = []
             for i, gains in enumerate((self.drive_gains, self.turn_gains)):
                 beta, bound = errors[i], self.bounds[i]
@@ -114,9 +112,9 @@ class AdaptiveRobust(SampledController):
                 gamma = 1 / max(abs(mu), gains.layer)
                 forces.append(-gamma * mu * bound)
                 growth = gains.growth * abs(beta) - gains.leakage * bound
-                self.bounds[i] = max(bound + self.period * growth, 0.0)
-            self.disturbance = Wrench(*(-force for force in forces))
-        return super().answer(preview, age)
+                self.bounds[i] = max(bound + estimator.period * growth, 0.0)
+            estimator.disturbance = Wrench(*(-force for force in forces))
+        return super()._follow(age)
 
 
 def constraint_errors(gains: Guidance, state: State, reference: Reference) -> tuple[float, float]:

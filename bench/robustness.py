@@ -18,14 +18,13 @@ from climber_uk.closed_loop.simulate import Controlling, Link, Run, as_commanded
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.control_law import ControlLaw, ControlOptions
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.exact import Exact
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.timing import Timing
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse
@@ -54,14 +53,12 @@ def ours(
     gains: ConstraintSet = GUIDANCE,
     delay: float = 0.0,
     observer: Observer = OBSERVER,
-    sampled_controller: type[SampledController] = SampledController,
+    controller: type[Controller] = Controller,
 ) -> Controller:
     """The controller as the node runs it."""
     law = ControlLaw(climber, gains, ControlOptions())
     timing = Timing(transport_delay=delay)
-    return Controller(
-        sampled_controller(law, observer, timing, Pacing()), Safety(), ANYWHERE, UNGUARDED
-    )
+    return controller(Settings(law, observer, timing), Safety(), ANYWHERE, UNGUARDED)
 
 
 def without_observer(
@@ -208,9 +205,8 @@ def too_weak(make: Make) -> tuple[float, float, float]:
 def know_limit(controlling: Controlling, climber: Climber) -> None:
     """Tell a controller of a new torque limit."""
     if isinstance(controlling, Controller):
-        sampled_controller = controlling.sampled_controller
-        if sampled_controller.law.climber is not climber:
-            sampled_controller.law = replace(sampled_controller.law, climber=climber)
+        if controlling.law.climber is not climber:
+            controlling.law = replace(controlling.law, climber=climber)
     else:
         controlling.climber = climber
 

@@ -1,8 +1,8 @@
 """`python bench/tick.py`: what a controller's tick costs, beside other ways to compute the same.
 
-A tick is what `SampledController` does from an odometry to its torques: prediction, constraints,
-UK, observer and saturation, without messages. All ways are measured in turns in one process; the
-least time of many counts.
+A tick is from an odometry to its torques: prediction, constraints, UK, observer and saturation,
+without messages, and without what a `Controller` checks besides. All ways are measured in turns in
+one process; the least time of many counts.
 """
 
 import argparse
@@ -16,10 +16,18 @@ from limit import Limit, controller_numbers
 from scipy.linalg import sqrtm
 
 from climber_uk.closed_loop.simulate import sampled
+from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraint_set import rows
 from climber_uk.control.constraints import CONSTRAINTS
-from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
-from climber_uk.control.sampled_controller import SampledController
+from climber_uk.control.control_law import (
+    Command,
+    ControlInput,
+    ControlLaw,
+    ControlOptions,
+    check_finite,
+)
+from climber_uk.control.controller import Controller, Settings
+from climber_uk.control.model import Observer
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview
@@ -78,74 +86,82 @@ class Known:
 
     def __init__(self, preview: Preview, times: Iterable[int]) -> None:
         self.targets = {time: preview.target(time) for time in times}
+        self.times = preview.times
 
     def target(self, time: int) -> ReferencePoint | None:
         """See `Preview`."""
         return self.targets[time]
 
 
-def ticks(sampled_controller: SampledController, known: bool = False) -> Callable[[], None]:
-    """Ticks of a `SampledController` along the paper's ellipse, with targets that are known or not.
+def tick(controller: Controller, stamp: int, motion: Motion) -> Command:
+    """What a `Controller` that follows does, all is well: see its docstring."""
+    estimator, active = controller.estimator, controller.active
+    estimator.see(stamp, motion)
+    ahead = estimator.ahead(0.0)
+    aim = controller.law.aim(ahead)
+    target = active.target(ahead.motion, ahead.begins, aim)
+    assert target.point is not None
+    command = controller.law.command(ahead, target.point)
+    check_finite(command.wheels)
+    active.go_on(target)
+    estimator.sent(ahead.begins, command.wheels, command.fits)
+    return command
+
+
+def on_the_paper(law: ControlLaw, preview: Any) -> Controller:
+    """A controller that knows its reference."""
+    controller = Controller(Settings(law), approach=ANYWHERE)
+    controller.active.preview = preview
+    return controller
+
+
+def ticks(law: ControlLaw, known: bool = False) -> Callable[[], None]:
+    """Ticks along the paper's ellipse, with targets that are known or not.
 
     A tick aims at the middle of the period that follows it.
     """
     preview: Any = sampled(PAPER, 60.0)
     if known:
         aims = (SECOND + round((number + 0.5) * PERIOD * SECOND) for number in range(10_000))
-        preview = Known(preview, aims)
+        preview = Known(preview, [SECOND, *aims])
     stamps = (SECOND + round(number * PERIOD * SECOND) for number in range(10_000))
     all_of_them = list(zip(stamps, motions_on_the_way(10_000), strict=True))
-    number = 0
+    controller, number = on_the_paper(law, preview), 0
 
     def some() -> None:
-        nonlocal number
+        nonlocal controller, number
         if number + TICKS > len(all_of_them):
-            sampled_controller.reset()
-            number = 0
+            controller, number = on_the_paper(law, preview), 0
         for stamp, motion in all_of_them[number : number + TICKS]:
-            sampled_controller.see(stamp, motion)
-            sampled_controller.answer(preview, 0.0)
+            tick(controller, stamp, motion)
         number += TICKS
 
     return some
 
 
-def ticks_in_c(
-    limit: Limit, sampled_controller: SampledController
-) -> tuple[Callable[[], None], Array]:
+def ticks_in_c(limit: Limit, law: ControlLaw) -> tuple[Callable[[], None], Array]:
     """Ticks of the same law in C, of targets that are known; and their torques (n, 2)."""
-    controllers = controller_numbers(sampled_controller.law, sampled_controller.observer, 1)
+    controllers = controller_numbers(law, Observer(), 1)
     numbers, preview = np.array(motions_on_the_way(TICKS)), sampled(PAPER, 1.0)
     times = (SECOND + round((number + 0.5) * PERIOD * SECOND) for number in range(TICKS))
     aims = np.array([preview.target(time) for time in times])
     memory, torques = np.zeros((1, 12)), np.zeros((TICKS, 2))
     memory[0, :7] = numbers[0]
     arrays = (("ControlLaw", controllers), ("Memory", memory), ("Motion", numbers))
-    law, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
+    numbers_of_law, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
     targets, told = limit.pointer("ReferencePoint", aims), limit.pointer("double", torques)
 
     def some() -> None:
-        tick = limit.functions.tick  # which lives as long as the library does
+        in_c = limit.functions.tick  # which lives as long as the library does
         for i in range(TICKS):
-            tick(law, past, motions + i, targets + i, PERIOD, told + 2 * i)
+            in_c(numbers_of_law, past, motions + i, targets + i, PERIOD, told + 2 * i)
 
     return some, torques
 
 
-def with_known_targets(
-    sampled_controller: SampledController, in_c: Callable[[], None]
-) -> dict[str, Callable[[], None]]:
+def with_known_targets(law: ControlLaw, in_c: Callable[[], None]) -> dict[str, Callable[[], None]]:
     """The same work as the C does, which is given the targets."""
-    another = SampledController(
-        sampled_controller.law,
-        sampled_controller.observer,
-        sampled_controller.timing,
-        sampled_controller.pacing,
-    )
-    return {
-        f"{OURS}, targets known": ticks(another, known=True),
-        "C through cffi, targets known": in_c,
-    }
+    return {f"{OURS}, targets known": ticks(law, known=True), "C through cffi, targets known": in_c}
 
 
 def bare(law: ControlLaw) -> Callable[[], None]:
@@ -184,16 +200,14 @@ def ways(constraints: str, options: ControlOptions) -> dict[str, ControlLaw]:
     }
 
 
-def check(sampled_controller: SampledController, run: Callable[[], None], torques: Array) -> None:
-    """Raise `RuntimeError` unless the C gives what the `SampledController` answers."""
+def check(law: ControlLaw, run: Callable[[], None], torques: Array) -> None:
+    """Raise `RuntimeError` unless the C gives what the controller answers."""
     run()
-    preview = sampled(PAPER, 1.0)
+    controller = on_the_paper(law, sampled(PAPER, 1.0))
     for number, motion in enumerate(motions_on_the_way(TICKS)):
-        sampled_controller.see(SECOND + round(number * PERIOD * SECOND), motion)
-        command = sampled_controller.answer(preview, 0.0)
-        if command is None or np.abs(command.torques - torques[number]).max() > 1e-9:
+        command = tick(controller, SECOND + round(number * PERIOD * SECOND), motion)
+        if np.abs(command.torques - torques[number]).max() > 1e-9:
             raise RuntimeError(f"tick {number}: {command} is not {torques[number]}")
-    sampled_controller.reset()
 
 
 def table(title: str, times: dict[str, float]) -> None:
@@ -212,13 +226,10 @@ def main() -> None:
     options = parser.parse_args()
     limit = None if options.no_c else Limit()
     for constraints in CONSTRAINTS:
-        trackers = {
-            name: SampledController(law)
-            for name, law in ways(constraints, ControlOptions()).items()
-        }
-        whole = {name: ticks(sampled_controller) for name, sampled_controller in trackers.items()}
+        laws = ways(constraints, ControlOptions())
+        whole = {name: ticks(law) for name, law in laws.items()}
         if limit is not None and constraints == "guidance":
-            ours = next(iter(trackers.values()))
+            ours = laws[OURS]
             run, torques = ticks_in_c(limit, ours)
             check(ours, run, torques)
             whole |= with_known_targets(ours, run)

@@ -15,7 +15,6 @@ from tick import PERIOD, TICKS, WARM, WithMatrices, bare, ticks, ways, with_know
 
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
-from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State, Torques, Wrench
@@ -63,10 +62,10 @@ def check(controllers: Mapping[str, ControlLaw]) -> float:
     return largest
 
 
-def in_c(limit: Limit, sampled_controller: SampledController) -> Callable[[], None]:
-    """Ticks of the law in C, those of `sampled_controller`, for as long as there is `limit`."""
-    run, torques = tick.ticks_in_c(limit, sampled_controller)
-    tick.check(sampled_controller, run, torques)
+def in_c(limit: Limit, law: ControlLaw) -> Callable[[], None]:
+    """Ticks of the law in C, for as long as there is `limit`."""
+    run, torques = tick.ticks_in_c(limit, law)
+    tick.check(law, run, torques)
     return run
 
 
@@ -86,15 +85,10 @@ def compare(rounds: int) -> None:
             for name, law in laws(constraints, ControlOptions(predict=False)).items()
         }
         table(f"one torque, {constraints}", in_turns(alone, rounds, WARM), "µs", per_tick)
-        trackers = {
-            name: SampledController(law)
-            for name, law in laws(constraints, ControlOptions()).items()
-        }
-        whole = {
-            name: timed(ticks(sampled_controller)) for name, sampled_controller in trackers.items()
-        }
+        controllers = laws(constraints, ControlOptions())
+        whole = {name: timed(ticks(law)) for name, law in controllers.items()}
         if constraints == "guidance":
-            ours = next(iter(trackers.values()))
+            ours = next(iter(controllers.values()))
             same = with_known_targets(ours, in_c(limit, ours))
             whole |= {name: timed(run) for name, run in same.items()}
         table(f"a controller's tick, {constraints}", in_turns(whole, rounds, WARM), "µs", per_tick)

@@ -3,7 +3,7 @@
 One: a trajectory -> `simulate.simulate` (the nodes' `Controller` and `SimulatedRobot`, and a `Link`
 of delay, jitter, loss and noise between them) -> `simulate.Run`.
 
-Many: arrays (N,) in the place of numbers -> `batch.Loops` (the nodes' `SampledController`, with
+Many: arrays (N,) in the place of numbers -> `batch.Loops` (the nodes' `Estimator`, with
 `pressure_gauge` and `simulation.sensors`) -> steps of the plants (`unicycle`, or `compiled`, which
 is the same by numba) -> `outcome.Tally` -> `outcome.Outcome`.
 """

@@ -1,4 +1,4 @@
-"""Thousands of closed loops at once: the node's `SampledController` with unicycle climbers.
+"""Thousands of closed loops at once: the node's estimator and law with unicycle climbers.
 
 Whatever is a number in a `Climber`, in gains, in sensors or in a start may be an array (N,) of one
 for each loop. Loops run in blocks that fit the cache, and their outcome is summed up on the way:
@@ -19,9 +19,9 @@ from climber_uk.closed_loop.outcome import Outcome, Tally
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
 from climber_uk.control.control_law import ControlLaw
+from climber_uk.control.estimator import Estimator
 from climber_uk.control.model import Observer
-from climber_uk.control.sampled_controller import SampledController, Timing
-from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.timing import Timing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Wheeled
@@ -100,9 +100,7 @@ class Loops:
         self, course: BatchRun, preview: Preview, on_period: Callable[[], object] = lambda: None
     ) -> Outcome:
         """The same, all loops at once; `on_period` is called in every period."""
-        sampled_controller = SampledController(
-            self.law, self.observer, self.timing, Pacing(catch_up=0.0)
-        )
+        estimator = Estimator(self.law.climber, self.observer, self.timing)
         tally = Tally(len(self.start.x), self.contact)
         motion, step = self.start, course.period / course.steps
         advance = _advance_function(course.compiled)
@@ -117,10 +115,13 @@ class Loops:
         )
         for tick, (noise, climber, law, target) in enumerate(zip(*by_tick, strict=True)):
             measured = motion if noise is None else self.sensors.corrupted(motion, noise)
-            sampled_controller.law = law
-            sampled_controller.see(SECOND + round(tick * course.period * SECOND), measured)
-            command = sampled_controller.answer(preview, 0.0)
-            assert command is not None  # the preview goes beyond the duration
+            estimator.climber = law.climber
+            estimator.see(SECOND + round(tick * course.period * SECOND), measured)
+            ahead = estimator.ahead(0.0)
+            aimed_at = preview.target(law.aim(ahead))
+            assert aimed_at is not None  # the preview goes beyond the duration
+            command = law.command(ahead, aimed_at)
+            estimator.sent(ahead.begins, command.wheels, command.fits)
             if not on_their_way:
                 before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
                 on_their_way.extend([before] * course.delay)

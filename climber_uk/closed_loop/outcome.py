@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from climber_uk.control.control_law import Command
-from climber_uk.control.sampled_controller import CUT
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import MAX_MARGIN
 from climber_uk.mechanics.climber import Climber
@@ -61,8 +60,7 @@ class Tally:
         np.maximum(self.worst, square, out=self.worst, where=on)
         np.copyto(self.last, square, where=on)
         np.copyto(self.settled_at, time, where=(square > SETTLED * SETTLED) & on)
-        is_saturated = (np.abs(command.lost.force) > CUT) | (np.abs(command.lost.moment) > CUT)
-        np.add(self.saturated, is_saturated, out=self.saturated, where=on)
+        np.add(self.saturated, np.logical_not(command.fits), out=self.saturated, where=on)
         for torque in wheels:
             np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
         lateral = climber.lateral_reaction(motion)

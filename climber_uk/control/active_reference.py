@@ -3,15 +3,12 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from climber_uk.control.approach import Approach
-from climber_uk.control.control_law import Command
+from climber_uk.control.approach import Approach, nearest, speed_along
+from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.guard import STANDS, Expected, Rates
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode
-from climber_uk.control.sampled_controller import SampledController
-from climber_uk.control.time_scaling import Progress, restarted
+from climber_uk.control.time_scaling import IN_TIME, Pace, Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
@@ -22,28 +19,71 @@ AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastes
 KEPT = 2 * SECOND  # [ns] of a reference that is kept behind the climber
 MOST_POINTS = 5000  # of a reference that are kept: who plans it may not wait
 LONGEST_SKIP = SECOND  # [ns] of a reference that a climber, which went on unanswered, may be ahead
-SKIP_STEPS = 20  # in which it is looked for there
 SLOW = 0.01  # [m/s] of a reference that is at rest
 AS_FAST = 0.9  # of the reference's speed, from which a climber goes on in time
 STRAYED = 1.5  # times `max_distance`, beyond which a climber that follows is off its path
+LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
+LONGEST_GAP = 0.3  # [s] between two answers over which the reference goes on
+IN_TIME_AGAIN = 1e-3  # [1] of σ that is missing at the end of a restart
 
 
-class Followed(NamedTuple):
-    """What came of following."""
+class Progress(NamedTuple):
+    """How far along the reference a climber has come."""
+
+    time: int | None = None  # [ns] of the last answer
+    waited: int = 0  # [ns]
+    pace: Pace = IN_TIME
+    is_restarting: bool = False  # σ is on its way up to 1, and what is lost by it is waited
+
+    def at(self, time: int) -> int:
+        """Time of the reference [ns] at `time` [ns], near that of the last answer."""
+        return time - self.waited - round(self.pace.lag * SECOND)
+
+    def target(self, preview: Preview, time: int) -> ReferencePoint | None:
+        """Target for `time` [ns]; None outside of the preview."""
+        if self.pace == IN_TIME:
+            return preview.target(time - self.waited)
+        return self.pace.target(preview, time - self.waited)
+
+    def advanced(self, time: int, pacing: Pacing) -> "Progress":
+        """Progress at `time` [ns]; the reference stands still where the clock has jumped."""
+        if self.time is None:
+            return self._replace(time=time)
+        passed = time - self.time
+        if not 0 <= passed <= LONGEST_GAP * SECOND:
+            return self._replace(time=time, waited=self.waited + passed)
+        if self.pace == IN_TIME:
+            return Progress(time, self.waited, self.pace, self.is_restarting)
+        pace, waited = self.pace.after(passed / SECOND, pacing), self.waited
+        is_restarting = self.is_restarting and pace.rate < 1 - IN_TIME_AGAIN
+        excess = pace.lag if self.is_restarting else pace.lag - LONGEST_LAG
+        if excess > 0:
+            waited += round(excess * SECOND)
+            pace = pace._replace(lag=pace.lag - excess)
+        if self.is_restarting and not is_restarting:
+            pace = IN_TIME
+        return Progress(time, waited, pace, is_restarting)
+
+
+class Target(NamedTuple):
+    """Where a climber should be when its torques act, or why it is not to follow."""
 
     mode: Mode
     detail: str = ""
-    command: Command | None = None
+    point: ReferencePoint | None = None
+    is_gentle: bool = False  # to be followed by constraints that can begin at rest
+    progress: Progress = Progress()
 
 
 class ActiveReference:
     """Knows where on its reference the climber is, and takes it there if it is elsewhere."""
 
-    def __init__(self, sampled_controller: SampledController, options: Approach) -> None:
-        self.sampled_controller, self.options = sampled_controller, options
-        self.approach_constraints = Guidance()  # that can begin at rest
+    def __init__(self, pacing: Pacing, options: Approach, gentle: Guidance) -> None:
+        self.pacing, self.options = pacing, options
+        self.gentle = gentle  # constraints that can begin at rest, in the place of the law's
         self.preview: Preview | None = None  # of the reference
         self.way: Preview | None = None  # to where it waits
+        self.progress = Progress()  # along what is followed
         self._position: int | None = None  # [ns] time of the reference; None: not begun
         self._is_paused = True
         # what is followed, number of `AROUND`, and the fastest motion around it
@@ -56,52 +96,20 @@ class ActiveReference:
         return self.way or self.preview
 
     @property
-    def target(self) -> ReferencePoint | None:
-        """Where the climber should be at the last odometry; None if nothing is followed."""
-        followed = self.followed
-        if followed is None or self._is_paused:
-            return None
-        return followed.target(self.time_followed(self.sampled_controller.stamp))
-
-    def expected(self, target: ReferencePoint) -> Expected:
-        """What is expected of a climber that should be at `target`."""
-        sampled_controller, followed = self.sampled_controller, self.followed
-        assert followed is not None
-        number = self.time_followed(sampled_controller.stamp) // AROUND
-        if self._around is None or self._around[0] is not followed or self._around[1] != number:
-            fastest = followed.fastest((number - 1) * AROUND, (number + 2) * AROUND)
-            self._around = followed, number, fastest
-        pace = sampled_controller.progress.pace
-        hurry = 1 + (sampled_controller.pacing.catch_up if pace.lag > 0 else 0.0)
-        constraints = (
-            self.approach_constraints if self._is_gentle else sampled_controller.law.constraints
-        )
-        return Expected(
-            wanted=Rates(math.hypot(target.v_x, target.v_y), abs(target.yaw_rate)),
-            allowed=Rates(*constraints.fastest(*(hurry * rate for rate in self._around[2]))),
-            waits=pace.rate < STANDS,
-        )
-
-    @property
-    def _is_gentle(self) -> bool:
+    def is_gentle(self) -> bool:
         """Whether what is followed begins at rest."""
-        return self.way is not None or self.sampled_controller.progress.is_restarting
+        return self.way is not None or self.progress.is_restarting
 
     def position(self, stamp: int) -> int | None:
         """Time of the reference [ns] at `stamp` [ns]; None if none was followed or waits."""
         if self.way is None and not self._is_paused:
-            return self.sampled_controller.progress.at(stamp)
+            return self.progress.at(stamp)
         return self._position
 
     @property
     def waited(self) -> float:
         """How much later than planned the reference is [s]."""
-        progress = self.sampled_controller.progress
-        return progress.waited / SECOND + float(progress.pace.lag)
-
-    def time_followed(self, stamp: int) -> int:
-        """Time of what is followed [ns] at `stamp` [ns]."""
-        return self.sampled_controller.progress.at(stamp)
+        return self.progress.waited / SECOND + float(self.progress.pace.lag)
 
     def begins_after(self, stamp: int) -> bool:
         """Whether the reference begins later."""
@@ -121,18 +129,34 @@ class ActiveReference:
         if self._position is None and self.preview is not None and not self.begins_after(stamp):
             self._position = self._first_position(stamp)
 
-    def follow(self, age: float) -> Followed:
-        """Torques for the last odometry that the `SampledController` saw, of `age` [s]."""
-        if self.preview is None:
-            return Followed(Mode.WAITING)
-        try:
-            if self._is_paused:
-                refused = self._begin(self.sampled_controller.begin(age))
-                if refused is not None:
-                    return refused
-            return self._go_on(self.preview, age)
-        except (ValueError, ArithmeticError) as error:
-            return Followed(Mode.NO_SOLUTION, str(error))
+    # What is expected of a climber that follows
+
+    def at(self, stamp: int) -> ReferencePoint | None:
+        """Where the climber should be at `stamp` [ns]; None if nothing is followed."""
+        followed = self.followed
+        if followed is None or self._is_paused:
+            return None
+        return followed.target(self.progress.at(stamp))
+
+    def expected(self, stamp: int, target: ReferencePoint, constraints: ConstraintSet) -> Expected:
+        """What is expected of a climber that should be at `target` at `stamp` [ns].
+
+        `constraints` are those of the law.
+        """
+        followed, pace = self.followed, self.progress.pace
+        assert followed is not None
+        number = self.progress.at(stamp) // AROUND
+        if self._around is None or self._around[0] is not followed or self._around[1] != number:
+            fastest = followed.fastest((number - 1) * AROUND, (number + 2) * AROUND)
+            self._around = followed, number, fastest
+        hurry = 1 + (self.pacing.catch_up if pace.lag > 0 else 0.0)
+        speed, yaw_rate = self._around[2]
+        constraints = self.gentle if self.is_gentle else constraints
+        return Expected(
+            wanted=Rates(math.hypot(target.v_x, target.v_y), abs(target.yaw_rate)),
+            allowed=Rates(*constraints.fastest(hurry * speed, hurry * yaw_rate)),
+            waits=pace.rate < STANDS,
+        )
 
     def strayed(self, motion: Motion, target: ReferencePoint) -> tuple[Mode, str] | None:
         """Whether a climber is too far from where it should be."""
@@ -141,23 +165,45 @@ class ActiveReference:
             return None
         return Mode.OFF_PATH, f"{distance:.2f} m from it"
 
-    def _go_on(self, preview: Preview, age: float) -> Followed:
-        sampled_controller = self.sampled_controller
-        constraints = self.approach_constraints if self._is_gentle else None
-        if self.way is not None:
-            command = sampled_controller.answer(self.way, age, constraints)
-            if command is not None:
-                return Followed(Mode.APPROACHING, f"{self._began_at:.2f} m away", command)
-            self.way, self._is_paused = None, True  # it has arrived
-            refused = self._begin(sampled_controller.begin(age))
+    # Where it is to be next
+
+    def target(self, motion: Motion, begins: int, aim: int) -> Target:
+        """Target for `aim` [ns], of a climber whose torques act from `begins` [ns] on.
+
+        It will be in `motion` by then.
+        """
+        if self.preview is None:
+            return Target(Mode.WAITING)
+        if self._is_paused:
+            refused = self._begin(self.preview, motion, begins)
             if refused is not None:
                 return refused
-            return self._go_on(preview, age)
-        command = sampled_controller.answer(preview, age, constraints)
-        if command is None:
-            return Followed(Mode.WAITING)
-        self._position = sampled_controller.progress.position
-        return Followed(Mode.FOLLOWING, "", command)
+        progress = self.progress.advanced(begins, self.pacing)
+        if self.way is not None:
+            point = progress.target(self.way, aim)
+            if point is None:  # it has arrived
+                self.way, self._is_paused = None, True
+                return self.target(motion, begins, aim)
+            mode, detail = Mode.APPROACHING, f"{self._began_at:.2f} m away"
+            return Target(mode, detail, point, True, progress)
+        point = progress.target(self.preview, aim)
+        if point is None:
+            return Target(Mode.WAITING)
+        return Target(Mode.FOLLOWING, "", point, self.is_gentle, progress)
+
+    def slowed(self, target: Target, missing: float, aim: int, period: float) -> Target:
+        """Target that asks `missing` [m/s²] less along the climber; see `Pace.slowed`."""
+        preview, progress = self.followed, target.progress
+        assert preview is not None
+        pace = progress.pace.slowed(missing, preview, aim - progress.waited, period)
+        progress = progress._replace(pace=pace)
+        return target._replace(point=progress.target(preview, aim), progress=progress)
+
+    def go_on(self, target: Target) -> None:
+        """Go on to where it is followed now."""
+        self.progress = target.progress
+        if self.way is None and target.progress.time is not None:
+            self._position = target.progress.at(target.progress.time)
 
     # Beginning, and going on after a pause
 
@@ -167,29 +213,29 @@ class ActiveReference:
         first, last = int(self.preview.times[0]), int(self.preview.times[-1])
         return time if first <= time <= last else first
 
-    def _begin(self, time: int) -> Followed | None:
+    def _begin(self, preview: Preview, motion: Motion, time: int) -> Target | None:
         """Follow from `time` [ns] on: the reference, or a way to it; else say why not."""
-        sampled_controller, preview, options = self.sampled_controller, self.preview, self.options
-        assert preview is not None
-        motion = sampled_controller.expected_at(time)
+        options = self.options
         position = self._where(preview, motion, time)
-        target = preview.target(position)
-        if target is None:
-            return Followed(Mode.WAITING)
-        distance = math.hypot(motion.x - target.x, motion.y - target.y)
+        point = preview.target(position)
+        if point is None:
+            return Target(Mode.WAITING)
+        distance = math.hypot(motion.x - point.x, motion.y - point.y)
         if distance > options.max_start_distance:
-            return Followed(
+            return Target(
                 Mode.TOO_FAR,
-                f"{distance:.2f} m, from ({motion.x:.2f}, {motion.y:.2f}) to ({target.x:.2f}, "
-                f"{target.y:.2f}); max_start_distance is {options.max_start_distance} m",
+                f"{distance:.2f} m, from ({motion.x:.2f}, {motion.y:.2f}) to ({point.x:.2f}, "
+                f"{point.y:.2f}); max_start_distance is {options.max_start_distance} m",
             )
         self._is_paused, self._began_at, self._position = False, distance, position
-        turned = abs(wrapped(motion.heading - target.heading))
+        turned = abs(wrapped(motion.heading - point.heading))
         if distance > options.max_distance or turned > options.max_heading:
-            self.way = options.way(motion, target, time)
-            sampled_controller.progress = Progress()
+            self.way = options.way(motion, point, time)
+            self.progress = Progress()
         else:
-            sampled_controller.progress = restarted(time, position, _rate(motion, target))
+            rate = _rate(motion, point)
+            pace = IN_TIME if rate > 1 - IN_TIME_AGAIN else Pace(rate=rate)
+            self.progress = Progress(time, time - position, pace, pace != IN_TIME)
         return None
 
     def _where(self, preview: Preview, motion: Motion, time: int) -> int:
@@ -197,35 +243,14 @@ class ActiveReference:
         if self._position is None:
             return self._first_position(time)
         first, last = int(preview.times[0]), int(preview.times[-1])
-        position = max(self._position, first)
-        answered = self.sampled_controller.progress.time
+        position, answered = max(self._position, first), self.progress.time
         skip = 0 if answered is None else min(time - answered, LONGEST_SKIP, last - position)
-        if skip <= 0:
-            return position
-        times = position + np.linspace(0, skip, SKIP_STEPS + 1).astype(np.int64)
-        targets = [preview.target(int(at)) for at in times]
-        offsets = [
-            math.hypot(motion.x - target.x, motion.y - target.y)
-            for target in targets
-            if target is not None
-        ]
-        nearest = int(times[int(np.argmin(offsets))])
-        target = preview.target(nearest)
-        if target is None or abs(speed := _speed(target)) < SLOW:
-            return nearest
-        ahead = (motion.x - target.x) * target.v_x + (motion.y - target.y) * target.v_y
-        ahead = min(max(ahead / (speed * speed), -skip / SKIP_STEPS / SECOND), skip / SECOND)
-        return min(max(nearest + round(ahead * SECOND), position), position + skip)
-
-
-def _speed(target: ReferencePoint) -> float:
-    """Speed of a target along its heading [m/s]."""
-    return float(target.v_x * math.cos(target.heading) + target.v_y * math.sin(target.heading))
+        return position if skip <= 0 else nearest(preview, motion, position, skip)
 
 
 def _rate(motion: Motion, target: ReferencePoint) -> float:
     """Rate σ of a reference that is as fast as the climber is, 1 if that is nearly so."""
-    speed = _speed(target)
+    speed = speed_along(target)
     if abs(speed) < SLOW:
         return 1.0
     rate = float(min(max(motion.speed / speed, 0.0), 1.0))

@@ -18,6 +18,8 @@ PEAK = 15 / 8  # of p'
 SHORTEST = 0.4  # [s] that a move takes
 POINT_PERIOD = 0.05  # [s]
 HERE = 1e-3  # [m] that need not be driven
+SKIP_STEPS = 20  # in which it is looked for where the climber is ahead
+SLOW = 0.01  # [m/s] of a reference that is at rest
 
 
 @parameters
@@ -83,6 +85,29 @@ class Approach:
 
 ANYWHERE = Approach(max_start_distance=1e6, max_distance=1e6, max_heading=10.0)
 """Follows at once, from wherever the climber is: the law by itself."""
+
+
+def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
+    """Time of a reference [ns], from `begin` to `skip` after it [ns], when it is nearest."""
+    times = begin + np.linspace(0, skip, SKIP_STEPS + 1).astype(np.int64)
+    targets = [preview.target(int(at)) for at in times]
+    offsets = [
+        math.hypot(motion.x - target.x, motion.y - target.y)
+        for target in targets
+        if target is not None
+    ]
+    found = int(times[int(np.argmin(offsets))])
+    target = preview.target(found)
+    if target is None or abs(speed := speed_along(target)) < SLOW:
+        return found
+    ahead = (motion.x - target.x) * target.v_x + (motion.y - target.y) * target.v_y
+    ahead = min(max(ahead / (speed * speed), -skip / SKIP_STEPS / SECOND), skip / SECOND)
+    return min(max(found + round(ahead * SECOND), begin), begin + skip)
+
+
+def speed_along(target: ReferencePoint) -> float:
+    """Speed of a target along its heading [m/s]."""
+    return float(target.v_x * math.cos(target.heading) + target.v_y * math.sin(target.heading))
 
 
 def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:

@@ -6,13 +6,13 @@ from typing import Protocol, TypeVar
 from climber_uk.control.approach import Approach
 from climber_uk.control.constraints import CONSTRAINTS, FORCE_LAWS, UDWADIA_KALABA
 from climber_uk.control.control_law import ControlLaw, ControlOptions
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.guard import GuardOptions
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.timing import Timing
 from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
 from climber_uk.mechanics.climber import Climber
 from climber_uk.parameters.declaration import parameter, parameters
@@ -28,8 +28,8 @@ class ParameterSource(Protocol):
 
 
 @parameters
-class ConstraintChoice:
-    """Which constraints are followed, and what kind of climber follows them."""
+class ControllerChoice:
+    """Which control law runs, with which constraints, and what holds the climber."""
 
     constraints: str = parameter("guidance", "", "constraint set", choices=CONSTRAINTS)
     controller: str = parameter(
@@ -42,7 +42,7 @@ class ConstraintChoice:
 
 
 KINDS: list[tuple[type, str]] = [
-    *((kind, "") for kind in (ConstraintChoice, Climber, ControlOptions, Timing, Safety, Approach)),
+    *((kind, "") for kind in (ControllerChoice, Climber, ControlOptions, Timing, Safety, Approach)),
     *((kind, f"{name}.") for name, kind in [*CONSTRAINTS.items(), *FORCE_LAWS.items()]),
     (Observer, "observer."),
     (Pacing, "pacing."),
@@ -51,12 +51,10 @@ KINDS: list[tuple[type, str]] = [
 """All that is read, with the prefix of its parameters."""
 
 
-def settings(
-    parameters: ParameterSource, pressure: float | None
-) -> tuple[ControlLaw, Observer, Timing, Pacing]:
+def settings(parameters: ParameterSource, pressure: float | None) -> Settings:
     """What the parameters, and the measured pressure [Pa], say now."""
     read = parameters.read
-    choice = read(ConstraintChoice)
+    choice = read(ControllerChoice)
     name, climber = choice.constraints, with_its_seal(read(Climber), choice.adhesion)
     if pressure is not None:
         climber = replace(climber, suction_pressure=pressure)
@@ -66,16 +64,18 @@ def settings(
     other = choice.controller
     force_law = read(FORCE_LAWS[other], f"{other}.") if other != UDWADIA_KALABA else None
     law = ControlLaw(climber, constraints, options, force_law)
-    return law, read(Observer, "observer."), read(Timing), read(Pacing, "pacing.")
+    return Settings(law, read(Observer, "observer."), read(Timing), read(Pacing, "pacing."))
 
 
 def build_controller(parameters: ParameterSource, pressure: float | None) -> Controller:
     """Controller as the parameters say, that has seen nothing yet."""
-    read, sampled_controller = parameters.read, SampledController(*settings(parameters, pressure))
-    controller = Controller(
-        sampled_controller, read(Safety), read(Approach), read(GuardOptions, "guard.")
+    read = parameters.read
+    name = read(ControllerChoice).adhesion
+    return Controller(
+        settings(parameters, pressure),
+        read(Safety),
+        read(Approach),
+        read(GuardOptions, "guard."),
+        read(ADHESION[name], f"{name}."),
+        read(Guidance, "guidance."),
     )
-    name = read(ConstraintChoice).adhesion
-    controller.guard.adhesion = read(ADHESION[name], f"{name}.")
-    controller.active.approach_constraints = read(Guidance, "guidance.")
-    return controller

@@ -4,6 +4,7 @@ A constraint set says what forward acceleration v̇ and yaw acceleration θ̈ it
 A q̈ = b these are [cosθ sinθ 0] q̈ = v̇ and [0 0 1] q̈ = θ̈; the wheels' no-slip row is the third.
 """
 
+import dataclasses
 from typing import Any, Protocol
 
 import numpy as np
@@ -40,6 +41,16 @@ class ConstraintSet(Protocol):
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""
+
+
+def blended(before: ConstraintSet, after: ConstraintSet, share: float) -> ConstraintSet:
+    """Constraints on their way from gains to others; `share` of it is done."""
+    gains = {
+        field.name: (1 - share) * getattr(before, field.name) + share * getattr(after, field.name)
+        for field in dataclasses.fields(after)  # type: ignore[arg-type]
+        if isinstance(field.default, float)
+    }
+    return dataclasses.replace(after, **gains)  # type: ignore[type-var]
 
 
 def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> DesiredAcceleration:

@@ -5,6 +5,7 @@ the constraints (8) is M Aᵀ b - Q. It splits uniquely into the wheels' lateral
 torques that make the climber obey: τR,L = r (F ± N/d) / 2.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,7 +15,7 @@ import numpy as np
 
 from climber_uk.control.constraint_set import ConstraintSet, rows
 from climber_uk.control.model import predict
-from climber_uk.mechanics import Array, pack, unpack
+from climber_uk.mechanics import SECOND, Array, pack, unpack
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
 from climber_uk.mechanics.quantities import (
@@ -30,6 +31,7 @@ from climber_uk.mechanics.udwadia_kalaba import constraint_force
 from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
+CUT = 1e-9  # [N, N m] of a demand that limits have taken away
 Solve = Callable[[Any, Motion], tuple[Any, Any]]  # force and moment
 
 
@@ -66,6 +68,7 @@ class ControlInput(NamedTuple):
     held: Torques  # that act until then
     disturbance: Wrench  # see `Observer`
     period: float  # [s] for which the answer is going to act
+    begins: int = 0  # [ns] when that begins
 
 
 class Command(NamedTuple):
@@ -85,6 +88,11 @@ class Command(NamedTuple):
     def constraint_force(self) -> Array:
         """Drive [N], lateral [N], about z [N m], (..., 3): x, y, z of a wrench's message."""
         return pack(self.demanded.force, self.lateral, self.demanded.moment)
+
+    @property
+    def fits(self) -> Any:
+        """Whether no limit took anything away: a bool, or an array (N,) of them."""
+        return (abs(self.lost.force) <= CUT) & (abs(self.lost.moment) <= CUT)
 
     @property
     def missing(self) -> Array:
@@ -115,8 +123,7 @@ class ForceLaw(Protocol):
 class ControlLaw:
     """The control law: a model of the climber and a constraint set, or another law. No memory.
 
-    What it has to know of before comes in a `ControlInput`, from the `SampledController` that owns
-    it.
+    What it has to know of before comes in a `ControlInput`, from the `Estimator`.
     """
 
     climber: Climber
@@ -124,13 +131,17 @@ class ControlLaw:
     options: ControlOptions = field(default_factory=ControlOptions)
     other: ForceLaw | None = None  # in the constraints' place
 
+    def aim(self, situation: ControlInput) -> int:
+        """Time [ns] for which a situation's torques are computed: that of its `target`."""
+        return situation.begins + round(self.options.lookahead(situation.period) * SECOND)
+
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
         """Torques for a situation; `target` is that of half a period after it begins.
 
         A fixed-point iteration of two passes: the answer itself moves the state to the time that it
         is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
-        climber, (motion, held, (r_drive, r_turn), period) = self.climber, situation
+        climber, (motion, held, (r_drive, r_turn), period, _) = self.climber, situation
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         right, left = self._fixed_bounds or self._bounds(situation)
@@ -205,3 +216,11 @@ class ControlLaw:
 def _near(bounds: Bounds, torque: Any, change: Any) -> Bounds:
     lowest, highest = bounds
     return clipped(torque - change, lowest, highest), clipped(torque + change, lowest, highest)
+
+
+def check_finite(torques: Torques) -> None:
+    """Raise `ValueError` if a climber's torques are not finite; of many, each has its own."""
+    right, left = torques
+    is_one = isinstance(right, float) or np.ndim(right) == 0
+    if is_one and not math.isfinite(right + left):
+        raise ValueError(f"torques {torques} are not finite")

@@ -1,38 +1,43 @@
 """The whole controller without ROS: odometry and reference in, torques out, whatever happens.
 
+An odometry goes one way, from top to bottom: what it tells of the climber (`Estimator.see`),
+whether torques and reference explain that (`Guard.watch`), whether to follow (`Mode`), where the
+climber will be when its torques act (`Estimator.ahead`), where it should be then
+(`ActiveReference.target`), and which torques take it there (`ControlLaw.command`).
+
 Times are integers in nanoseconds: stamps on the odometry's clock, `now` on the node's, which is 0
 while there is none.
 """
 
 import math
-from collections import deque
+from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from climber_uk.control.active_reference import ActiveReference
-from climber_uk.control.ages import Ages
 from climber_uk.control.approach import Approach
-from climber_uk.control.control_law import Command
-from climber_uk.control.guard import Guard, GuardOptions, Observed
-from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import LONGEST_STEP, SampledController
-from climber_uk.control.twist_check import SUSPECTED, TwistCheck
-from climber_uk.mechanics import SECOND, Array, pack
+from climber_uk.control.constraint_set import ConstraintSet, blended
+from climber_uk.control.control_law import CUT, Command, ControlLaw, check_finite
+from climber_uk.control.estimator import Estimator, Observed
+from climber_uk.control.guard import Guard, GuardOptions
+from climber_uk.control.guidance import Guidance
+from climber_uk.control.model import Observer
+from climber_uk.control.safe_output import SafeOutput
+from climber_uk.control.safety import Calm, Mode, Safety, Trouble
+from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.timing import LONGEST_STEP, Ages, Timing
+from climber_uk.control.twist import SUSPECTED, TwistCheck
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import Motion, State, Torques
+from climber_uk.mechanics.quantities import Motion, State
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
 CLOCK_STEP = round(0.2 * SECOND)  # [ns] back, from which time has started anew
 SELDOM = 0.8  # of the timeout from one odometry to the next: the least delay would exceed it
-REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
-STALL_REST = 10  # times the rest after which a stalled climber tries again
-BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
-PUSHED = 0.05  # [m/s] by which it may be faster than before; if it is, something pushes it:
-COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
-FLAPPING = 3  # faults within `FLAPPING_TIME`, after which the next one has to be over for a while
-FLAPPING_TIME = 2 * SECOND  # [ns]
-CALM = SECOND // 2  # [ns] for which it has to be over
-
-Trouble = tuple[Mode, str]
+RETUNING_TIME = 0.5  # [s] in which changed gains come to act
+FOLLOWING, APPROACHING, WAITING = Mode.FOLLOWING, Mode.APPROACHING, Mode.WAITING
 
 
 class Answer(NamedTuple):
@@ -43,12 +48,17 @@ class Answer(NamedTuple):
     command: Command | None  # what they came from; None: safe output
 
 
+class Settings(NamedTuple):
+    """What may change while a controller runs."""
+
+    law: ControlLaw
+    observer: Observer = Observer()
+    timing: Timing = Timing()
+    pacing: Pacing = Pacing()
+
+
 class Controller:
     """Follows while all is well, else gives the safe output; `mode` and `detail` say why.
-
-    It decides whether to follow. It owns a `SampledController`, which knows the state at each
-    odometry and what acts until the next; that owns a `ControlLaw`, which has no memory and turns
-    one motion and one reference into torques. What to follow is the `ActiveReference`'s.
 
     The mode is found anew for every answer, from the fields below, the first that holds
     (`_find_mode`). Good odometry without a reference is WAITING, without any output, for up to
@@ -57,38 +67,48 @@ class Controller:
 
     def __init__(
         self,
-        sampled_controller: SampledController,
+        settings: Settings,
         safety: Safety | None = None,
         approach: Approach | None = None,
         guard: GuardOptions | None = None,
+        adhesion: Adhesion | None = None,
+        gentle: Guidance | None = None,
     ) -> None:
-        self.sampled_controller, self.safety = sampled_controller, safety or Safety()
-        self.active = ActiveReference(sampled_controller, approach or Approach())
-        self.guard = Guard(guard or GuardOptions())
+        """`adhesion` is for the guard; `gentle` are the constraints of what begins at rest."""
+        self.safety = safety or Safety()
+        self._law, observer, timing, pacing = settings
+        self.estimator = Estimator(self._law.climber, observer, timing, self.safety)
+        self.active = ActiveReference(pacing, approach or Approach(), gentle or Guidance())
+        self.guard = Guard(guard or GuardOptions(), adhesion or Suction())
         self.mode, self.detail = Mode.WAITING, ""
         self.answer: Answer | None = None  # the last one
+        self.ages = Ages()
+        self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
         self._enabled = True
         self._clockless_looks = 0  # in a row, of `look`: see `CLOCK_PATIENCE`
         self._heard: int | None = None  # [ns] time of the last odometry, good or bad
         self._trouble: Trouble | None = None  # with that odometry
-        self._fault: Trouble | None = None  # found by the guard, until the climber has rested
-        self._rested = 0.0  # [s] since it is at rest
         self._stamp = 0  # [ns] of the last good one
         self._now = 0  # [ns] of the last look at the clock
-        self.ages = Ages()
         self._unsettled = 0  # odometry messages until a jump is forgiven
         self._twist = TwistCheck()
         self._moved_without_twist = 0.0  # [m]
         self._waiting_since: int | None = None  # [ns] stamp of the first one not answered
-        self._last_fault: tuple[int, Trouble] | None = None  # [ns] when it was there last
-        self._fault_times: deque[int] = deque(maxlen=FLAPPING)  # [ns] when each began
-        self._braked: tuple[int, float] | None = None  # [ns] begin of the safe output, rim speed
-        self._coasts_until = 0  # [ns]
+        self._calm, self._safe_output = Calm(), SafeOutput(self.safety)
+
+    @property
+    def law(self) -> ControlLaw:
+        """The control law, by the settings of now."""
+        return self._law
+
+    @law.setter
+    def law(self, law: ControlLaw) -> None:
+        self._law, self.estimator.climber = law, law.climber
 
     @property
     def state(self) -> State | None:
         """State at the last good odometry, as it is believed to be."""
-        motion = self.sampled_controller.motion
+        motion = self.estimator.motion
         return None if motion is None else State.moving(motion)
 
     @property
@@ -99,20 +119,23 @@ class Controller:
     @property
     def clock_offset(self) -> float:
         """By how much the node's clock is ahead of the odometry's [s]; 0 if that may be latency."""
-        return self.ages.offset(self.sampled_controller.timing.max_latency)
-
-    @property
-    def preview(self) -> Preview | None:
-        """What is followed, or will be: the reference, or the way to it."""
-        return self.active.followed
+        return self.ages.offset(self.estimator.timing.max_latency)
 
     def enable(self, enabled: bool) -> None:
         """Follow the reference, or give the safe output; what was wrong before is forgiven."""
         self._enabled = enabled
         self._moved_without_twist = 0.0
         if enabled:
-            self._fault = None
+            self.guard.fault = None
             self._forget_when()
+
+    def retune(self, settings: Settings) -> None:
+        """Go over to other settings: the constraints' gains gradually, so that no torque jumps."""
+        if settings.law.constraints != self.law.constraints:
+            self._retuned = self.estimator.stamp, self.constraints
+        self.law, self.estimator.observer, self.estimator.timing, self.active.pacing = settings
+
+    # What comes in
 
     def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
         """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
@@ -121,21 +144,21 @@ class Controller:
         # was no clock until then tells nothing, and is counted anew
         if self._stamp == 0:
             self._clockless_looks = 0
-        if stamp == self._stamp and self.mode in (Mode.FOLLOWING, Mode.APPROACHING):
+        if stamp == self._stamp and self.mode in (FOLLOWING, APPROACHING):
             return self.answer  # it was not received: the same once more
-        timeout = round(self.safety.odometry_timeout * SECOND)
-        if now > 0 and abs(now - stamp) > timeout:
-            off = (now - stamp) / SECOND
+        timeout, off = self.safety.odometry_timeout, (now - stamp) / SECOND
+        if now > 0 and abs(now - stamp) > round(timeout * SECOND):
             return self.on_bad_odometry(now, f"stamp is {off:.2f} s from the clock, too far")
-        if 0 < self._stamp - stamp <= timeout:
+        if 0 < self._stamp - stamp <= round(timeout * SECOND):
             return None
         self._heard = stamp
         if now > 0:
-            self.ages.add(now, (now - stamp) / SECOND)
+            self.ages.add(now, off)
         if stamp != self._stamp:
-            if self._stamp and abs(stamp - self._stamp) > timeout:
-                self._start_anew()
-            self._trouble = self._take(stamp, state.motion)
+            if self._stamp and abs(stamp - self._stamp) > round(timeout * SECOND):
+                self.estimator.reset()
+                self._watch_anew()
+            self._trouble = self._see(stamp, state.motion)
             self._stamp = stamp
         return self._answer(now)
 
@@ -158,7 +181,7 @@ class Controller:
         if self._heard is None and now > 0:
             self._heard = now
         mode, _ = self._find_mode(now)
-        return None if mode in (Mode.FOLLOWING, Mode.WAITING) else self._answer(now)
+        return None if mode in (FOLLOWING, WAITING) else self._answer(now)
 
     def _look_at_clock(self, now: int) -> None:
         """Notice a clock that went back: by a little, or because time starts anew."""
@@ -170,111 +193,113 @@ class Controller:
         # stamps of before the step are no newer ones
         self._stamp, self._waiting_since = 0, None
         self._forget_when()
-        self.sampled_controller.restart()
+        self.estimator.restart()
         if back > CLOCK_STEP:
             self.active.preview = None
 
     def _forget_when(self) -> None:
         """Forget when what was: it counts no more, or times of before mean nothing."""
         self.guard.forgive()
-        self._last_fault, self._braked, self._coasts_until = None, None, 0
-        self._fault_times.clear()
+        self._safe_output.forget()
+        self._calm = Calm()
 
-    # What odometry says
+    # 1. What an odometry tells, and whether that can be
 
-    def _take(self, stamp: int, motion: Motion) -> Trouble | None:
-        """Give the `SampledController` an odometry; return what is wrong with it."""
-        sampled_controller, last = self.sampled_controller, self.sampled_controller.motion
-        if last is None:
-            sampled_controller.see(stamp, motion)
-        else:
-            expected = sampled_controller.expected_at(stamp)
-            trouble = None
-            if sampled_controller.observer.velocity_source == "pose":
-                motion = motion._replace(speed=expected.speed, yaw_rate=expected.yaw_rate)
-            else:
-                trouble = self._check_twist(
-                    last, motion, (stamp - sampled_controller.stamp) / SECOND
-                )
-            if self.safety.has_jumped(expected, motion, sampled_controller.law.climber.half_track):
-                self._start_anew()
-                self._unsettled = self.safety.settling_messages
-                trouble = None  # no rate explains a jump
+    def _see(self, stamp: int, motion: Motion) -> Trouble | None:
+        """Take in an odometry; return what is wrong with it."""
+        is_first = self.estimator.motion is None
+        observed = self.estimator.see(stamp, motion)
+        if observed is None and not is_first:
+            self._watch_anew()
+            self._unsettled = self.safety.settling_messages
+        if not is_first:
             self._unsettled -= self._unsettled > 0
-            self._watch(stamp, last, motion, trouble)
-            sampled_controller.see(stamp, motion, expected)
+        if observed is not None:
+            self._watch(stamp, observed, self._check_twist(observed))
         if self._unsettled:
             return Mode.JUMPED, ""
         if self._moved_without_twist > self.safety.max_twist_error:
             return Mode.NO_TWIST, "set velocity_source to pose"
         return None
 
-    def _check_twist(self, last: Motion, motion: Motion, time: float) -> Trouble | None:
+    def _watch_anew(self) -> None:
+        """Watch from now on: the climber is elsewhere."""
+        self.guard.restart()
+        self._twist.restart()
+        self._moved_without_twist = 0.0
+
+    def _check_twist(self, observed: Observed) -> Trouble | None:
         """Whether the twist is missing, or another one than the pose's rate."""
-        if motion.speed == 0 and motion.yaw_rate == 0:
-            self._moved_without_twist += math.hypot(motion.x - last.x, motion.y - last.y)
+        before, after = observed.before, observed.after
+        if self.estimator.observer.velocity_source == "pose":
+            return None
+        if after.speed == 0 and after.yaw_rate == 0:
+            self._moved_without_twist += math.hypot(after.x - before.x, after.y - before.y)
             return None
         self._moved_without_twist = 0.0
-        self._twist.add(last, motion, time, self.sampled_controller.law.climber.half_track)
+        self._twist.add(before, after, observed.time, self._law.climber.half_track)
         detail, is_sign = self._twist.trouble(self.safety.max_twist_error)
         if not detail:
             return None
         return Mode.SIGN_WRONG if is_sign else Mode.TWIST_WRONG, detail
 
-    def _start_anew(self) -> None:
-        self.sampled_controller.reset()
-        self.guard.restart()
-        self._twist.restart()
-        self._moved_without_twist = 0.0
-
-    def _watch(self, stamp: int, last: Motion, motion: Motion, trouble: Trouble | None) -> None:
+    def _watch(self, stamp: int, observed: Observed, trouble: Trouble | None) -> None:
         """Let the guard look at a climber that follows; let one that had a fault rest."""
-        sampled_controller, guard = self.sampled_controller, self.guard
-        climber = sampled_controller.law.climber
-        time = (stamp - sampled_controller.stamp) / SECOND
-        if self._fault is None:
-            if self.mode in (Mode.FOLLOWING, Mode.APPROACHING) and time > 0:
-                acted, disturbance = (
-                    sampled_controller.mean_torques(stamp),
-                    sampled_controller.disturbance,
-                )
-                observed = Observed(
-                    last, motion, time, acted, disturbance, sampled_controller.reaction
-                )
-                self._fault, self._rested = trouble or self._find_fault(observed), 0.0
-                if self._fault is not None:
-                    guard.fault(stamp)
-            return
-        rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
-        self._rested = self._rested + time if rim < REST else 0.0
-        needed = guard.options.recovery_time * (STALL_REST if self._is(Mode.STALLED) else 1)
-        if self._rested > needed and not self._is_for_good:
-            self._fault = None
-            guard.restart()
-            self._twist.restart()
+        guard = self.guard
+        if guard.fault is not None:
+            guard.rest(self._law.climber, observed.after, observed.time)
+            if guard.fault is None:
+                self._twist.restart()
+        elif self.mode in (FOLLOWING, APPROACHING) and observed.time > 0:
+            fault = trouble or self._find_fault(observed)
+            if fault is not None:
+                guard.count(stamp, fault)
 
     def _find_fault(self, observed: Observed) -> Trouble | None:
-        """What the guard finds of a climber that follows."""
-        target = self.active.target
+        """What the guard finds of a climber that follows, by the reference at its last odometry."""
+        target = self.active.at(self._stamp)
         if target is None:
             return None
-        climber, expected = self.sampled_controller.law.climber, self.active.expected(target)
-        fault = self.guard.watch(climber, observed, expected)
+        expected = self.active.expected(self._stamp, target, self._law.constraints)
+        fault = self.guard.watch(self._law.climber, observed, expected)
         fault = fault or self.active.strayed(observed.before, target)
         if fault is not None and fault[0] is Mode.TOO_FAST:
             sign = self._twist.opposed(SUSPECTED * self.safety.max_twist_error)
             return (Mode.SIGN_WRONG, sign) if sign else fault
         return fault
 
-    @property
-    def _is_for_good(self) -> bool:
-        """Whether somebody has to look after the climber first."""
-        return self.guard.has_given_up or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
+    # 2. Whether to follow
 
-    def _is(self, mode: Mode) -> bool:
-        return self._fault is not None and self._fault[0] is mode
-
-    # What to do
+    def _answer(self, now: int) -> Answer | None:
+        """Torques for the last odometry, in the mode of now."""
+        age = min(max(0, now - self._stamp) / SECOND, LONGEST_STEP)
+        found = self._find_mode(now)
+        mode, detail = self._calm.mode(self.mode, max(now, self._stamp), found)
+        command = None
+        if mode in (FOLLOWING, Mode.NO_REFERENCE):
+            is_followed, why, command = self._follow(age)
+            if is_followed is not WAITING or mode is FOLLOWING:
+                mode, detail = is_followed, why
+        if mode in (WAITING, Mode.NO_REFERENCE):
+            self._waiting_since = self._waiting_since or self._stamp
+        else:
+            self._waiting_since = None
+        if mode is not self.mode:
+            if mode.is_fault:
+                self.estimator.forget()
+            if command is not None:
+                self._safe_output.end()
+        self.mode, self.detail = mode, detail
+        if mode is WAITING:
+            return None
+        if command is None:
+            self.active.pause(self._stamp)
+            law, estimator = self._law, self.estimator
+            torques = self._safe_output.send(mode, self._stamp, age, estimator, law)
+        else:
+            torques = command.wheels
+        self.answer = Answer(self._stamp, np.array(torques), command)
+        return self.answer
 
     def _find_mode(self, now: int) -> Trouble:
         """Mode as things are, and a detail of it."""
@@ -286,22 +311,12 @@ class Controller:
             return Mode.WAITING, ""
         if now - self._heard > self.safety.odometry_timeout * SECOND:
             return Mode.NO_ODOMETRY, ""
-        return self._trouble or self._told_fault() or self._unfit() or self._missing(now)
-
-    def _told_fault(self) -> Trouble | None:
-        """What the guard found, and how it ends."""
-        if self._fault is None:
-            return None
-        mode, detail = self._fault
-        return mode, f"{detail}; ~/enable to go on" if self._is_for_good else detail
+        return self._trouble or self.guard.told or self._unfit() or self._missing(now)
 
     def _unfit(self) -> Trouble | None:
         """What forbids to follow, though nothing is wrong."""
-        sampled_controller, safety = self.sampled_controller, self.safety
-        pressure, period = (
-            sampled_controller.law.climber.suction_pressure,
-            sampled_controller.period,
-        )
+        safety, pressure = self.safety, self._law.climber.suction_pressure
+        period = self.estimator.period
         if pressure < safety.least_pressure:
             return Mode.LOW_PRESSURE, f"{pressure:.0f} Pa"
         if period > SELDOM * safety.odometry_timeout:
@@ -315,70 +330,51 @@ class Controller:
         since = now if self._waiting_since is None else self._waiting_since
         if now - since > self.safety.reference_timeout * SECOND:
             return Mode.NO_REFERENCE, ""
-        return Mode.FOLLOWING, ""
+        return FOLLOWING, ""
 
-    def _calmed(self, now: int, mode: Mode, detail: str) -> Trouble:
-        """The mode, or the last fault where faults come and go: it has to be over for a while."""
-        time = max(now, self._stamp)
-        if mode.is_fault:
-            if not self.mode.is_fault:
-                self._fault_times.append(time)
-            self._last_fault = time, (mode, detail)
-        elif self.mode.is_fault and self._last_fault is not None and mode is Mode.FOLLOWING:
-            over_since, fault = self._last_fault
-            flaps = len(self._fault_times) == FLAPPING
-            if (
-                flaps
-                and 0 <= over_since - self._fault_times[0] < FLAPPING_TIME
-                and 0 <= time - over_since < CALM
-            ):
-                return fault
-        return mode, detail
+    # 3. Where to, and with which torques
 
-    def _answer(self, now: int) -> Answer | None:
-        """Torques for the last odometry, in the mode of now."""
-        age = min(max(0, now - self._stamp) / SECOND, LONGEST_STEP)
-        mode, detail = self._calmed(now, *self._find_mode(now))
-        command = None
-        if mode in (Mode.FOLLOWING, Mode.NO_REFERENCE):
-            found = self.active.follow(
-                self.ages.latency(age, self.sampled_controller.timing.max_latency)
-            )
-            command = found.command
-            if found.mode is not Mode.WAITING or mode is Mode.FOLLOWING:
-                mode, detail = found.mode, found.detail
-        if mode in (Mode.WAITING, Mode.NO_REFERENCE):
-            self._waiting_since = self._waiting_since or self._stamp
-        else:
-            self._waiting_since = None
-        if mode.is_fault and mode is not self.mode:
-            self.sampled_controller.forget()
-        self.mode, self.detail = mode, detail
-        if mode is Mode.WAITING:
-            return None
-        if command is None:
-            self.active.pause(self._stamp)
-            torques = self._safe_torques(age)
-        else:
-            self._braked = None
-            torques = command.wheels
-        self.answer = Answer(self._stamp, pack(*torques), command)
-        return self.answer
+    def _follow(self, age: float) -> tuple[Mode, str, Command | None]:
+        """Mode, detail, and torques for the last odometry, of `age` [s]."""
+        estimator, active = self.estimator, self.active
+        if active.preview is None:
+            return WAITING, "", None
+        try:
+            ahead = estimator.ahead(self.ages.latency(age, estimator.timing.max_latency))
+            aim = self._law.aim(ahead)
+            target = active.target(ahead.motion, ahead.begins, aim)
+            point = target.point
+            if point is None:
+                return target.mode, target.detail, None
+            law = self._law_for(target.is_gentle)
+            command = law.command(ahead, point)
+            lost = command.lost.force
+            if abs(lost) > CUT and active.pacing.catch_up > 0:
+                target = active.slowed(target, lost / law.climber.mass, aim, ahead.period)
+                command = law.command(ahead, target.point or point)
+            check_finite(command.wheels)
+        except (ValueError, ArithmeticError) as error:
+            return Mode.NO_SOLUTION, str(error), None
+        active.go_on(target)
+        estimator.sent(ahead.begins, command.wheels, command.fits)
+        return target.mode, target.detail, command
 
-    def _safe_torques(self, age: float) -> Torques:
-        motion, climber = self.sampled_controller.motion, self.sampled_controller.law.climber
-        if self.mode is Mode.DEAD_WHEEL and climber.seal_friction >= climber.weight_along_wall:
-            return self.sampled_controller.let_go(age)  # one wheel that holds turns the climber
-        holds = self.safety.safe_output == "hold" and self._stamp >= self._coasts_until
-        if holds and motion is not None:
-            rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
-            begin, before = self._braked = self._braked or (self._stamp, rim)
-            if self._stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
-                self._coasts_until, self._braked = self._stamp + round(COASTING * SECOND), None
-                return self.sampled_controller.let_go(age)
-            braking = 0.0 if self.mode.doubts_odometry else self.safety.braking_rate
-            try:
-                return self.sampled_controller.hold(age, braking)
-            except (ValueError, ArithmeticError):
-                self.sampled_controller.reset()  # finite odometry gave an absurd state
-        return self.sampled_controller.let_go(age)
+    def _law_for(self, is_gentle: bool) -> ControlLaw:
+        """The control law, with the constraints that are followed now."""
+        if is_gentle:
+            return replace(self._law, constraints=self.active.gentle, other=None)
+        if self._retuned is not None:
+            return replace(self._law, constraints=self.constraints)
+        return self._law
+
+    @property
+    def constraints(self) -> ConstraintSet:
+        """The law's constraints as they are now, on their way from the gains that were before."""
+        if self._retuned is None:
+            return self._law.constraints
+        since, before = self._retuned
+        share = (self.estimator.stamp - since) / SECOND / RETUNING_TIME
+        if not 0 <= share < 1 or type(before) is not type(self._law.constraints):
+            self._retuned = None
+            return self._law.constraints
+        return blended(before, self._law.constraints, share)

@@ -8,9 +8,10 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from climber_uk.control.safety import Mode
+from climber_uk.control.estimator import Observed
+from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.adhesion import Adhesion, Suction
+from climber_uk.mechanics.adhesion import Adhesion
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.parameters.declaration import parameter, parameters
@@ -26,6 +27,8 @@ EXCITED = 0.12  # of the largest torque: standard deviation that tells whether a
 LETS_GO = 0.15  # [s] after rest, in which friction that lets go may make it faster
 UNTOLD = 0.012  # [s] that a loop may take longer to answer than it knows
 SUSPECTED = 0.4  # of both is enough where the climber runs away
+REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
+STALL_REST = 10  # times the rest after which a stalled climber tries again
 
 
 @parameters(slots=True)
@@ -66,17 +69,6 @@ class Rates(NamedTuple):
 
     speed: float  # [m/s]
     yaw_rate: float  # [rad/s]
-
-
-class Observed(NamedTuple):
-    """What odometry tells, and what acted since the one before."""
-
-    before: Motion
-    after: Motion
-    time: float  # [s] between them
-    torques: Torques  # their mean
-    disturbance: Wrench
-    reaction: float  # [s] in which a torque can answer
 
 
 class Expected(NamedTuple):
@@ -130,9 +122,12 @@ class Wheel:
 class Guard:
     """Watches a climber that follows."""
 
-    def __init__(self, options: GuardOptions, adhesion: Adhesion | None = None) -> None:
-        self.options, self.adhesion = options, adhesion or Suction()
+    def __init__(self, options: GuardOptions, adhesion: Adhesion) -> None:
+        self.options, self.adhesion = options, adhesion
+        self.fault: Trouble | None = None  # that was found, until the climber has rested
+        self._rested = 0.0  # [s] since it is at rest
         self.faults: deque[int] = deque()  # [ns] stamps
+        self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
         self.restart()
 
     def forgive(self) -> None:
@@ -147,25 +142,23 @@ class Guard:
         self._forget_wheels()
 
     def _forget_wheels(self) -> None:
-        self._wheels = Wheel(), Wheel()
-        self._moved = 0.0  # [s]
+        if self._moved:
+            self._wheels = Wheel(), Wheel()
+        self._moved = 0.0
 
-    def watch(
-        self, climber: Climber, observed: Observed, expected: Expected
-    ) -> tuple[Mode, str] | None:
+    def watch(self, climber: Climber, observed: Observed, expected: Expected) -> Trouble | None:
         """What is wrong with what is observed; None if all is well."""
-        self._add_to_wheels(climber, observed)
+        torques = observed.torques
+        self._add_to_wheels(climber, observed, torques)
         too_fast = self._watch_rates(climber, observed, expected.allowed)
         return (
-            self._watch_wheels(climber, observed.torques, SUSPECTED if too_fast else 1.0)
+            self._watch_wheels(climber, torques, SUSPECTED if too_fast else 1.0)
             or too_fast
-            or self._watch_limit(climber, observed, expected)
+            or self._watch_limit(climber, observed, expected, torques)
             or self._watch_disturbance(climber, observed.disturbance)
         )
 
-    def _watch_rates(
-        self, climber: Climber, observed: Observed, allowed: Rates
-    ) -> tuple[Mode, str] | None:
+    def _watch_rates(self, climber: Climber, observed: Observed, allowed: Rates) -> Trouble | None:
         options, motion = self.options, observed.after
         fastest = allowed.speed + options.speed_margin + self._let_go(climber, observed)
         fastest_turn = allowed.yaw_rate + options.yaw_rate_margin
@@ -189,9 +182,10 @@ class Guard:
         return climber.seal_friction / climber.mass * (observed.reaction + UNTOLD)
 
     def _watch_limit(
-        self, climber: Climber, observed: Observed, expected: Expected
-    ) -> tuple[Mode, str] | None:
-        largest, motion, wanted = max(map(abs, observed.torques)), observed.after, expected.wanted
+        self, climber: Climber, observed: Observed, expected: Expected, torques: Torques
+    ) -> Trouble | None:
+        motion, wanted = observed.after, expected.wanted
+        largest = max(abs(torques.right), abs(torques.left))
         share = largest / climber.max_wheel_torque
         if wanted.speed > MOVES:
             stands = abs(motion.speed) < STANDS * wanted.speed
@@ -207,20 +201,27 @@ class Guard:
             return None
         return Mode.STALLED, f"{largest:.2f} N m"
 
-    def _watch_disturbance(self, climber: Climber, disturbance: Wrench) -> tuple[Mode, str] | None:
-        explained = self.adhesion.force(climber) + climber.mass * GRAVITY
-        most = self.options.max_disturbance * explained
-        moment = most * climber.half_track
-        if most == 0 or (abs(disturbance.force) <= most and abs(disturbance.moment) <= moment):
+    def _watch_disturbance(self, climber: Climber, disturbance: Wrench) -> Trouble | None:
+        share, weight, lever = (
+            self.options.max_disturbance,
+            climber.mass * GRAVITY,
+            climber.half_track,
+        )
+        force, turn = abs(disturbance.force), abs(disturbance.moment)
+        if force <= share * weight and turn <= share * weight * lever:
+            return None  # which weight alone explains
+        most = share * (self.adhesion.force(climber) + weight)
+        moment = most * lever
+        if most == 0 or (force <= most and turn <= moment):
             return None
         return Mode.DISTURBED, (
             f"{disturbance.force:.0f} N, {disturbance.moment:.0f} N m; "
             f"explained are {most:.0f} N, {moment:.0f} N m"
         )
 
-    def _add_to_wheels(self, climber: Climber, observed: Observed) -> None:
+    def _add_to_wheels(self, climber: Climber, observed: Observed, torques: Torques) -> None:
         """See `Wheel`; (11) and (15) tell the force that acted on each."""
-        before, after, time, torques = observed[:4]
+        before, after, time = observed.before, observed.after, observed.time
         response_time = self.options.response_time
         if response_time == 0 or min(abs(before.speed), abs(after.speed)) < SLIDES:
             self._forget_wheels()
@@ -235,9 +236,7 @@ class Guard:
         for wheel, torque, force in zip(self._wheels, torques, found, strict=True):
             wheel.add(torque / climber.wheel_radius, force, share)
 
-    def _watch_wheels(
-        self, climber: Climber, torques: Torques, proof: float
-    ) -> tuple[Mode, str] | None:
+    def _watch_wheels(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
         if not 0 < self.options.response_time < self._moved:
             return None
         right, left = self._wheels
@@ -250,13 +249,35 @@ class Guard:
 
     # Faults, and the way back
 
-    def fault(self, stamp: int) -> None:
-        """Count a fault at `stamp` [ns]."""
+    def count(self, stamp: int, fault: Trouble) -> None:
+        """Remember a fault, at `stamp` [ns]."""
+        self.fault, self._rested = fault, 0.0
         self.faults.append(stamp)
-        while self.faults and stamp - self.faults[0] > self.options.memory * SECOND:
+        while stamp - self.faults[0] > self.options.memory * SECOND:
             self.faults.popleft()
 
+    def rest(self, climber: Climber, motion: Motion, time: float) -> None:
+        """A climber that had a fault is in `motion` for `time` [s]; if it has rested, trust it."""
+        rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
+        self._rested = self._rested + time if rim < REST else 0.0
+        needed = self.options.recovery_time * (STALL_REST if self._is(Mode.STALLED) else 1)
+        if self._rested > needed and not self.is_for_good:
+            self.fault = None
+            self.restart()
+
     @property
-    def has_given_up(self) -> bool:
-        """Whether there were so many faults that somebody has to look after the climber."""
-        return len(self.faults) >= self.options.attempts
+    def is_for_good(self) -> bool:
+        """Whether somebody has to look after the climber first."""
+        many = len(self.faults) >= self.options.attempts
+        return many or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
+
+    @property
+    def told(self) -> Trouble | None:
+        """The fault, and how it ends."""
+        if self.fault is None:
+            return None
+        mode, detail = self.fault
+        return mode, f"{detail}; ~/enable to go on" if self.is_for_good else detail
+
+    def _is(self, mode: Mode) -> bool:
+        return self.fault is not None and self.fault[0] is mode

@@ -5,8 +5,10 @@ one it is now.
 """
 
 import math
+from collections import deque
 from enum import Enum
 
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import parameter, parameters
@@ -57,9 +59,40 @@ class Mode(Enum):
         )
 
 
+Trouble = tuple[Mode, str]  # and a detail of it
 NO_FAULTS = frozenset(
     {Mode.FOLLOWING, Mode.APPROACHING, Mode.WAITING, Mode.NOT_BEGUN, Mode.DISABLED}
 )
+
+
+FLAPPING = 3  # faults within `FLAPPING_TIME`, after which the next one has to be over for a while
+FLAPPING_TIME = 2 * SECOND  # [ns]
+CALM = SECOND // 2  # [ns] for which it has to be over
+
+
+class Calm:
+    """Faults that come and go: the last one has to be over for a while."""
+
+    def __init__(self) -> None:
+        self._last: tuple[int, Trouble] | None = None  # [ns] when it was there last
+        self._times: deque[int] = deque(maxlen=FLAPPING)  # [ns] when each began
+
+    def mode(self, before: Mode, time: int, found: Trouble) -> Trouble:
+        """What was found at `time` [ns], in the mode of `before`; or the last fault instead."""
+        mode, _ = found
+        if mode.is_fault:
+            if not before.is_fault:
+                self._times.append(time)
+            self._last = time, found
+        elif before.is_fault and self._last is not None and mode is Mode.FOLLOWING:
+            over_since, fault = self._last
+            if (
+                len(self._times) == FLAPPING
+                and 0 <= over_since - self._times[0] < FLAPPING_TIME
+                and 0 <= time - over_since < CALM
+            ):
+                return fault
+        return found
 
 
 @parameters

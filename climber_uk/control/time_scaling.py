@@ -16,9 +16,6 @@ from climber_uk.mechanics.quantities import ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
 
 SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
-LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
-LONGEST_GAP = 0.3  # [s] between two answers over which the reference goes on
-IN_TIME_AGAIN = 1e-3  # [1] of σ that is missing at the end of a restart
 
 
 @parameters(slots=True)
@@ -83,60 +80,3 @@ class Pace(NamedTuple):
 
 
 IN_TIME = Pace()
-
-
-class Progress(NamedTuple):
-    """How far along a reference the climber is: at its time `position`, by the climber's clock.
-
-    `waited` is for good: the rest of the reference comes later by it. `pace.lag` is made up for.
-    """
-
-    time: int | None = None  # [ns] from when the last answer acts; None: there was none
-    waited: int = 0  # [ns]
-    pace: Pace = IN_TIME
-    is_restarting: bool = False  # σ is on its way up to 1, and what is lost by it is waited
-
-    @property
-    def position(self) -> int | None:
-        """Time of the reference [ns] that the last answer was for; None if there was none."""
-        return None if self.time is None else self.at(self.time)
-
-    def at(self, time: int) -> int:
-        """Time of the reference [ns] at `time` [ns], near that of the last answer."""
-        return time - self.waited - round(self.pace.lag * SECOND)
-
-    def target(self, preview: Preview, time: int) -> ReferencePoint | None:
-        """Target for `time` [ns]; None outside of the preview."""
-        if self.pace == IN_TIME:
-            return preview.target(time - self.waited)
-        return self.pace.target(preview, time - self.waited)
-
-    def advanced(self, time: int, pacing: Pacing) -> "Progress":
-        """Progress at `time` [ns]; the reference stands still where the clock has jumped."""
-        if self.time is None:
-            return self._replace(time=time)
-        passed = time - self.time
-        if not 0 <= passed <= LONGEST_GAP * SECOND:
-            return self._replace(time=time, waited=self.waited + passed)
-        if self.pace == IN_TIME:
-            return self._replace(time=time)
-        pace, waited = self.pace.after(passed / SECOND, pacing), self.waited
-        is_restarting = self.is_restarting and pace.rate < 1 - IN_TIME_AGAIN
-        excess = pace.lag if self.is_restarting else pace.lag - LONGEST_LAG
-        if excess > 0:
-            waited += round(excess * SECOND)
-            pace = pace._replace(lag=pace.lag - excess)
-        if self.is_restarting and not is_restarting:
-            pace = IN_TIME
-        return Progress(time, waited, pace, is_restarting)
-
-    def slowed(self, missing: float, preview: Preview, time: int, step: float) -> "Progress":
-        """Progress that asks `missing` [m/s²] less along the climber; see `Pace.slowed`."""
-        pace = self.pace.slowed(missing, preview, time - self.waited, step)
-        return self._replace(pace=pace)
-
-
-def restarted(time: int, position: int, rate: float) -> Progress:
-    """Progress that goes on at `position` [ns] of the reference, at first at the rate σ `rate`."""
-    pace = IN_TIME if rate > 1 - IN_TIME_AGAIN else Pace(rate=rate)
-    return Progress(time, time - position, pace, pace != IN_TIME)

@@ -1,18 +1,26 @@
-"""Whether an odometry's twist is that of its stamp, or the mean of the period before it.
+"""What an odometry's twist is worth: whether it is of its stamp, and whether the pose agrees."""
 
-Encoders tell means: the way of a period, by its time. A twist of the stamp is that way by the time
-only together with the one before: (v + v₀)/2. What fits the poses better is taken; if in doubt,
-the twist is that of its stamp.
-"""
+import math
 
+from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
 
-MEMORY = 1.0  # [s]
+KIND_MEMORY = 1.0  # [s]
 SURELY = 0.1  # share of the other's squares of misfits, below which a twist is taken for a mean
+CHECK_MEMORY = 0.5  # [s] in which a difference is forgotten
+SHARE = 0.3  # by which they may differ: slip, scale
+OPPOSED = 0.2  # of the largest error: way both of them must have gone, to opposite sides
+IN_A_ROW = 3  # odometry messages that say so
+SUSPECTED = 0.02  # of the largest error: enough, and once, where a climber is too fast as well
 
 
 class TwistKind:
-    """Which of both it has been of late."""
+    """Whether the twist of late is that of its stamp, or the mean of the period before it.
+
+    Encoders tell means: the way of a period, by its time. A twist of the stamp is that way by the
+    time only together with the one before: (v + v₀)/2. What fits the poses better is taken; if in
+    doubt, the twist is that of its stamp.
+    """
 
     def __init__(self) -> None:
         self.is_mean = False
@@ -21,13 +29,61 @@ class TwistKind:
     def learn(self, before: Motion, now: Motion, time: float) -> None:
         """Take in an odometry, `time` [s] after the one `before`."""
         speed, rate = mean_twist(before, now, time)
-        left = max(0.0, 1.0 - time / MEMORY)
+        left = max(0.0, 1.0 - time / KIND_MEMORY)
         off, turned_off = now.speed - speed, now.yaw_rate - rate
         off_0, turned_off_0 = before.speed - speed, before.yaw_rate - rate
         self._as_mean = left * self._as_mean + off * off + turned_off * turned_off
         off, turned_off = (off + off_0) / 2, (turned_off + turned_off_0) / 2
         self._as_instant = left * self._as_instant + off * off + turned_off * turned_off
         self.is_mean = self._as_mean < SURELY * self._as_instant
+
+
+class TwistCheck:
+    """Whether the twist is the rate of the pose: its sign may be wrong.
+
+    Compares ways by pose and by twist, each the sum of what was gone in the last moments.
+    """
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Compare from now on."""
+        self._ways = [(0.0, 0.0), (0.0, 0.0)]  # [m] by pose and by twist: forward, rim in turning
+        self._opposed = 0
+
+    def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
+        """Add the way from the last odometry to the next, `time` [s] later."""
+        turned = wrapped(motion.heading - last.heading)
+        middle = last.heading + turned / 2
+        forward = (motion.x - last.x) * math.cos(middle) + (motion.y - last.y) * math.sin(middle)
+        gone = (
+            (forward, time * (last.speed + motion.speed) / 2),
+            (half_track * turned, half_track * time * (last.yaw_rate + motion.yaw_rate) / 2),
+        )
+        left = math.exp(-time / CHECK_MEMORY)
+        self._ways = [
+            (left * by_pose + pose, left * by_twist + twist)
+            for (by_pose, by_twist), (pose, twist) in zip(self._ways, gone, strict=True)
+        ]
+
+    def opposed(self, least: float) -> str:
+        """Which part of the twist has another sign than its way, of `least` [m]; else ''."""
+        for name, (pose, twist) in zip(("linear.x", "angular.z"), self._ways, strict=True):
+            if pose * twist < 0 and min(abs(pose), abs(twist)) > least:
+                return f"twist.{name}"
+        return ""
+
+    def trouble(self, largest: float) -> tuple[str, bool]:
+        """What is wrong if they differ by more than `largest` [m], and whether a sign is."""
+        opposed = self.opposed(OPPOSED * largest)
+        self._opposed = self._opposed + 1 if opposed else 0
+        if self._opposed >= IN_A_ROW:
+            return opposed, True
+        differs = max(
+            abs(pose - twist) - SHARE * max(abs(pose), abs(twist)) for pose, twist in self._ways
+        )
+        return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
 
 
 def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from sensor_msgs.msg import FluidPressure, JointState, TimeReference
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from climber_uk.control.build import KINDS, ConstraintChoice, build_controller, settings
+from climber_uk.control.build import KINDS, ControllerChoice, build_controller, settings
 from climber_uk.control.constraints import UDWADIA_KALABA
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
@@ -111,7 +111,7 @@ class UkTorqueController(ManagedNode):
 
     def summary(self) -> str:
         """Climber, constraint set and safe output, for the log."""
-        climber, choice = self.parameters.read(Climber), self.parameters.read(ConstraintChoice)
+        climber, choice = self.parameters.read(Climber), self.parameters.read(ControllerChoice)
         law, adhesion = f"constraints {choice.constraints}", choice.adhesion
         law = law if choice.controller == UDWADIA_KALABA else f"controller {choice.controller}"
         pull = self.attachment.adhesion.force(climber)
@@ -142,7 +142,7 @@ class UkTorqueController(ManagedNode):
     def read_attachment(self) -> Attachment:
         """Adhesion and grip by the present parameters, for the margins."""
         read = self.parameters.read
-        name = read(ConstraintChoice).adhesion
+        name = read(ControllerChoice).adhesion
         return Attachment(adhesion=read(ADHESION[name], f"{name}."), grip=read(Grip))
 
     def on_parameters(self) -> None:
@@ -154,7 +154,7 @@ class UkTorqueController(ManagedNode):
 
     def retune(self) -> None:
         """Give the controller the present parameters, and the measured pressure."""
-        self.controller.sampled_controller.retune(*settings(self.parameters, self.pressure))
+        self.controller.retune(settings(self.parameters, self.pressure))
 
     def publish_parameters(self) -> None:
         """Publish all parameters, so that a bag has all that the torques come from."""
@@ -212,7 +212,8 @@ class UkTorqueController(ManagedNode):
         """Report what has changed, and publish an answer if there is one."""
         controller = self.controller
         mode = controller.mode
-        if mode is not Mode.WAITING:  # a replay takes it for the mode of the next torque
+        # WAITING gives no torque, of which a replay would take it for the mode
+        if mode is not self.last_mode and mode is not Mode.WAITING:
             approaches = mode is Mode.APPROACHING
             self.report(
                 "reference waits", mode.value if approaches else "", controller.detail, False
@@ -259,18 +260,18 @@ class UkTorqueController(ManagedNode):
         if self.force.is_heard:
             self.force.publish(stamp, *command.constraint_force)
         if self.is_due(stamp):
-            force, moment = controller.sampled_controller.disturbance
+            force, moment = controller.estimator.disturbance
             self.disturbance.publish(stamp, force, 0.0, moment)
         if not self.error.is_heard:
             return
-        followed = controller.preview
-        desired = followed.at(controller.active.time_followed(stamp)) if followed else None
+        active = controller.active
+        desired = active.followed.at(active.progress.at(stamp)) if active.followed else None
         if state is not None and desired is not None:
             self.error.publish(stamp, *tracking_error(state.pose, desired))
 
     def add_margins(self, answer: Answer, state: State) -> None:
         """Add the slip margin under an answer's torques, and the tip margin."""
-        climber, attachment = self.controller.sampled_controller.law.climber, self.attachment
+        climber, attachment = self.controller.law.climber, self.attachment
         drive, _ = climber.force_and_moment(answer.torques)
         if answer.command is not None:
             lateral = float(answer.command.constraint_force[1])
@@ -293,29 +294,29 @@ class UkTorqueController(ManagedNode):
 
     def report_delay(self) -> None:
         """Report torques that act much later, or earlier, than `transport_delay` says."""
-        sampled_controller = self.controller.sampled_controller
-        late = sampled_controller.latency.is_far_off
-        delay = sampled_controller.timing.transport_delay + sampled_controller.latency.delay
+        estimator = self.controller.estimator
+        late = estimator.latency.is_far_off
+        delay = estimator.timing.transport_delay + estimator.latency.delay
         hint = f"set transport_delay to {delay:.3f}, or see check_driver --move"
         self.report("delay", "torques do not act when transport_delay says" * late, hint, False)
 
     def values(self) -> dict[str, object]:
         """Values for diagnostics."""
-        sampled_controller = self.controller.sampled_controller
-        force, moment = sampled_controller.disturbance
+        controller, estimator = self.controller, self.controller.estimator
+        force, moment = estimator.disturbance
         return {
             "state": self.life,
-            "mode": self.controller.mode.value,
-            "constraints": self.parameters.read(ConstraintChoice).constraints,
+            "mode": controller.mode.value,
+            "constraints": self.parameters.read(ControllerChoice).constraints,
             "answers": self.answers,
             "saturated answers": self.saturations,
-            "odometry period [s]": sampled_controller.period,
-            "clock offset [s]": self.controller.clock_offset,
-            "reference waits [s]": self.controller.active.waited,
-            "delay learnt [s]": sampled_controller.latency.delay,
+            "odometry period [s]": estimator.period,
+            "clock offset [s]": controller.clock_offset,
+            "reference waits [s]": controller.active.waited,
+            "delay learnt [s]": estimator.latency.delay,
             "disturbance of the drive [N]": force,
             "disturbance of the turn [N m]": moment,
-            "suction pressure [Pa]": sampled_controller.law.climber.suction_pressure,
+            "suction pressure [Pa]": controller.law.climber.suction_pressure,
         }
 
 

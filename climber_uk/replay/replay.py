@@ -150,7 +150,7 @@ class Replay:
 
     def retune(self) -> None:
         """Follow as the parameters, and the measured pressure, say now."""
-        self.controller.sampled_controller.retune(*settings(self.parameters, self.pressure))
+        self.controller.retune(settings(self.parameters, self.pressure))
 
     def keep(self, answer: Answer | None) -> None:
         """Keep the mode and the first answer to an odometry; go on from what was sent."""
@@ -163,4 +163,4 @@ class Replay:
             self.torques[answer.stamp] = answer.torques
             sent = self.recorded.torques.get(answer.stamp)
             if sent is not None:
-                self.controller.sampled_controller.correct(Torques(*sent.tolist()))
+                self.controller.estimator.correct(Torques(*sent.tolist()))

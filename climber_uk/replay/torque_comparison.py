@@ -55,7 +55,7 @@ def compare(recorded: RecordedController, replay: Replay) -> Comparison:
         stamps=np.array(stamps, np.int64),
         recorded=np.array([recorded.torques[stamp] for stamp in stamps]),
         replayed=np.array([replay.torques[stamp] for stamp in stamps]),
-        limit=replay.controller.sampled_controller.law.climber.max_wheel_torque,
+        limit=replay.controller.law.climber.max_wheel_torque,
         answers={"recorded": len(recorded.torques), "replayed": len(replay.torques)},
         modes={"recorded": recorded.modes, "replayed": replay.modes},
         changed=replay.changed,

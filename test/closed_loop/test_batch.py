@@ -6,12 +6,12 @@ import pytest
 from climber_uk.closed_loop.batch import BatchRun, Change, Loops
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.control_law import ControlLaw, ControlOptions
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.timing import Timing
 from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
@@ -69,15 +69,15 @@ CASES = {
 
 
 def alone(case, i, duration):
-    """The same by the scalar `SampledController` and the plant that integrates (30)."""
+    """The same by the scalar `Controller` and the plant that integrates (30)."""
     trajectory, start, true, gains, known, steps, delay = case
     model = replace(BUILT if trajectory is EIGHT else PAPER, **known)
     law = ControlLaw(as_floats(model, i), as_floats(gains, i))
     timing = Timing(transport_delay=0.005 * delay)
-    sampled_controller = SampledController(law, timing=timing, pacing=Pacing(catch_up=0.0))
+    settings = Settings(law, timing=timing, pacing=Pacing(catch_up=0.0))
     link = Link(step=0.005 / steps, delay=0.005 * delay)
     state = State.moving(Motion(*(float(number) for number in part(start, i))))
-    controller = Controller(sampled_controller, Safety(max_jump=1e9))
+    controller = Controller(settings, Safety(max_jump=1e9))
     return simulate(trajectory, state, duration, controller, as_floats(true, i), link)
 
 

@@ -35,7 +35,7 @@ class Climb:
         self.trajectory = plan.build_trajectory(Values(build_trajectory).read)
         given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
         self.controller = build_controller(Values(given), None)
-        climber = replace(self.controller.sampled_controller.law.climber, max_wheel_torque=100.0)
+        climber = replace(self.controller.law.climber, max_wheel_torque=100.0)
         self.plant = Plant(climber, STEP, **({"contact": SCRUB, "slip": True} if scrubs else {}))
         reference = self.trajectory.at(0.0)
         self.state = State(reference.pose + np.array(offset), reference.velocity)

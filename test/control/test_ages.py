@@ -1,6 +1,6 @@
 import pytest
 
-from climber_uk.control.ages import Ages
+from climber_uk.control.timing import Ages
 from climber_uk.mechanics import SECOND
 
 

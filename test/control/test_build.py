@@ -35,7 +35,7 @@ def driven(file, duration, **common):
         stamp = SECOND + round(period * options.control_period * SECOND)
         answer = controller.on_odometry(stamp, stamp, robot.odometer.latest()[1])
         torques.append(answer.torques)
-        disturbances.append(controller.sampled_controller.disturbance)
+        disturbances.append(controller.estimator.disturbance)
         for _ in range(options.steps):
             robot.advance(answer.torques)
         robot.measure()
@@ -58,7 +58,7 @@ def test_without_suction_no_seal_is_driven_against(common):
 def test_plant_and_controller_have_the_same_friction(adhesion):
     values = Values({"adhesion": adhesion})
     plant = plant_parts.parts(values).plant
-    believed = build_controller(values, pressure=None).sampled_controller.law.climber
+    believed = build_controller(values, pressure=None).law.climber
     assert believed.seal_friction == plant.contact.seal_friction(plant.climber)
     assert (believed.seal_friction > 0) is (adhesion == "suction")
 

@@ -7,12 +7,11 @@ from hypothesis import strategies as st
 
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.control_law import ControlLaw
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State, Wrench
@@ -30,10 +29,11 @@ class Loop:
 
     def __init__(self, observer=None, **safety):
         law = ControlLaw(Climber(), Guidance())
-        sampled_controller = SampledController(law, observer or Observer())
         # it is moved by no torque
         guard = replace(UNGUARDED, speed_margin=0.05, yaw_rate_margin=1.0)
-        self.controller = Controller(sampled_controller, Safety(**safety), guard=guard)
+        self.controller = Controller(
+            Settings(law, observer or Observer()), Safety(**safety), guard=guard
+        )
         self.now = SECOND
         self.answer = None
 
@@ -213,9 +213,9 @@ def test_a_single_wrong_odometry_never_reaches_the_wheels(loop):
 
 
 def test_a_fault_forgets_what_was_learnt(loop):
-    loop.controller.sampled_controller.disturbance = Wrench(5.0, 1.0)
+    loop.controller.estimator.disturbance = Wrench(5.0, 1.0)
     loop.tell(moved=(1.0, 0.0, 0.0))
-    np.testing.assert_array_equal(loop.controller.sampled_controller.disturbance, 0)
+    np.testing.assert_array_equal(loop.controller.estimator.disturbance, 0)
 
 
 def test_a_twist_of_zero_while_the_pose_moves_is_a_fault_until_there_is_one():
@@ -261,7 +261,7 @@ def test_hold_carries_the_weight_brakes_and_lets_the_brake_go_when_it_must_have_
     loop = Loop(safe_output="hold")
     loop.plan()
     loop.tell(times=20)
-    weight = loop.controller.sampled_controller.law.climber.weight_along_wall
+    weight = loop.controller.law.climber.weight_along_wall
     heading = loop.state(loop.now).heading
     loop.controller.enable(False)
     loop.tell()
@@ -379,12 +379,11 @@ def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source
 def test_too_little_suction_stops_the_climber_until_it_is_back():
     loop = Loop(least_pressure=2000.0)
     loop.plan()
-    sampled_controller = loop.controller.sampled_controller
-    whole = sampled_controller.law
+    whole = loop.controller.law
     assert loop.tell() is Mode.FOLLOWING
-    sampled_controller.law = replace(whole, climber=replace(whole.climber, suction_pressure=1999.0))
+    loop.controller.law = replace(whole, climber=replace(whole.climber, suction_pressure=1999.0))
     assert loop.tell() is Mode.LOW_PRESSURE
     assert loop.controller.mode.is_fault
     assert is_safe(loop)
-    sampled_controller.law = whole
+    loop.controller.law = whole
     assert loop.tell() is Mode.FOLLOWING

@@ -11,6 +11,7 @@ from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.adhesion import Suction
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Stribeck
 from climber_uk.mechanics.quantities import State
@@ -134,7 +135,7 @@ def test_friction_that_is_not_as_believed_is_no_runaway_however_late_the_loop_an
     link, share_of_friction, share_of_mass, breakaway
 ):
     climb = Climb()
-    controller, believed = climb.controller, climb.controller.sampled_controller.law.climber
+    controller, believed = climb.controller, climb.controller.law.climber
     true = replace(
         believed,
         mass=share_of_mass * believed.mass,
@@ -158,13 +159,10 @@ def test_friction_that_is_not_as_believed_is_no_runaway_however_late_the_loop_an
 
 
 def test_faults_count_for_a_while_only():
-    guard = Guard(GuardOptions(attempts=2, memory=10.0))
-    guard.fault(SECOND)
-    assert not guard.has_given_up
-    guard.fault(20 * SECOND)
-    assert not guard.has_given_up
-    guard.fault(29 * SECOND)
-    assert guard.has_given_up
+    guard, fault = Guard(GuardOptions(attempts=2, memory=10.0), Suction()), (Mode.STALLED, "")
+    for time, is_for_good in ((1, False), (20, False), (29, True)):
+        guard.count(time * SECOND, fault)
+        assert guard.is_for_good is is_for_good
 
 
 def test_torques_stay_within_the_limit_whatever_is_wrong():

@@ -2,8 +2,10 @@
 
 import pytest
 
-from climber_uk.control.guard import Expected, Guard, GuardOptions, Observed, Rates
+from climber_uk.control.estimator import Observed
+from climber_uk.control.guard import Expected, Guard, GuardOptions, Rates
 from climber_uk.control.safety import Mode
+from climber_uk.mechanics.adhesion import Suction
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 
@@ -19,14 +21,14 @@ class Watched:
     """A guard of a climber that always does the same."""
 
     def __init__(self):
-        self.guard = Guard(GuardOptions())
+        self.guard = Guard(GuardOptions(), Suction())
 
     def finds(self, speed=0.1, turn=0.0, torques=(0.0, 0.0), disturbance=(0.0, 0.0), **expected):
         """What it finds in the next period."""
         wanted = Rates(*expected.get("wanted", (0.2, 0.0)))
         expected = Expected(wanted, Rates(0.3, 0.5), expected.get("waits", False))
         motion = Motion(0.0, 0.0, 0.0, 1.0, 0.0, speed, turn)
-        wrench, acted = Wrench(*disturbance), Torques(*torques)
+        wrench, acted = Wrench(*disturbance), [(Torques(*torques), PERIOD)]
         observed = Observed(motion, motion, PERIOD, acted, wrench, REACTION)
         found = self.guard.watch(CLIMBER, observed, expected)
         return found and found[0]

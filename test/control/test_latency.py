@@ -9,12 +9,18 @@ from identification_experiments import SCENARIOS
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.control_law import ControlLaw
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.latency import FASTEST, LONGEST, Latency, Oscillation, Sample
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
+from climber_uk.control.timing import (
+    FASTEST,
+    LONGEST,
+    Latency,
+    Oscillation,
+    Sample,
+    Timing,
+)
 from climber_uk.simulation.sensors import Sensors
 
 BUILT = SCENARIOS["climber.yaml"]
@@ -25,11 +31,11 @@ ENCODERS = Link(sensors=WHEELS, delay=0.005, torque_lag=0.005)
 def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, **timing):
     """Run of climber.yaml's climber, and the controller after it."""
     law = ControlLaw(BUILT.believed, guidance)
-    sampled_controller = SampledController(law, timing=Timing(**timing))
-    controller = Controller(sampled_controller, Safety(), ANYWHERE, UNGUARDED)
+    settings = Settings(law, timing=Timing(**timing))
+    controller = Controller(settings, Safety(), ANYWHERE, UNGUARDED)
     run = simulate(BUILT.trajectory, BUILT.start, duration, controller, climber, link)
     assert controller.mode is Mode.FOLLOWING
-    return run, controller.sampled_controller
+    return run, controller.estimator
 
 
 @pytest.mark.slow
@@ -73,11 +79,11 @@ def test_a_model_that_is_wrong_as_well_ends_in_no_limit_cycle(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [0.03, 0.04])
 def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
-    run, sampled_controller = drive(Link(delay=delay), duration=15.0)
+    run, estimator = drive(Link(delay=delay), duration=15.0)
     assert run.rms() < 5e-3
     assert run.chatter(10.0) < 0.05
     assert (
-        delay - 0.021 < sampled_controller.latency.delay < 1.3 * delay
+        delay - 0.021 < estimator.latency.delay < 1.3 * delay
     )  # what is beyond the margin, at least
     lost, _ = drive(Link(delay=delay), learn_delay=False)
     assert lost.chatter(4.0) > 0.5
@@ -86,11 +92,9 @@ def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
 @pytest.mark.slow
 def test_a_delay_that_is_told_but_not_there_is_unlearnt():
     """Of encoders with a slow period, where it would not be borne."""
-    run, sampled_controller = drive(
-        replace(ENCODERS, period=0.02), transport_delay=0.05, duration=15.0
-    )
+    run, estimator = drive(replace(ENCODERS, period=0.02), transport_delay=0.05, duration=15.0)
     assert run.chatter(10.0) < 0.05
-    assert sampled_controller.latency.delay <= 0
+    assert estimator.latency.delay <= 0
 
 
 @pytest.mark.slow
@@ -98,8 +102,8 @@ def test_a_delay_that_is_told_but_not_there_is_unlearnt():
 def test_friction_that_is_wrong_is_taken_for_no_delay(share):
     coefficient = share * BUILT.believed.seal_friction_coefficient
     true = replace(BUILT.believed, seal_friction_coefficient=coefficient)
-    _, sampled_controller = drive(Link(), climber=true)
-    assert sampled_controller.latency.delay < 2e-3
+    _, estimator = drive(Link(), climber=true)
+    assert estimator.latency.delay < 2e-3
 
 
 def test_an_acceleration_oscillates_once_it_has_gone_to_and_fro_often():

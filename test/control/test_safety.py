@@ -5,10 +5,9 @@ import pytest
 
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.control_law import ControlLaw
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import SPEED_TIME, Mode, Safety
-from climber_uk.control.sampled_controller import SampledController
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
@@ -56,8 +55,7 @@ def test_a_heading_a_turn_away_is_none_and_what_is_not_finite_has_jumped():
 
 def controller(now=SECOND, **safety):
     """A controller that has answered an odometry of 1 s on its path, and the climber's state."""
-    sampled_controller = SampledController(ControlLaw(Climber(), Guidance()))
-    controller = Controller(sampled_controller, Safety(**safety))
+    controller = Controller(Settings(ControlLaw(Climber(), Guidance())), Safety(**safety))
     controller.on_reference(now, sampled(CIRCLE, 10.0))
     start = CIRCLE.at(0.0)
     state = State(start.pose, start.velocity)
@@ -78,10 +76,10 @@ def test_a_fault_forgets_what_was_learnt_of_disturbances(fault, mode):
     following, state = controller()
     faster = State(state.pose, 1.02 * state.velocity)
     following.on_odometry(SECOND, SECOND + 5 * MILLISECOND, faster)
-    assert any(following.sampled_controller.disturbance[:2])
+    assert any(following.estimator.disturbance[:2])
     fault(following)
     assert following.mode is mode
-    assert not any(following.sampled_controller.disturbance)
+    assert not any(following.estimator.disturbance)
 
 
 @pytest.mark.parametrize(("older", "is_ignored"), [(1, True), (99, True), (101, False)])

@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.time_scaling import Pace, Pacing, Progress
+from climber_uk.control.active_reference import Progress
+from climber_uk.control.time_scaling import Pace, Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.reference import Reference
@@ -93,4 +94,4 @@ def test_time_that_is_not_made_up_for_is_waited(progress, lag, waited):
 def test_over_a_gap_the_reference_stands_still(passed, goes_on):
     time = SECOND + round(passed * SECOND)
     later = Progress(SECOND, 0).advanced(time, Pacing())
-    assert later.position == (time if goes_on else SECOND)
+    assert later.at(time) == (time if goes_on else SECOND)

@@ -6,9 +6,9 @@ from identification_experiments import NOISE, SCENARIOS
 
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.control_law import ControlLaw
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.model import Observer
-from climber_uk.control.sampled_controller import SampledController, Timing
+from climber_uk.control.timing import Timing
 from climber_uk.control.twist import mean_twist
 from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.sensors import Sensors
@@ -24,9 +24,9 @@ def encoders(counts):
 def driven(link, twist="auto", duration=4.0):
     law = ControlLaw(BUILT.believed, BUILT.guidance)
     observer, timing = Observer(twist=twist), Timing(learn_delay=False)
-    controller = Controller(SampledController(law, observer, timing))
+    controller = Controller(Settings(law, observer, timing))
     run = simulate(BUILT.trajectory, BUILT.start, duration, controller, BUILT.believed, link)
-    return run, controller.sampled_controller
+    return run, controller.estimator
 
 
 def test_a_mean_twist_leads_from_one_pose_to_the_other():
@@ -53,8 +53,8 @@ def test_a_mean_twist_leads_from_one_pose_to_the_other():
     ids=["truth", "noise", "noise of the twist", "few counts", "many counts"],
 )
 def test_it_is_told_which_twist_odometry_has(period, sensors, is_mean):
-    _, sampled_controller = driven(Link(period=period, sensors=sensors))
-    assert sampled_controller.twist.is_mean is is_mean
+    _, estimator = driven(Link(period=period, sensors=sensors))
+    assert estimator.twist.is_mean is is_mean
 
 
 def test_a_mean_twist_taken_for_one_of_its_stamp_costs_the_margin_of_slow_odometry():

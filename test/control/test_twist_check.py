@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from climber_uk.control.twist_check import TwistCheck
+from climber_uk.control.twist import TwistCheck
 from climber_uk.mechanics.quantities import Motion
 
 TIME = 0.1  # [s] from one odometry to the next

@@ -6,14 +6,14 @@ import pytest
 from climber_uk.closed_loop.simulate import Link, sampled, simulate
 from climber_uk.control.approach import ANYWHERE, Approach
 from climber_uk.control.control_law import ControlLaw, ControlOptions
-from climber_uk.control.controller import Controller
+from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.exact import Exact
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.sampled_controller import SampledController, Timing
 from climber_uk.control.time_scaling import Pacing
+from climber_uk.control.timing import Timing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import State
@@ -58,7 +58,7 @@ def controller(
     **parts,
 ):
     law = ControlLaw(climber, constraints, options)
-    return Controller(SampledController(law, observer, timing, pacing), safety, **parts)
+    return Controller(Settings(law, observer, timing, pacing), safety, **parts)
 
 
 def lap(controlling, climber=CLIMBER, link=IDEAL, duration=10.0):
@@ -97,7 +97,7 @@ def test_friction_that_is_not_known_is_learnt(share):
     ours = controller()
     assert lap(ours, other).rms(after=2.0) < 0.02e-3
     more = other.seal_friction - CLIMBER.seal_friction
-    assert ours.sampled_controller.disturbance[0] == pytest.approx(-more, abs=0.1)
+    assert ours.estimator.disturbance[0] == pytest.approx(-more, abs=0.1)
     assert lap(controller(observer=FIXED_MODEL), other).rms(after=2.0) > 0.1
 
 
@@ -129,7 +129,7 @@ def test_odometry_may_come_at_other_rates(period):
     ours = controller(BUILT, BUILT_GAINS)
     run = simulate(eight, start, 10.0, ours, BUILT, Link(step=0.001, period=period))
     assert run.rms() < 1e-3
-    assert ours.sampled_controller.period == pytest.approx(period, rel=1e-6)
+    assert ours.estimator.period == pytest.approx(period, rel=1e-6)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
@@ -208,10 +208,8 @@ def too_weak(controlling, weak, until):
 
     def climber(time):
         now = weak if 5.0 <= time < until else CLIMBER
-        if controlling.sampled_controller.law.climber is not now:
-            controlling.sampled_controller.law = replace(
-                controlling.sampled_controller.law, climber=now
-            )
+        if controlling.law.climber is not now:
+            controlling.law = replace(controlling.law, climber=now)
         return now
 
     return simulate(PAPER, START, 25.0, controlling, climber)
@@ -251,41 +249,38 @@ def test_gains_change_without_a_jump_of_the_torque():
 
     def steps(change):
         ours = controller(constraints=before)
+        ours.on_reference(SECOND, sampled(PAPER, 1.0))
         offset = State(START.pose + np.array([-0.05, 0.05, 0.1]), START.velocity)
-        sampled_controller = ours.sampled_controller
-        sampled_controller.see(SECOND, offset.motion)
-        preview = sampled(PAPER, 1.0)
-        old = sampled_controller.answer(preview, 0.0).torques
-        change(sampled_controller)
+        old = ours.on_odometry(SECOND, SECOND, offset).torques
+        change(ours)
         stamp = SECOND + 5_000_000
-        sampled_controller.see(stamp, sampled_controller.expected_at(stamp))
-        return np.abs(sampled_controller.answer(preview, 0.0).torques - old).max()
+        expected = State.moving(ours.estimator.expected_at(stamp))
+        return np.abs(ours.on_odometry(stamp, stamp, expected).torques - old).max()
 
-    def retune(sampled_controller):
-        law = replace(sampled_controller.law, constraints=after)
-        sampled_controller.retune(
-            law, sampled_controller.observer, sampled_controller.timing, sampled_controller.pacing
-        )
+    def replace_at_once(ours):
+        ours.law = replace(ours.law, constraints=after)
 
-    def replace_at_once(sampled_controller):
-        sampled_controller.law = replace(sampled_controller.law, constraints=after)
+    def retune_to_them(ours):
+        retune(ours, after)
 
-    assert steps(retune) < steps(lambda _: None) + 0.01 * steps(replace_at_once)
+    assert steps(retune_to_them) < steps(lambda _: None) + 0.01 * steps(replace_at_once)
+
+
+def retune(ours, constraints):
+    estimator = ours.estimator
+    law = replace(ours.law, constraints=constraints)
+    ours.retune(Settings(law, estimator.observer, estimator.timing, ours.active.pacing))
 
 
 def test_changed_gains_act_in_full_half_a_second_later():
-    ours = controller()
-    sampled_controller = ours.sampled_controller
-    sampled_controller.see(SECOND, START.motion)
-    changed = replace(sampled_controller.law, constraints=Guidance(along_track_gain=6.0))
-    sampled_controller.retune(
-        changed, sampled_controller.observer, sampled_controller.timing, sampled_controller.pacing
-    )
-    assert sampled_controller._constraints().along_track_gain == 5.0
-    sampled_controller.stamp += SECOND // 4
-    assert sampled_controller._constraints().along_track_gain == pytest.approx(5.5)
-    sampled_controller.stamp += SECOND // 4
-    assert sampled_controller._constraints() is changed.constraints
+    ours, after = controller(), Guidance(along_track_gain=6.0)
+    ours.estimator.see(SECOND, START.motion)
+    retune(ours, after)
+    assert ours.constraints.along_track_gain == 5.0
+    ours.estimator.stamp += SECOND // 4
+    assert ours.constraints.along_track_gain == pytest.approx(5.5)
+    ours.estimator.stamp += SECOND // 4
+    assert ours.constraints is after
 
 
 @dataclass(frozen=True)
@@ -296,12 +291,11 @@ class Named(Guidance):
 
 
 def test_what_is_no_gain_changes_at_once():
-    ours = controller(constraints=Named()).sampled_controller
-    ours.see(SECOND, START.motion)
-    changed = replace(ours.law, constraints=Named(along_track_gain=6.0, kind="fast"))
-    ours.retune(changed, ours.observer, ours.timing, ours.pacing)
-    ours.stamp += SECOND // 4
-    assert ours._constraints() == Named(along_track_gain=5.5, kind="fast")
+    ours = controller(constraints=Named())
+    ours.estimator.see(SECOND, START.motion)
+    retune(ours, Named(along_track_gain=6.0, kind="fast"))
+    ours.estimator.stamp += SECOND // 4
+    assert ours.constraints == Named(along_track_gain=5.5, kind="fast")
 
 
 def test_a_torque_limit_does_not_wind_the_observer_up():
@@ -309,7 +303,7 @@ def test_a_torque_limit_does_not_wind_the_observer_up():
     ours = controller(weak)
     lap(ours, replace(weak, seal_friction_coefficient=1.0), duration=3.0)
     more = 0.2 * 0.47 * 150
-    assert abs(ours.sampled_controller.disturbance[0]) < 2 * more
+    assert abs(ours.estimator.disturbance[0]) < 2 * more
 
 
 def test_times_without_sense_are_refused():

@@ -1,6 +1,6 @@
 import pytest
 
-from climber_uk.control.torque_history import TorqueHistory
+from climber_uk.control.timing import TorqueHistory
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Torques
 

@@ -1,0 +1,221 @@
+"""Where a climber is and what disturbs it: from odometry, and from the torques that act meanwhile.
+
+One climber, or many in step: arrays (N,) where there are floats. Stamps are integers in
+nanoseconds, on the clock of the odometry.
+"""
+
+from typing import Any, NamedTuple
+
+from climber_uk.control.control_law import ControlInput
+from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, predict
+from climber_uk.control.safety import Safety
+from climber_uk.control.timing import LONGEST_STEP, Latency, Sample, Timing, TorqueHistory
+from climber_uk.control.twist import TwistKind, mean_twist
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.many import chosen
+from climber_uk.mechanics.quantities import Motion, Torques, Wrench
+
+LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
+PERIOD_SMOOTHING = 0.1  # share of a new period in the mean
+
+
+class Observed(NamedTuple):
+    """What an odometry tells, and what acted since the one before."""
+
+    before: Motion
+    after: Motion
+    time: float  # [s] between them
+    acted: list[tuple[Torques, float]]  # torques, and how long each [s]
+    disturbance: Wrench  # as it was known before
+    reaction: float  # [s] in which a torque can answer
+
+    @property
+    def torques(self) -> Torques:
+        """Mean of the torques that acted."""
+        whole = right = left = 0.0
+        for torques, time in self.acted:
+            whole += time
+            right += torques.right * time
+            left += torques.left * time
+        whole = whole or 1.0
+        return Torques(right / whole, left / whole)
+
+
+class Estimator:
+    """Predicts the climber's motion by its model, and corrects it by odometry.
+
+    `see` takes an odometry, `ahead` tells where the climber will be when an answer begins to act,
+    and `sent` is told which that is. What moves further than `safety` allows is not believed: it
+    starts anew from there.
+    """
+
+    def __init__(
+        self,
+        climber: Climber,
+        observer: Observer,
+        timing: Timing,
+        safety: Safety | None = None,
+    ) -> None:
+        self.climber, self.observer, self.timing, self.safety = climber, observer, timing, safety
+        self.period = timing.control_period  # [s] from one odometry to the next
+        self._period_is_measured = False
+        self._sent = TorqueHistory()
+        self.latency, self.twist = Latency(), TwistKind()
+        self._delay = 0.0  # [s] of the last answer
+        self.reset()
+
+    def reset(self) -> None:
+        """Start anew, from an unknown state at an unknown time."""
+        self.restart()
+        self.forget()
+
+    def restart(self) -> None:
+        """Go on at an unknown time, from an unknown state: the clock was set back."""
+        self.stamp = 0  # [ns]
+        self._sent.restart()
+        self.motion: Motion | None = None
+        self._told: Motion | None = None  # the last odometry, as it was told
+
+    def forget(self) -> None:
+        """Forget what was learnt of the disturbance."""
+        self.learnt = DisturbanceEstimate()
+        # whether no limit cut the last answer, so that what came out tells of the disturbance:
+        # a bool; of many climbers an array (N,) of them
+        self._learning: Any = False
+
+    @property
+    def disturbance(self) -> Wrench:
+        """What pushes and turns the climber besides what the model knows."""
+        return Wrench(self.learnt.force, self.learnt.moment)
+
+    @disturbance.setter
+    def disturbance(self, disturbance: Wrench) -> None:
+        self.learnt = DisturbanceEstimate(*disturbance)
+
+    def see(self, stamp: int, motion: Motion) -> Observed | None:
+        """Correct state and disturbance by an odometry of `stamp` [ns], newer than the last.
+
+        Returns what it tells of the time since the last; None if it starts anew.
+        """
+        before, has_twist = self.motion, self.observer.velocity_source == "odometry"
+        if before is not None:
+            acted = self._sent.between(self.stamp, stamp)
+            expected = self._rolled(before, acted)
+            if not has_twist:
+                motion = motion._replace(speed=expected.speed, yaw_rate=expected.yaw_rate)
+            safety = self.safety
+            if safety is None or not safety.has_jumped(expected, motion, self.climber.half_track):
+                return self._correct(stamp, before, acted, expected, motion)
+            self.reset()
+        self.stamp = stamp
+        self.motion = motion if has_twist else motion._replace(speed=0.0, yaw_rate=0.0)
+        return None
+
+    def ahead(self, age: float) -> ControlInput:
+        """What an answer to the last odometry, given at its `age` [s], meets when it acts."""
+        begins = self.begin(age)
+        motion = self.expected_at(begins)
+        return ControlInput(motion, self._sent.last, self.disturbance, self.period, begins)
+
+    def begin(self, age: float) -> int:
+        """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
+        timing = self.timing
+        delay = timing.transport_delay + (age if timing.measure_delay else 0.0)
+        delay += self.latency.delay if timing.learn_delay else 0.0
+        self._delay = delay
+        return self._sent.begin(self.stamp + round(delay * SECOND))
+
+    def sent(self, begins: int, torques: Torques, learning: Any = False) -> None:
+        """Torques were sent, which act from `begins` [ns] on.
+
+        `learning` is whether they are what was wanted: if a limit cut them, what comes out tells
+        nothing of the disturbance.
+        """
+        self._learning = learning
+        self._sent.add(begins, torques)
+        # without odometry, too, that of long ago is not needed
+        self._sent.forget_before(max(self.stamp, begins - LONG_AGO))
+
+    def correct(self, torques: Torques) -> None:
+        """Believe that other torques were sent than it was told last."""
+        self._sent.correct(torques)
+
+    def expected_at(self, stamp: int) -> Motion:
+        """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
+        assert self.motion is not None
+        if stamp == self.stamp:
+            return self.motion
+        return self._rolled(self.motion, self._sent.between(self.stamp, stamp))
+
+    def _rolled(self, motion: Motion, acting: list[tuple[Torques, float]]) -> Motion:
+        """Motion after torques have acted, each for some time [s]."""
+        climber, learnt = self.climber, self.learnt
+        r_drive, r_turn = learnt.force, learnt.moment
+        for torques, time in acting:
+            drive, turn = climber.wrench(*torques)
+            motion = predict(climber, motion, drive + r_drive, turn + r_turn, time)
+        return motion
+
+    def _correct(
+        self,
+        stamp: int,
+        before: Motion,
+        acted: list[tuple[Torques, float]],
+        expected: Motion,
+        motion: Motion,
+    ) -> Observed:
+        """Correct what is `expected` at `stamp` [ns] by the `motion` that was told."""
+        time = (stamp - self.stamp) / SECOND
+        reaction = self._delay + self.period / 2
+        observed = Observed(before, motion, time, acted, self.disturbance, reaction)
+        share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
+        self.period += share * (time - self.period)
+        self._period_is_measured = True
+        is_known = self._sent.are_known_since(self.stamp)
+        shares = self.observer.shares(time, self._delay)
+        if self.observer.velocity_source == "odometry" and isinstance(motion.x, float):
+            motion = self._at_its_stamp(before, expected, motion, time)
+            if self.timing.learn_delay and is_known:
+                self._learn_delay(acted[-1][0], expected, motion, time, shares)
+        self.motion, learnt = self.observer.corrected(
+            self.climber, self.learnt, expected, motion, time, shares
+        )
+        self.stamp = stamp
+        if is_known:
+            is_learnt = self._learning  # of many, each learns or holds what it has learnt
+            self.learnt = (
+                learnt if is_learnt is True else chosen(is_learnt, learnt, self.learnt.held)
+            )
+        return observed
+
+    def _at_its_stamp(self, before: Motion, expected: Motion, found: Motion, time: float) -> Motion:
+        """Motion whose speeds are those of its stamp, not the mean of the `time` [s] before."""
+        kind = self.observer.twist
+        if kind == "auto" and self._told is not None:
+            self.twist.learn(self._told, found, time)
+        self._told = found
+        if kind == "instantaneous" or (kind == "auto" and not self.twist.is_mean):
+            return found
+        speed, rate = mean_twist(before, expected, time)
+        return found._replace(
+            speed=found.speed + expected.speed - speed,
+            yaw_rate=found.yaw_rate + expected.yaw_rate - rate,
+        )
+
+    def _learn_delay(
+        self,
+        acting: Torques,
+        expected: Motion,
+        found: Motion,
+        time: float,
+        shares: tuple[Any, Any],
+    ) -> None:
+        """Learn how much later than told torques act; `shares` are the observer's."""
+        climber = self.climber
+        drive, turn = climber.wrench(*acting)
+        lever = climber.half_track
+        accelerations = drive / climber.mass, lever * turn / climber.yaw_inertia
+        errors = found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)
+        sample = Sample(accelerations, errors, time, abs(found.speed) > SLOW)
+        self.latency.learn(sample, shares, self.timing.transport_delay)

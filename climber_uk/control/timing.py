@@ -1,0 +1,231 @@
+"""When torques act: as told (`Timing`), as the clock shows (`Ages`), and as is learnt (`Latency`).
+
+Which act when, of those that were sent, is in a `TorqueHistory`. Stamps and times of clocks are
+integers in nanoseconds.
+"""
+
+from collections import deque
+from typing import Any, NamedTuple
+
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.quantities import Torques
+from climber_uk.parameters.declaration import parameter, parameters
+
+LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
+WINDOW = SECOND // 2  # [ns] in which one odometry at least is not late
+NONE = Torques(0.0, 0.0)
+LONGEST = 0.05  # [s] that is taken for a delay
+FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
+FASTEST = 0.05  # [s/s] by which it changes
+MEMORY = 1.0  # T_f [s]
+LEAST = 0.1  # S₀ [m²/s²] of changes of acceleration
+SWING = 0.3  # [m/s²] by which an acceleration has to go back to count as a reversal
+OSCILLATES = 4.0  # reversals in the memory
+STEADY: tuple[tuple[float, float], ...] = (0.0, 0.0), (0.0, 0.0)
+
+
+@parameters(slots=True)
+class Timing:
+    """When a torque acts: from its arrival at the wheels to that of the next.
+
+    It arrives `transport_delay` and the odometry's age, the clock minus its stamp, after the stamp.
+    """
+
+    control_period: float = parameter(
+        0.005, "s", "from an odometry to the next, until it is measured", above=0, at_most=1
+    )
+    transport_delay: float = parameter(
+        0.0,
+        "s",
+        "what the clock does not show: before the odometry's stamp and on the way to the wheels",
+        at_least=0,
+        at_most=LONGEST_STEP,
+        runtime=True,
+    )
+    max_latency: float = parameter(
+        0.02,
+        "s",
+        "age of an odometry that is believed: what is always older is the clocks' offset",
+        at_least=0,
+        at_most=LONGEST_STEP,
+    )
+    measure_delay: bool = parameter(
+        True, "", "add the odometry's age to the transport delay", runtime=True
+    )
+
+    learn_delay: bool = parameter(
+        True, "", "learn what is missing in the transport delay while it runs", runtime=True
+    )
+
+
+class Ages:
+    """Ages of the last half to whole second: the least of them is no accident."""
+
+    def __init__(self) -> None:
+        self._begin = 0  # [ns] of the window
+        self._least: float | None = None
+        self._least_before: float | None = None
+
+    def add(self, now: int, age: float) -> None:
+        """Add the age [s] of an odometry that arrived at `now` [ns]."""
+        if not 0 <= now - self._begin < WINDOW:
+            self._begin, self._least_before, self._least = now, self._least, None
+        self._least = age if self._least is None else min(self._least, age)
+
+    @property
+    def least(self) -> float:
+        """Least age [s]; below 0 where stamps are ahead of the clock."""
+        least, before = self._least, self._least_before
+        if least is None:
+            return 0.0 if before is None else before
+        return least if before is None else min(least, before)
+
+    def offset(self, max_latency: float) -> float:
+        """Offset of the odometry's clock [s]: that part of its age that no latency explains."""
+        least = self.least
+        return 0.0 if abs(least) <= max_latency else least
+
+    def latency(self, age: float, max_latency: float) -> float:
+        """Latency [s] of an odometry of some age [s], without the offset."""
+        return min(max(age - self.offset(max_latency), 0.0), max_latency)
+
+
+class TorqueHistory:
+    """Torques in the order in which they act; none before the first."""
+
+    def __init__(self) -> None:
+        self._begun: deque[tuple[int, Torques]] = deque()  # [ns] from when, torques
+        self.last = NONE  # the torques that will act in the end
+
+    def begin(self, wanted: int) -> int:
+        """When torques would begin to act [ns]: as wanted, but none overtakes the last ones."""
+        return max(wanted, self._begun[-1][0]) if self._begun else wanted
+
+    def add(self, begins: int, torques: Torques) -> None:
+        """Torques that act from `begins` [ns] on."""
+        self._begun.append((begins, torques))
+        self.last = torques
+
+    def correct(self, torques: Torques) -> None:
+        """Have other torques acting in the place of the last ones."""
+        begins, _ = self._begun.pop()
+        self.add(begins, torques)
+
+    def forget_before(self, time: int) -> None:
+        """Keep only what matters from `time` [ns] on."""
+        while len(self._begun) > 1 and self._begun[1][0] <= time:
+            self._begun.popleft()
+
+    def restart(self) -> None:
+        """Times of before mean nothing any more; the last torques have acted for ever."""
+        if self._begun:
+            self._begun = deque([(0, self.last)])
+
+    def are_known_since(self, time: int) -> bool:
+        """Whether it is known what acts from `time` [ns] on."""
+        return bool(self._begun) and self._begun[0][0] <= time
+
+    def between(self, start: int, end: int) -> list[tuple[Torques, float]]:
+        """Torques that act from `start` to `end` [ns], each with how long it does [s]."""
+        torques, spans = NONE, []
+        for begins, following in self._begun:
+            if begins >= end:
+                break
+            if begins > start:
+                spans.append((torques, (begins - start) / SECOND))
+                start = begins
+            torques = following
+        if end > start:
+            spans.append((torques, (end - start) / SECOND))
+        return spans
+
+
+class Oscillation:
+    """How often an acceleration has gone to and fro of late."""
+
+    def __init__(self) -> None:
+        self.reversals = 0.0
+        self._way, self._extreme = 1.0, 0.0
+
+    def add(self, acceleration: float, left: float) -> bool:
+        """Whether it oscillates, with an `acceleration` [m/s²]; `left` of what was before."""
+        back = self._way * (self._extreme - acceleration)
+        self.reversals *= left
+        if back < 0 or back > SWING:
+            self._extreme = acceleration
+        if back > SWING:
+            self._way = -self._way
+            self.reversals += 1.0
+        return self.reversals > OSCILLATES
+
+
+class Sample(NamedTuple):
+    """What a period tells, of the drive and of the turn; lengths of a turn are at the wheels."""
+
+    accelerations: tuple[float, float]  # a [m/s²]
+    errors: tuple[float, float]  # ε [m/s]
+    time: float  # [s]
+    slides: bool = True  # whether it moves forwards or back
+
+
+class Latency:
+    """How much later than told a torque acts: learnt where the loop begins to oscillate for it.
+
+    Where a torque acts δ later than the model believes, speeds are off by ε = -δ (a - a₀), with a
+    and a₀ the accelerations by the torques that act at the end and at the begin of a period, so far
+    as the disturbance observer does not put that down to a disturbance: φ = ∂ε/∂δ goes through the
+    observer as ε does. δ of drive and turn together follows by recursive least squares that forget
+    (Ljung & Söderström 1983, 3.6):
+
+        S ← S (1 - T / T_f) + φ²,    δ ← δ - ε φ / (S + S₀)
+
+    A single disturbance looks like a delay, too, while the observer learns it. So only what goes to
+    and fro counts. A motor's lag is taken for a delay.
+    """
+
+    def __init__(self) -> None:
+        self.delay = 0.0  # [s]
+        self.oscillations = Oscillation(), Oscillation()
+        self._far_off = False
+        self._energy = 0.0  # S
+        self._before = 0.0, 0.0  # [m/s²]
+        # ∂/∂δ of the observer's disturbance, as accelerations, and of its rates
+        self._slopes = STEADY
+
+    @property
+    def is_far_off(self) -> bool:
+        """Whether it is more than the loop bears without learning; until it is less than half."""
+        self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
+        return self._far_off
+
+    def learn(self, sample: Sample, shares: tuple[Any, Any], told: float = 0.0) -> None:
+        """Take in a period; `shares` are those of the observer.
+
+        A delay that is `told` [s] may be too long: what is learnt may be as much less than 0.
+        """
+        accelerations, _, time, slides = sample
+        drive, turn = self.oscillations
+        left = max(0.0, 1.0 - time / MEMORY)
+        # at rest friction goes to and fro, and holds
+        drives = slides and drive.add(accelerations[0], left)
+        turns = turn.add(accelerations[1], left)
+        self._energy *= left
+        if drives or turns:
+            self._learn(sample, (drives, turns), shares, told)
+        else:
+            self._slopes = STEADY
+        self._before = accelerations
+
+    def _learn(
+        self, sample: Sample, oscillates: tuple[bool, bool], shares: tuple[Any, Any], told: float
+    ) -> None:
+        (new, newer), time, product, slopes = shares, sample.time, 0.0, []
+        for i, (slope, rate) in enumerate(self._slopes):
+            phi = sample.accelerations[i] - self._before[i] - time * slope
+            product += sample.errors[i] * phi * oscillates[i]
+            self._energy += phi * phi * oscillates[i]
+            slopes.append((slope + time * rate + new * phi / time, rate + newer * phi / time**2))
+        self._slopes = tuple(slopes)
+        most = FASTEST * time
+        change = min(max(-product / (self._energy + LEAST), -most), most)
+        self.delay = min(max(self.delay + change, -told), LONGEST)
