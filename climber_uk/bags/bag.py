@@ -30,7 +30,7 @@ class Bag:
     """An open bag: its topics, its messages, and what of it could not be read."""
 
     path: Path
-    files: list[StorageFile]
+    files: list[StorageFile] = field(default_factory=list)  # in the order of their first log times
     losses: list[str] = field(default_factory=list)  # in words, more while messages are read
 
     def __post_init__(self) -> None:
@@ -59,16 +59,6 @@ class Bag:
         is_split = all(end <= start for (_, end), (start, _) in pairwise(ends))
         yield from chain(*parts) if is_split else merge(*parts, key=lambda message: message[1])
 
-    def raw_messages(
-        self, topics: Collection[str], by_publishing: bool = False
-    ) -> Iterator[tuple[Connection, int, bytes]]:
-        """Yield connection, log time [ns] and serialised message in the order of the log times.
-
-        `by_publishing` gives the time of publishing in place of the log time.
-        """
-        for connection, log_time, publish_time, data in self.recorded(topics):
-            yield connection, publish_time if by_publishing else log_time, data
-
     def messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, int, Any]]:
         """Yield connection, log time, publishing time (0: not told) [ns] and message."""
         for connection, log_time, publish_time, data in self.recorded(topics):
@@ -82,8 +72,11 @@ class Bag:
             yield connection, log_time, publish_time, message
 
     def lose(self, what: str) -> None:
-        """Note something that could not be read, once."""
-        tell_loss(self.losses, what)
+        """Note in one line something that could not be read: once, and not too many of them."""
+        what = one_line(what)
+        if what not in self.losses and len(self.losses) <= MOST_LOSSES:
+            too_many = len(self.losses) == MOST_LOSSES
+            self.losses.append("and more, which are not told" if too_many else what)
 
     def lose_message(self, topic: str, why: str) -> None:
         """Note that a message could not be read, once by topic."""
@@ -137,36 +130,24 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"there is no bag {one_line(str(path))}")
-    losses: list[str] = []
-    failures: list[str] = []
-
-    def lose(what: str) -> None:
-        tell_loss(losses, what)
-
+    bag, failures = Bag(path), []
     with ExitStack() as stack:
         scratch = Path(stack.enter_context(TemporaryDirectory(prefix="climber_bag_")))
-        files: list[StorageFile] = []
-        for number, file in enumerate(storage_files(path, lose)):
+        for number, file in enumerate(storage_files(path, bag.lose)):
             own = scratch / str(number)
             own.mkdir()
             try:
-                files.append(stack.enter_context(closing(open_file(file, own, lose))))
+                opened = open_file(file, own, bag.lose)
+                bag.files.append(stack.enter_context(closing(opened)))
             except (ValueError, OSError) as error:
-                tell_loss(failures, f"{file.name}: {_said(error)}")
-        if not files:
+                failures.append(f"{file.name}: {_said(error)}")
+        if not bag.files:
             why = "; ".join(failures) or "neither metadata.yaml nor an .mcap or .db3 file in it"
             raise ValueError(one_line(f"{path} is no readable bag: {why}{other_files(path)}"))
         for failure in failures:
-            lose(f"{failure}: not read")
-        yield Bag(path, sorted(files, key=attrgetter("start")), losses)
-
-
-def tell_loss(losses: list[str], what: str) -> None:
-    """Add a loss, unless it was told, or too many were."""
-    what = one_line(what)
-    if what in losses or len(losses) > MOST_LOSSES:
-        return
-    losses.append(what if len(losses) < MOST_LOSSES else "and more, which are not told")
+            bag.lose(f"{failure}: not read")
+        bag.files.sort(key=attrgetter("start"))
+        yield bag
 
 
 def read_messages(

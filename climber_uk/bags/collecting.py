@@ -4,7 +4,7 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from operator import itemgetter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from tqdm import tqdm
@@ -14,28 +14,22 @@ from climber_uk.bags.bag import Bag
 from climber_uk.bags.batches import Batch, read_batches
 from climber_uk.bags.events import Event
 from climber_uk.bags.joints import Joints
-from climber_uk.bags.recorded import FilePart, in_order
+from climber_uk.bags.recorded import Samples, in_order
 from climber_uk.bags.reference import Points
-from climber_uk.bags.restarts import (
-    are_copies,
-    are_many,
-    are_strays,
-    disagreement,
-    windows,
-)
+from climber_uk.bags.restarts import are_copies, are_many, are_strays, disagreement, windows
 from climber_uk.bags.taking import STRAY, TAKEN
 from climber_uk.bags.topics import KNOWN, Topics
-from climber_uk.mechanics import Array, Stamps
 from climber_uk.messages import topics
 
-PATIENCE = 2.0  # [s] after which progress is told
+T = TypeVar("T", Samples, Joints, Points)
+PROGRESS_DELAY = 2.0  # [s] of reading, after which progress is shown
 
 
 class Collected:
     """What was read so far of one climber."""
 
     def __init__(self) -> None:
-        self.parts: dict[str, list[FilePart]] = defaultdict(list)
+        self.samples: dict[str, list[Samples]] = defaultdict(list)
         self.joints: dict[str, list[Joints]] = defaultdict(list)
         self.reference: list[Points] = []
         self.parameters: list[tuple[int, dict[str, Any]]] = []  # with the log time [ns]
@@ -57,7 +51,7 @@ class Collected:
             frame = batch.strings["header.frame_id"]
             if frame != (first := self.frames.setdefault(name, frame)):
                 raise ValueError(f"frame_id={frame!r}, others have {first!r}")
-            self.parts[name].append((batch.stamps, batch.log_times, *taken))
+            self.samples[name].append(Samples(batch.stamps, batch.log_times, *taken))
 
     @property
     def first_parameters(self) -> dict[str, Any]:
@@ -66,58 +60,50 @@ class Collected:
 
     def runs(self) -> list["Collected"]:
         """What belongs to each run: they differ where the odometry's time starts again."""
-        found = windows(*self._fit_odometry()[:2])
+        odometry = self._fit_odometry()
+        found = windows(odometry.stamps, odometry.arrivals)
         return [self.within(*window) for window in found] if len(found) > 1 else [self]
 
     def leave_out_strays(self) -> None:
         """Mark odometry whose stamp cannot be as unfit, unless there is so much of it."""
-        if parts := self.parts[topics.ODOMETRY]:
-            stamps, arrivals, values, faults = in_order(parts)
-            fit = np.flatnonzero(faults == 0)
-            if not are_many(strays := are_strays(stamps[fit])):
-                faults[fit[strays]] = STRAY
-            self.parts[topics.ODOMETRY] = [(stamps, arrivals, values, faults)]
+        if parts := self.samples[topics.ODOMETRY]:
+            samples = in_order(parts)
+            fit = np.flatnonzero(samples.faults == 0)
+            if not are_many(strays := are_strays(samples.stamps[fit])):
+                samples.faults[fit[strays]] = STRAY
+            self.samples[topics.ODOMETRY] = [samples]
 
     @property
     def disagreement(self) -> str:
         """Why the odometry is not of one run, in words; empty if it may be."""
-        stamps, _, values = self._fit_odometry()
-        return disagreement(stamps, values[:, :2])
+        odometry = self._fit_odometry()
+        return disagreement(odometry.stamps, odometry.values[:, :2])
 
     @property
     def contradictions(self) -> int:
         """How many messages of odometry have the stamp of another, but not its values."""
-        stamps = self._fit_odometry()[0]
+        stamps = self._fit_odometry().stamps
         return len(stamps) - len(np.unique(stamps))
 
-    def _fit_odometry(self) -> tuple[Stamps, Stamps, Array]:
-        """Stamps, log times and values of what is fit, each message once."""
-        stamps, arrivals, values, faults = in_order(self.parts[topics.ODOMETRY])
-        fit = (faults == 0) & ~are_copies(stamps, values)
-        return stamps[fit], arrivals[fit], values[fit]
+    def _fit_odometry(self) -> Samples:
+        """What is fit, each message once, in the order of log times."""
+        odometry = in_order(self.samples[topics.ODOMETRY])
+        return odometry.where(~are_copies(odometry.stamps, odometry.values)).fit
 
     def within(self, begin: float, end: float) -> "Collected":
         """What was recorded between two log times [ns], with the parameters known by the end."""
-        chosen = Collected()
-        chosen.begin, chosen.end = begin, end
-        chosen.frames, chosen.lost_previews = self.frames, self.lost_previews
-        for name, parts in self.parts.items():
-            for part in parts:
-                stamps, arrivals, values, faults = part
-                mask = (begin <= arrivals) & (arrivals < end)
-                chosen.parts[name].append(
-                    (stamps[mask], arrivals[mask], values[mask], faults[mask])
-                )
-        for name, joints in self.joints.items():
-            chosen.joints[name] = [
-                part.where((begin <= part.arrivals) & (part.arrivals < end)) for part in joints
-            ]
-        chosen.reference = [
-            points.where((begin <= points.arrivals) & (points.arrivals < end))
-            for points in self.reference
-        ]
-        chosen.parameters = [told for told in self.parameters if told[0] < end]
-        return chosen
+
+        def chosen(parts: list[T]) -> list[T]:
+            return [p.where((begin <= p.arrivals) & (p.arrivals < end)) for p in parts]
+
+        run = Collected()
+        run.begin, run.end = begin, end
+        run.frames, run.lost_previews = self.frames, self.lost_previews
+        run.samples |= {name: chosen(parts) for name, parts in self.samples.items()}
+        run.joints |= {name: chosen(parts) for name, parts in self.joints.items()}
+        run.reference = chosen(self.reference)
+        run.parameters = [told for told in self.parameters if told[0] < end]
+        return run
 
 
 def collect(
@@ -147,7 +133,7 @@ def collect(
     wanted = [topic for topic in bag.types if topic in takers or topic in texts]
     told: list[Event] = []
     with tqdm(
-        total=bag.count(wanted), unit=" messages", delay=PATIENCE, leave=False, disable=None
+        total=bag.count(wanted), unit=" messages", delay=PROGRESS_DELAY, leave=False, disable=None
     ) as progress:
         for topic, batch in read_batches(bag, wanted, by_publishing):
             progress.update(len(batch))

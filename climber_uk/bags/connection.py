@@ -1,6 +1,7 @@
 """What the storage files of bags have in common."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -40,10 +41,22 @@ class StorageFile(Protocol):
         """Close the file."""
 
 
-def tell_encodings(name: str, others: dict[str, list[str]], lose: Lose) -> None:
-    """Say which topics of a file are left out, by their encodings."""
+def readable(found: Iterable[tuple[Connection, str]], lose: Lose) -> Iterator[Connection]:
+    """Yield those of a file's topics, found with their encodings, that can be read; say which not.
+
+    `lose` is told of the others: a name that a terminal might obey, another encoding than CDR.
+    """
+    others: dict[str, list[str]] = defaultdict(list)
+    for connection, encoding in found:
+        topic = connection.topic
+        if not (type(connection.id) is int and is_name(topic) and is_name(connection.msgtype)):
+            lose(f"a topic that cannot be called so is left out: {topic!r:.60}")
+        elif encoding != CDR:
+            others[encoding].append(topic)
+        else:
+            yield connection
     for encoding, topics in others.items():
-        lose(f"{name}: {listed(topics)} left out: encoded as {encoding or 'nothing'}, not {CDR}")
+        lose(f"{listed(topics)} left out: encoded as {encoding or 'nothing'}, not {CDR}")
 
 
 def listed(names: Sequence[str]) -> str:

@@ -45,8 +45,6 @@ class Record(NamedTuple):
 class ChunkHead(NamedTuple):
     """What a chunk tells of itself, and where its messages are."""
 
-    start: int  # log times [ns]
-    end: int
     size: int  # [bytes] unpacked
     crc: int
     compression: str
@@ -98,7 +96,7 @@ class RecordFile:
         head = self.read(record.start, record.start + CHUNK_HEAD.size + 16)
         if record.opcode != Opcode.CHUNK or len(head) < CHUNK_HEAD.size + 8:
             return None
-        start, end, size, crc, length = CHUNK_HEAD.unpack_from(head)
+        _, _, size, crc, length = CHUNK_HEAD.unpack_from(head)
         behind = CHUNK_HEAD.size + length + 8
         if length > 4 or record.start + behind > record.end:
             return None
@@ -106,7 +104,7 @@ class RecordFile:
         packed = record.start + behind, record.end
         if int.from_bytes(head[behind - 8 : behind], "little") != packed[1] - packed[0]:
             return None
-        return ChunkHead(start, end, size, crc, compression.decode("ascii", "replace"), packed)
+        return ChunkHead(size, crc, compression.decode("ascii", "replace"), packed)
 
     def unpacked(self, place: Record, allowance: Allowance) -> bytes:
         """Messages of a chunk, or of a row of them; raises `ValueError` if they cannot be read."""

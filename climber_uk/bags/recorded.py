@@ -1,8 +1,8 @@
-"""The messages of a topic as arrays, by their stamps."""
+"""The messages of a topic as arrays: as they were recorded, and in the order of their stamps."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,23 @@ from numpy.typing import NDArray
 from climber_uk.bags.taking import FAULTS, WIDEST, Faults
 from climber_uk.mechanics import Array, Stamps
 
-# stamps (n,) and log times (n,) [ns], values (n, k), and what is wrong with them
-FilePart = tuple[Stamps, Stamps, Array, Faults]
+
+class Samples(NamedTuple):
+    """n messages of one topic, fit or not."""
+
+    stamps: Stamps  # (n,) [ns]
+    arrivals: Stamps  # (n,) log times [ns]
+    values: Array  # (n, k)
+    faults: Faults  # (n,) what is wrong with each, as a place in `taking.FAULTS`
+
+    def where(self, chosen: Any) -> "Samples":
+        """Those that a mask, or places (m,), choose."""
+        return Samples(*(array[chosen] for array in self))
+
+    @property
+    def fit(self) -> "Samples":
+        """Those with nothing wrong."""
+        return self.where(self.faults == 0)
 
 
 @dataclass(frozen=True)
@@ -26,19 +41,18 @@ class TimeSeries:
     late: int = 0  # recorded after one with a later stamp
 
     @classmethod
-    def of(cls, parts: Collection[FilePart]) -> "TimeSeries":
-        """Messages in parts; of those sent twice the first counts."""
+    def of(cls, parts: Collection[Samples]) -> "TimeSeries":
+        """The fit messages of some parts; of those with one stamp the first recorded counts."""
         if not parts:
             return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, WIDEST)))
-        stamps, arrivals, values, faults = in_order(parts)
-        fit = faults == 0
-        counts = np.bincount(faults, minlength=len(FAULTS)).tolist()
+        samples = in_order(parts)
+        counts = np.bincount(samples.faults, minlength=len(FAULTS)).tolist()
         unfit = {why: n for why, n in zip(FAULTS, counts, strict=True) if why and n}
-        stamps, arrivals, values = stamps[fit], arrivals[fit], values[fit]
-        late = int(np.sum(np.diff(stamps) < 0))
-        found, first = np.unique(stamps, return_index=True)
-        repeated = len(stamps) - len(found)
-        return cls(found, arrivals[first], values[first], unfit, repeated, late)
+        samples = samples.fit
+        late = int(np.sum(np.diff(samples.stamps) < 0))
+        stamps, first = np.unique(samples.stamps, return_index=True)
+        repeated = len(samples.stamps) - len(stamps)
+        return cls(stamps, samples.arrivals[first], samples.values[first], unfit, repeated, late)
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -57,8 +71,7 @@ class TimeSeries:
         return self.where((self.stamps >= first) & (self.stamps <= last))
 
 
-def in_order(parts: Collection[FilePart]) -> FilePart:
-    """All messages as one part, in the order in which they were recorded."""
-    stamps, arrivals, values, faults = (np.concatenate(part) for part in zip(*parts, strict=True))
-    order = np.argsort(arrivals, kind="stable")
-    return stamps[order], arrivals[order], values[order], faults[order]
+def in_order(parts: Collection[Samples]) -> Samples:
+    """All messages of some parts, of which there is one at least, in the order of log times."""
+    joined = Samples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    return joined.where(np.argsort(joined.arrivals, kind="stable"))

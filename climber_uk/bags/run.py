@@ -146,15 +146,10 @@ class RecordedRun:
         return np.isin(self.odometry.stamps, self.commands.stamps)
 
     @property
-    def hold(self) -> TimeSeries:
-        """(k,) slip margin, tip margin, load on the wheels [N]: the plant's, else estimates."""
+    def margins(self) -> TimeSeries:
+        """(k, 3) slip margin, tip margin, load on the wheels [N]: the plant's, else estimates."""
         told = [self.recorded[name] for name in topics.MARGINS]
         return next((recorded for recorded in told if len(recorded)), told[0])
-
-    @property
-    def margins(self) -> Array:
-        """(k, 2) slip margin, tip margin."""
-        return self.hold.values[:, :2]
 
     @cached_property
     def latency(self) -> Array:

@@ -1,6 +1,6 @@
 """Runs of one climber from what a bag tells of it, and what of that is of no use, in words."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
@@ -12,7 +12,7 @@ from climber_uk.bags import events
 from climber_uk.bags.bag import Bag, open_bag
 from climber_uk.bags.collecting import Collected, collect
 from climber_uk.bags.events import Event
-from climber_uk.bags.joints import Joints, of_both, of_one, wheel_names
+from climber_uk.bags.joints import Joints, commanded_torques, rates_and_torques
 from climber_uk.bags.recorded import TimeSeries
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
@@ -57,13 +57,13 @@ class RunReader:
 
     def runs(self, found: Collected, told: Collection[Event]) -> list[RecordedRun]:
         """All runs; raises `NoRunError`."""
-        if not found.parts[topics.ODOMETRY]:
+        if not found.samples[topics.ODOMETRY]:
             raise NoRunError(f"no odometry on {self.topic(topics.ODOMETRY)}")
         if found.lost_previews:
             topic = self.topic(topics.REFERENCE)
             self.bag.lose(f"{topic}: {found.lost_previews} messages left out: a point is unfit")
         self.check_truth(found)
-        parts = self.parts(found)
+        parts = self.split(found)
         runs, reasons = [], []
         for number, part in enumerate(parts, start=1):
             try:
@@ -77,7 +77,7 @@ class RunReader:
             self.bag.lose(reason)
         return runs
 
-    def parts(self, found: Collected) -> list[Collected]:
+    def split(self, found: Collected) -> list[Collected]:
         """What belongs to each run; says if there are several."""
         parts = found.runs()
         if len(parts) > 1:
@@ -87,7 +87,7 @@ class RunReader:
 
     def check_one_run(self, found: Collected) -> None:
         """Raise `ValueError` if there are several runs, one after the other or at once."""
-        if not found.parts[topics.ODOMETRY]:
+        if not found.samples[topics.ODOMETRY]:
             return
         path, topic, count = self.bag.path, self.topic(topics.ODOMETRY), len(found.runs())
         if count > 1:
@@ -100,7 +100,7 @@ class RunReader:
         """Do not use poses of which it is not known where they are to the odometry's."""
         here, there = (found.frames.get(name, "") for name in (topics.ODOMETRY, topics.TRUTH))
         if here and there and here != there:
-            del found.parts[topics.TRUTH]
+            del found.samples[topics.TRUTH]
             topic = self.topic(topics.TRUTH)
             self.bag.lose(f"{topic}: not used, frame_id={there!r} is not the odometry's, {here!r}")
 
@@ -164,7 +164,7 @@ class RunReader:
 
         The controller tells 20 times a second; between, its reference went on evenly.
         """
-        told = TimeSeries.of(found.parts[topics.REFERENCE_TIME])
+        told = TimeSeries.of(found.samples[topics.REFERENCE_TIME])
         if len(told):
             begin = told.stamps[0]
             behind = np.interp(stamps - begin, told.stamps - begin, told.values[:, 0])
@@ -173,7 +173,7 @@ class RunReader:
 
     def recorded(self, found: Collected, name: str) -> TimeSeries:
         """The messages of a topic; says how many are left out, and why."""
-        return self.judged(TimeSeries.of(found.parts[name]), name)
+        return self.judged(TimeSeries.of(found.samples[name]), name)
 
     def judged(self, recorded: TimeSeries, name: str) -> TimeSeries:
         """The same; says how many messages are left out, and why."""
@@ -218,33 +218,29 @@ class RunReader:
         return told
 
     def commands(self, found: Collected, parameters: Told) -> TimeSeries:
-        """Torques right, left that were commanded; says why there are none."""
-        parts = found.joints[topics.TORQUES]
-        if not parts:
-            return NOTHING
-        try:
-            return self.judged(
-                of_both(parts, wheel_names(_names(parts), parameters)), topics.TORQUES
-            )
-        except ValueError as error:
-            self.bag.lose(f"{self.topic(topics.TORQUES)}: not used, {error}")
-            return NOTHING
+        """Torques right, left (n, 2) [N m] that were commanded; notes why there are none."""
+        (torques,) = self.of_wheels(
+            found, topics.TORQUES, lambda parts: [commanded_torques(parts, parameters)]
+        ) or [NOTHING]
+        return torques
 
     def wheels(self, found: Collected, parameters: Told) -> tuple[TimeSeries, TimeSeries]:
-        """What joint_states tell of the right and the left wheel; says why they do not."""
-        parts = found.joints[topics.JOINTS]
-        if not parts:
-            return NOTHING, NOTHING
+        """Rate and torque (n, 2) of the right and the left wheel; notes why there are none."""
+        right, left = self.of_wheels(
+            found, topics.JOINTS, lambda parts: rates_and_torques(parts, parameters)
+        ) or [NOTHING, NOTHING]
+        return right, left
+
+    def of_wheels(
+        self, found: Collected, name: str, read: Callable[[Sequence[Joints]], Sequence[TimeSeries]]
+    ) -> Sequence[TimeSeries]:
+        """What `read` makes of a topic's joints; nothing, and a note why, if it raises."""
+        parts = found.joints[name]
         try:
-            right, left = (of_one(parts, name) for name in wheel_names(_names(parts), parameters))
-            return self.judged(right, topics.JOINTS), self.judged(left, topics.JOINTS)
+            return [self.judged(series, name) for series in read(parts)] if parts else []
         except ValueError as error:
-            self.bag.lose(f"{self.topic(topics.JOINTS)}: not used, {error}")
-            return NOTHING, NOTHING
-
-
-def _names(parts: Iterable[Joints]) -> set[str]:
-    return {name for part in parts for name in part.names}
+            self.bag.lose(f"{self.topic(name)}: not used, {error}")
+            return []
 
 
 def _seconds(event: Event, odometry: TimeSeries, start: int) -> float:

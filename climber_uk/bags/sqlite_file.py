@@ -6,22 +6,15 @@ together than the file has. Behind a damaged page one is gone on with the next r
 
 import sqlite3
 from array import array
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from climber_uk.bags.connection import (
-    CDR,
-    MOST_TOPICS,
-    Connection,
-    Logged,
-    Lose,
-    is_name,
-    tell_encodings,
-)
+from climber_uk.bags.connection import MOST_TOPICS, Connection, Logged, Lose, readable
 from climber_uk.bags.definitions import LONGEST
 from climber_uk.bags.sqlite_database import (
     Patience,
@@ -60,18 +53,15 @@ class SqliteFile:
             self.lose("cut off, read up to the last whole message")
         elif readable != path:
             self.size += sum(file.stat().st_size for file in scratch.glob(f"{path.name}-*"))
-        try:
-            self._database = open_database(readable, self._patience)
-        except sqlite3.Error as error:
-            raise ValueError(f"no readable database: {error}") from None
-        try:
-            self._look_into()
-        except sqlite3.Error as error:
-            self.close()
-            raise ValueError(f"no readable database: {error}") from None
-        except BaseException:
-            self.close()
-            raise
+        with ExitStack() as stack:
+            try:
+                self._database = stack.enter_context(
+                    closing(open_database(readable, self._patience))
+                )
+                self._look_into()
+            except sqlite3.Error as error:
+                raise ValueError(f"no readable database: {error}") from None
+            stack.pop_all()  # it stays open
 
     def close(self) -> None:
         """Close the file."""
@@ -102,7 +92,7 @@ class SqliteFile:
         self._rows = np.array(told, np.int64).reshape(-1, 4)  # (n, 4)
         times = self._rows[:, 1]
         self.start, self.end = (int(times.min()), int(times.max())) if len(times) else (2**63, 0)
-        self.connections = list(self._connections())
+        self.connections = list(readable(self._connections(), self.lose))
 
     def _sound_rows(self) -> Iterator[Row]:
         for _ in self._selected("SELECT 1 FROM messages NOT INDEXED WHERE _rowid_ < 1 LIMIT 1"):
@@ -138,22 +128,16 @@ class SqliteFile:
             most = f"{LARGEST_MESSAGE >> 20} MiB"
             self.lose(f"{unfit} rows are left out: no message, or larger than {most}")
 
-    def _connections(self) -> Iterator[Connection]:
+    def _connections(self) -> Iterator[tuple[Connection, str]]:
+        """All topics, with their encodings."""
         definitions = self._definitions()
         counts = Counter(self._rows[:, 2].tolist())
-        others: dict[str, list[str]] = defaultdict(list)
         columns = ", ".join(TABLES["topics"])
         for number, topic, type_name, encoding in self._selected(
             f"SELECT {columns} FROM topics NOT INDEXED LIMIT {MOST_TOPICS}"
         ):
-            if type(number) is not int or not (is_name(topic) and is_name(type_name)):
-                self.lose(f"a topic that cannot be called so is left out: {topic!r:.60}")
-            elif encoding != CDR:
-                others[str(encoding)].append(topic)
-            else:
-                told = definitions.get(type_name, "")
-                yield Connection(number, topic, type_name, counts[number], told)
-        tell_encodings(self.name, others, self._lose)
+            text = definitions.get(type_name, "")
+            yield Connection(number, topic, type_name, counts[number], text), str(encoding)
 
     def _definitions(self) -> dict[str, str]:
         """Definitions by the names of types, as far as they are told."""

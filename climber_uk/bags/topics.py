@@ -1,38 +1,23 @@
 """Which topics of a bag are a climber's."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from climber_uk.messages.topics import (
-    CLOCK,
-    DIAGNOSTICS,
-    FORCE,
-    JOINTS,
-    LOG,
-    MARGINS,
-    ODOMETRY,
-    PARAMETERS,
-    PRESSURE,
-    REFERENCE,
-    REFERENCE_TIME,
-    TORQUES,
-    TRUTH,
-)
+from climber_uk.messages import topics
+from climber_uk.messages.topics import ODOMETRY
 
 NAMES = (
-    *(ODOMETRY, TRUTH, REFERENCE, REFERENCE_TIME, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE),
-    *MARGINS,
+    *(ODOMETRY, topics.TRUTH, topics.REFERENCE, topics.REFERENCE_TIME, topics.TORQUES),
+    *(topics.JOINTS, topics.PRESSURE, topics.PARAMETERS, topics.FORCE, *topics.MARGINS),
 )
 TYPES = {
-    **dict.fromkeys((ODOMETRY, TRUTH), "nav_msgs/msg/Odometry"),
-    **dict.fromkeys((TORQUES, JOINTS), "sensor_msgs/msg/JointState"),
-    REFERENCE: "trajectory_msgs/msg/MultiDOFJointTrajectory",
-    PRESSURE: "sensor_msgs/msg/FluidPressure",
-    PARAMETERS: "rcl_interfaces/msg/ParameterEvent",
-    CLOCK: "rosgraph_msgs/msg/Clock",
-    DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+    ODOMETRY: "nav_msgs/msg/Odometry",
+    topics.TORQUES: "sensor_msgs/msg/JointState",
+    topics.REFERENCE: "trajectory_msgs/msg/MultiDOFJointTrajectory",
+    topics.PRESSURE: "sensor_msgs/msg/FluidPressure",
+    topics.CLOCK: "rosgraph_msgs/msg/Clock",
 }  # of those that are read message by message
-KNOWN = {*NAMES, DIAGNOSTICS, LOG}
+KNOWN = {*NAMES, topics.DIAGNOSTICS, topics.LOG}
 MOST_CLIMBERS = 100  # that are told of, unless they were chosen
 
 
@@ -83,13 +68,3 @@ class Topics:
                 f"odometry of {len(found)} climbers, more than {MOST_CLIMBERS}: choose by namespace"
             )
         return found
-
-
-def types_of(topics: Iterable[str]) -> dict[str, str]:
-    """Type that each of some topics should have, by their full names, which end in ours."""
-    return {
-        topic: of
-        for topic in topics
-        for name, of in TYPES.items()
-        if f"/{topic}".endswith(f"/{name.lstrip('/')}")
-    }

@@ -79,10 +79,7 @@ REQUIRED = {
     f"{PLANT}.odometry_delay": 0.0,
 }
 # Values that they have instead of the defaults: each controller would have a timing of its own
-WITHOUT = {
-    f"{CONTROLLER}.learn_delay": False,
-    f"{CONTROLLER}.observer.twist": "instantaneous",
-}
+WITHOUT = {f"{CONTROLLER}.learn_delay": False, f"{CONTROLLER}.observer.twist": "instantaneous"}
 
 
 def check_drawn(name: str, constraints: str) -> None:

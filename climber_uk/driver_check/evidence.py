@@ -106,7 +106,7 @@ class MotionSeen:
         return self.twist[:, [0, 2]]
 
 
-class Command(NamedTuple):
+class TorqueCommand(NamedTuple):
     """Torques in force from a time [ns] on."""
 
     time: int
@@ -126,7 +126,7 @@ class TrialRecord:
     """The torques of a trial, and why it was stopped if it was."""
 
     pulses: Sequence[PulseTimes]
-    commands: Sequence[Command]
+    commands: Sequence[TorqueCommand]
     highest: float  # [N m] limit of a wheel's torque in the trial
     silence: tuple[int, int] | None = None  # begin and end [ns] without commands
     trouble: str = ""  # why it was stopped before the end
@@ -165,16 +165,9 @@ class Evidence:
     @cached_property
     def covariances(self) -> Array:
         """Covariances (n, 6), on the diagonal: of x, y, θ, and of their rates."""
-        return np.array(
-            [
-                [
-                    covariance[i]
-                    for covariance in (m.pose.covariance, m.twist.covariance)
-                    for i in PLANAR
-                ]
-                for m in (a.message for a in self.arrivals)
-            ]
-        ).reshape(-1, 6)
+        messages = [arrival.message for arrival in self.arrivals]
+        both = np.array([(m.pose.covariance, m.twist.covariance) for m in messages])
+        return both.reshape(-1, 2, 36)[:, :, PLANAR].reshape(-1, 6)
 
     @cached_property
     def motion(self) -> MotionSeen:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from climber_uk.driver_check import evidence, thresholds
-from climber_uk.driver_check.evidence import Arrival, Command, motion_of
+from climber_uk.driver_check.evidence import Arrival, TorqueCommand, motion_of
 from climber_uk.driver_check.pulses import PUSHED_BY, Pulse, Silence, Stage
 from climber_uk.driver_check.response import expected_gain, respond
 from climber_uk.mechanics import SECOND, Array
@@ -58,7 +58,7 @@ class Trial:
         self.late = round(max(LATE, LATE_PERIODS * period) * SECOND)
         ages = [a.wall - reading.nanoseconds(a.message.header.stamp) for a in heard]
         self.usual_age = float(np.median(ages))  # [ns]
-        self.commands: list[Command] = []
+        self.commands: list[TorqueCommand] = []
         self.pulses: list[evidence.PulseTimes] = []
         self.silence: tuple[int, int] | None = None
         self.trouble = ""
@@ -122,7 +122,7 @@ class Trial:
                 self.stage.finish()
             torques = self.stage_torques(self.stage, stamp, state)
         if torques is not None:
-            self.commands.append(Command(max(stamp, now), torques))
+            self.commands.append(TorqueCommand(max(stamp, now), torques))
         return torques
 
     def keep_within_bounds(self, state: State) -> None:

@@ -19,19 +19,8 @@ from climber_uk.identification.estimation import identify
 from climber_uk.identification.identified import NAMES
 from climber_uk.identification.integral_equations import Cut
 from climber_uk.identification.recorded_motion import TOPICS, read_motion
-from climber_uk.identification.recorded_site import (
-    assumed_away,
-    differences,
-    site_of,
-)
-from climber_uk.identification.report import (
-    changes,
-    label_of,
-    missing,
-    remarks,
-    rows,
-    table,
-)
+from climber_uk.identification.recorded_site import assumed_away, differences, site_of
+from climber_uk.identification.report import changes, label_of, missing, remarks, rows, table
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed

@@ -89,38 +89,19 @@ def drive_equations(
     speed, yaw_rate = motion.smooth_rates.T
     sliding = np.hypot(speed, motion.side_slip)
     share = speed / np.maximum(sliding, 1e-9)  # of the seal's friction that is along the heading
+    resisted = np.column_stack([load * share, speed])
     known = gravity + motion.side_slip * yaw_rate
-    found = []
-    for window in windows:
-        time = motion.time[window]
-        pushed = motion.impulse[window].sum(axis=1)
-        late = motion.torques[window].sum(axis=1)
-        integrals = np.column_stack([load * share, speed])[window]
-        impulses = np.column_stack(
-            [pushed - pushed[0], -_integral(integrals, time), late[0] - late]
-        )
-        rate = None if motion.rates is None else motion.rates[window, 0]
-        free = _integral(known[window], time)
-        found.append(_twice_integrated(time, rate, motion.way[window], impulses, free))
-    return found
+    return [_driven(motion, w, 0, motion.way, resisted[w], known[w]) for w in windows]
 
 
 def turn_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
     """(15) in each window: b₁, b₂, b₃, and b₁ times how much later torques act than assumed."""
     found, yaw_rate = [], motion.smooth_rates[:, 1]
     for window in windows:
-        time = motion.time[window]
-        pushed, late = (
-            -np.diff(motion.impulse[window])[:, 0],
-            -np.diff(motion.torques[window])[:, 0],
-        )
         sign = np.sign(yaw_rate[window[len(window) // 2]])
-        integrals = np.column_stack([np.full(len(window), sign), yaw_rate[window]])
-        impulses = np.column_stack(
-            [pushed - pushed[0], -_integral(integrals, time), late[0] - late]
-        )
-        rate = None if motion.rates is None else motion.rates[window, 1]
-        found.append(_twice_integrated(time, rate, motion.pose[window, 2], impulses, 0 * time))
+        resisted = np.column_stack([np.full(len(window), sign), yaw_rate[window]])
+        known = np.zeros(len(window))
+        found.append(_driven(motion, window, 1, motion.pose[:, 2], resisted, known))
     return found
 
 
@@ -131,10 +112,10 @@ def wheel_equations(
     assert motion.wheel_angles is not None
     right, left = motion.wheel_angles.T
     both = (motion.way, (right + left) / 2), (motion.pose[:, 2], (right - left) / 2)
-    found = []
-    for gone, angle in both:
-        found.append([_of_wheels(motion.time[w], gone[w], angle[w]) for w in windows])
-    return found[0], found[1]
+    way, heading = (
+        [_of_wheels(motion.time[w], gone[w], angle[w]) for w in windows] for gone, angle in both
+    )
+    return way, heading
 
 
 def friction_load(motion: RecordedMotion, climber: Climber, site: Site) -> Array:
@@ -150,6 +131,22 @@ def gravity_ahead(motion: RecordedMotion, climber: Climber, site: Site) -> Array
     s_x, s_y = site.wall.along(climber.inclination, y)
     along: Array = GRAVITY * (s_x * np.cos(heading) + s_y * np.sin(heading))
     return along
+
+
+def _driven(
+    motion: RecordedMotion, window: Indices, column: int, gone: Array, resisted: Array, known: Array
+) -> Equations:
+    """Of the speed (column 0), which τR + τL changes, or the yaw rate (1), which τR - τL does.
+
+    `gone` (n,) is how far the climber has gone, or turned, by each of the motion's times. In the
+    window, `resisted` (m, 2) is what friction's coefficients are multiplied with, and `known` (m,)
+    the acceleration that has no coefficient.
+    """
+    time, pair = motion.time[window], np.array([1.0, (1.0, -1.0)[column]])
+    pushed, late = motion.impulse[window] @ pair, motion.torques[window] @ pair
+    impulses = np.column_stack([pushed - pushed[0], -_integral(resisted, time), late[0] - late])
+    rate = None if motion.rates is None else motion.rates[window, column]
+    return _twice_integrated(time, rate, gone[window], impulses, _integral(known, time))
 
 
 def _twice_integrated(

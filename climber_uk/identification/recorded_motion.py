@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.bags.collecting import Collected
-from climber_uk.bags.joints import torques_and_angles, wheel_names
+from climber_uk.bags.joints import torques_and_angles
 from climber_uk.bags.recorded import TimeSeries
 from climber_uk.bags.restarts import are_strays
 from climber_uk.bags.run_reader import RunReader, Told
 from climber_uk.identification.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.quantities import across, along
 from climber_uk.messages.topics import JOINTS, ODOMETRY, PARAMETERS, PRESSURE, TORQUES
 
 Indices = NDArray[np.intp]
@@ -42,9 +43,7 @@ class RecordedMotion:
     @cached_property
     def way(self) -> Array:
         """Way along the heading since the start, backwards negative (n,) [m]."""
-        x, y, heading = np.diff(self.pose, axis=0).T
-        middle = self.pose[:-1, 2] + heading / 2
-        return np.concatenate([[0.0], np.cumsum(x * np.cos(middle) + y * np.sin(middle))])
+        return np.concatenate([[0.0], np.cumsum(self._steps[0])])
 
     @cached_property
     def smooth_rates(self) -> Array:
@@ -60,13 +59,18 @@ class RecordedMotion:
     @cached_property
     def side_slip(self) -> Array:
         """Speed to the left (n,) [m/s], smoothed; 0 where it cannot be told from noise."""
-        x, y, turned = np.diff(self.pose, axis=0).T
-        middle = self.pose[:-1, 2] + turned / 2
-        steps = y * np.cos(middle) - x * np.sin(middle)
+        steps = self._steps[1]
         aside = np.concatenate([[0.0], np.cumsum(steps)])
         slip = rate(self.time, aside, SLIP_SMOOTHING)
         noise = np.std(np.diff(steps)) / np.sqrt(6) / SLIP_SMOOTHING  # less, with cubics
         return slip if np.sqrt(np.mean(slip**2)) > CLEAR * noise else 0 * slip
+
+    @cached_property
+    def _steps(self) -> tuple[Array, Array]:
+        """Ahead and to the left (n - 1,) [m] from each pose to the next, by the heading midway."""
+        step = np.diff(self.pose, axis=0)
+        middle = self.pose[:-1, 2] + step[:, 2] / 2
+        return along(middle, step), across(middle, step)
 
     @cached_property
     def torques(self) -> Array:
@@ -153,10 +157,8 @@ def _seconds(told: TimeSeries) -> Array:
 
 def _wheels(found: Collected, parameters: Told) -> TimeSeries:
     """Torques and angles of both wheels (n, 4), as joint_states tell them."""
-    parts = found.joints[JOINTS]
     with suppress(ValueError):
-        names = wheel_names({name for part in parts for name in part.names}, parameters)
-        return torques_and_angles(parts, names)
+        return torques_and_angles(found.joints[JOINTS], parameters)
     return TimeSeries.of([])
 
 

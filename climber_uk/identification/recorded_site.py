@@ -22,22 +22,14 @@ ASSUMED_AWAY: dict[str, tuple[Callable[[Any], bool], str]] = {
         "a ring rubs less along the heading the more it turns, and resists turning: it is fitted "
         "as if it did not",
     ),
-    "friction": (
-        lambda law: law != "coulomb",
-        "it is fitted as Coulomb's and a viscous one",
-    ),
+    "friction": (lambda law: law != "coulomb", "it is fitted as Coulomb's and a viscous one"),
     "odometry_source": (
         lambda source: source == "wheels",
         "radius and track are what the odometry was made with, and slip is taken for motion",
     ),
     "heading_bias": (lambda bias: bias != 0, "the weight is taken to pull another way"),
 }
-OF_SUCTION = (
-    "seal_friction_coefficient",
-    "wheel_load_share",
-    "suction_pressure",
-    "suction_area",
-)
+OF_SUCTION = ("seal_friction_coefficient", "wheel_load_share", "suction_pressure", "suction_area")
 
 
 def site_of(controller: Parameters, plant: Parameters) -> Site:

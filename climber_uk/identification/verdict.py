@@ -36,12 +36,7 @@ OFF = 0.2  # of the commanded torques: most by which those at the wheels may dif
 OF_DRIVING = ("mass", "seal_friction_coefficient", "viscous_friction")
 OF_WHEELS = ("wheel_radius", "half_track")
 OF_TORQUES = (*OF_DRIVING, *OF_TURNING)
-OF_KIND = {
-    DRIVE: OF_DRIVING,
-    TURN: OF_TURNING,
-    WAY: ("wheel_radius",),
-    HEADING: ("half_track",),
-}
+OF_KIND = {DRIVE: OF_DRIVING, TURN: OF_TURNING, WAY: ("wheel_radius",), HEADING: ("half_track",)}
 
 
 def reasons(

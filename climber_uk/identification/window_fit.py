@@ -7,7 +7,7 @@ Least squares of the residuals' soft L1 norm, by reweighting. Three things may m
 - what the equations lack, and may go with what tells the coefficient: see `Misfit`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -135,9 +135,8 @@ class WindowFit:
 
     @cached_property
     def information(self) -> Array:
-        """N of each window (n, c, c)."""
-        rows = zip(self._split(self.design), self._split(self._weights), strict=True)
-        return np.stack([J.T @ (w[:, None] * J) for J, w in rows])
+        """Jᵀ W J of each window (n, c, c), by design J and weights W: the normal equations."""
+        return self._by_window(lambda J, w: J.T @ (w[:, None] * J), self.design, self._weights)
 
     @cached_property
     def covariance(self) -> Array:
@@ -147,8 +146,8 @@ class WindowFit:
     @cached_property
     def changes(self) -> Array:
         """Of the coefficients without one window after the other (n, c)."""
-        parts = self._split(self.design), self._split(self._weights), self._split(self.residuals)
-        g = np.stack([J.T @ (w * r) for J, w, r in zip(*parts, strict=True)])
+        rows = self.design, self._weights, self.residuals
+        g = self._by_window(lambda J, w, r: J.T @ (w * r), *rows)
         rest = self.information.sum(axis=0) - self.information
         changes: Array = (_inverse(rest) @ g[..., None])[..., 0]
         return changes
@@ -156,9 +155,8 @@ class WindowFit:
     @cached_property
     def pulls(self) -> Array:
         """What an acceleration of 1 that is lacking in a window would add (n, 2, c)."""
-        parts = self._split(self.design), self._split(self._weights), self._split(self.lacking)
-        g = np.stack([F.T @ (w[:, None] * J) for J, w, F in zip(*parts, strict=True)])
-        return g @ self.covariance
+        rows = self.design, self._weights, self.lacking
+        return self._by_window(lambda J, w, F: F.T @ (w[:, None] * J), *rows) @ self.covariance
 
     @cached_property
     def misfit(self) -> Misfit:
@@ -185,20 +183,20 @@ class WindowFit:
 
     def _white(self) -> Array:
         """Standard deviation (q,) of the white part of residuals, from their differences."""
+        windows = [*zip(self._split(self.residuals), self._split(self.quantity), strict=True)]
         white = []
         for number in range(len(self.noise)):
-            steps = [
-                np.diff(r[quantity == number])
-                for r, quantity in zip(
-                    self._split(self.residuals), self._split(self.quantity), strict=True
-                )
-            ]
-            white.append(MEDIAN * np.median(np.abs(np.concatenate(steps))) / np.sqrt(2))
+            steps = np.concatenate([np.diff(r[quantity == number]) for r, quantity in windows])
+            white.append(MEDIAN * np.median(np.abs(steps)) / np.sqrt(2))
         return np.maximum(white, ROUNDING)
 
     @cached_property
     def _weights(self) -> Array:
         return _weights(self.residuals)
+
+    def _by_window(self, function: Callable[..., Array], *rows: NDArray[Any]) -> Array:
+        """What a function of each window's part of some rows makes (n, ...)."""
+        return np.stack([function(*w) for w in zip(*map(self._split, rows), strict=True)])
 
     def _split(self, rows: NDArray[Any]) -> list[NDArray[Any]]:
         return np.split(rows, self.ends[:-1])

@@ -13,24 +13,17 @@ import numpy as np
 from climber_uk.bags.bag import Bag
 from climber_uk.bags.collecting import collect
 from climber_uk.bags.events import Event, changes
-from climber_uk.bags.joints import of_both, wheel_names
+from climber_uk.bags.joints import commanded_torques
 from climber_uk.bags.run_reader import RunReader
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array, Stamps
-from climber_uk.messages.topics import (
-    CLOCK,
-    CONTROLLER,
-    DIAGNOSTICS,
-    ODOMETRY,
-    PARAMETERS,
-    PRESSURE,
-    REFERENCE,
-    TORQUES,
-)
+from climber_uk.messages import topics
+from climber_uk.messages.topics import CLOCK, CONTROLLER, TORQUES
 
-# topics of what the controller was told, and of what it told
-TOPICS = ODOMETRY, REFERENCE, PRESSURE, TORQUES, PARAMETERS, DIAGNOSTICS
+# inputs and outputs of the controller
+INPUTS = topics.ODOMETRY, topics.REFERENCE, topics.PRESSURE
+TOPICS = *INPUTS, TORQUES, topics.PARAMETERS, topics.DIAGNOSTICS
 Modes = list[tuple[int, str]]  # each with the time of the node's clock from which on it was
 
 
@@ -69,8 +62,7 @@ class RecordedController:
         # when the torques that answer a stamp were published first
         self.published = dict(zip(stamps[::-1].tolist(), arrivals[::-1].tolist(), strict=True))
         try:
-            joints = {name for part in efforts for name in part.names}
-            torques = of_both(efforts, wheel_names(joints, file or self.parameters or {}))
+            torques = commanded_torques(efforts, file or self.parameters or {})
         except ValueError as error:
             raise ValueError(f"{bag.path}: {topic}: {error}") from None
         # right, left [N m], by the stamp that they answer

@@ -11,7 +11,7 @@ from typing import Any
 
 from climber_uk.bags.bag import Bag
 from climber_uk.bags.publishing_order import read_published
-from climber_uk.bags.topics import types_of
+from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
@@ -67,20 +67,21 @@ class Replay:
 
         Messages, not arrays: one by one they go through the reading that the node has.
         """
-        odometry, reference = f"{namespace}/{ODOMETRY}", f"{namespace}/{REFERENCE}"
-        missing = {odometry, reference}
-        takers = {
+        callbacks = {
             CLOCK: self.on_clock,
-            odometry: self.on_odometry,
-            reference: self.on_reference,
-            f"{namespace}/{PRESSURE}": self.on_pressure,
-            f"{namespace}/{TORQUES}": self.on_torques,
+            ODOMETRY: self.on_odometry,
+            REFERENCE: self.on_reference,
+            PRESSURE: self.on_pressure,
+            TORQUES: self.on_torques,
         }
-        for topic, at, message in read_published(bag, types_of(takers), is_published):
+        names = {Topics().full(name, namespace): name for name in callbacks}
+        missing = {topic for topic, name in names.items() if name in (ODOMETRY, REFERENCE)}
+        types = {topic: TYPES[name] for topic, name in names.items()}
+        for topic, at, message in read_published(bag, types, is_published):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
-            takers[topic](at, message)
+            callbacks[names[topic]](at, message)
         if missing:
             raise ValueError(f"{bag.path} has no message on {' and '.join(sorted(missing))}")
 

@@ -28,10 +28,10 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
     """
     reader, found = RunReader.read(bag, Topics(), namespace)
     topic = reader.topic(ODOMETRY)
-    if not found.parts[ODOMETRY]:
+    if not found.samples[ODOMETRY]:
         raise ValueError("; ".join([f"{bag} has no message on {topic}", *reader.bag.losses]))
     runs = []
-    for part in reader.parts(found):
+    for part in reader.split(found):
         try:
             reader.check_agreement(part)
         except NoRunError as error:

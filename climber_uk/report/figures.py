@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from io import BytesIO
 
 import matplotlib
@@ -16,6 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.bags.connection import one_line
 from climber_uk.bags.events import ERROR, OK
+from climber_uk.bags.recorded import TimeSeries
 from climber_uk.bags.run import RecordedRun
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
@@ -145,20 +145,8 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
     return np.repeat(time[begins], 2), np.stack([low, high], axis=1).ravel()
 
 
-def _torques(run: RecordedRun) -> Curves:
-    return run.seconds(run.commands), run.torques
-
-
-def _latency(run: RecordedRun) -> Curves:
-    return run.seconds(run.commands), 1e3 * run.latency[:, None]
-
-
-def _recorded(name: str, run: RecordedRun) -> Curves:
-    return run.seconds(run.recorded[name]), run.recorded[name].values
-
-
-def _margins(run: RecordedRun) -> Curves:
-    return run.seconds(run.hold), run.margins
+def _all_of(run: RecordedRun, series: TimeSeries) -> Curves:
+    return run.seconds(series), series.values
 
 
 CURVES: dict[str, tuple[str, Sequence[str], Callable[[RecordedRun], Curves]]] = {
@@ -167,12 +155,24 @@ CURVES: dict[str, tuple[str, Sequence[str], Callable[[RecordedRun], Curves]]] = 
         ("along-track [mm]", "cross-track [mm]", "heading [mrad]"),
         lambda run: (run.time, 1e3 * run.error),
     ),
-    "torques": ("Wheel torques", ("right [N m]", "left [N m]"), _torques),
+    "torques": (
+        "Wheel torques",
+        ("right [N m]", "left [N m]"),
+        lambda run: _all_of(run, run.commands),
+    ),
     "constraint_force": (
         "Udwadia-Kalaba constraint force, in the climber's frame",
         ("drive [N]", "lateral [N]", "about z [N m]"),
-        partial(_recorded, topics.FORCE),
+        lambda run: _all_of(run, run.recorded[topics.FORCE]),
     ),
-    "margins": ("Margins: below 1 it slips, it tips", ("slip margin", "tip margin"), _margins),
-    "latency": ("From an odometry's arrival to that of its torque", ("latency [ms]",), _latency),
+    "margins": (
+        "Margins: below 1 it slips, it tips",
+        ("slip margin", "tip margin"),
+        lambda run: (run.seconds(run.margins), run.margins.values[:, :2]),
+    ),
+    "latency": (
+        "From an odometry's arrival to that of its torque",
+        ("latency [ms]",),
+        lambda run: (run.seconds(run.commands), 1e3 * run.latency[:, None]),
+    ),
 }

@@ -63,10 +63,7 @@ def _tiles(column: Column) -> Iterable[tuple[str, str, str, str, int]]:
     if math.isfinite(values["truth_rms_distance"]):
         main = f"{shown('truth_rms_distance')} RMS, truly"
         note = f"at most {shown('truth_max_distance')}; by the odometry {', '.join(by_odometry)}"
-    yield (
-        *("Tracking", "rms_distance", main, f"{note}; {settled}"),
-        OK if is_settled else WARNING,
-    )
+    yield (*("Tracking", "rms_distance", main, f"{note}; {settled}"), OK if is_settled else WARNING)
     yield (
         "Motors",
         "peak_torque",

@@ -15,16 +15,12 @@ from climber_uk.report.metrics.metric import GAP, NAN, Case, Metric, largest, me
 
 WHEELS = "right", "left"
 NEGLIGIBLE = 0.01  # of the most torque, whose sign does not count
-FORCES = (
-    ("drive", "N", "forwards"),
-    ("lateral", "N", "to the left"),
-    ("moment", "N m", "about z"),
-)
+FORCES = (("drive", "N", "forwards"), ("lateral", "N", "to the left"), ("moment", "N m", "about z"))
 
 
 def saturated(case: Case) -> float:
     """Share of answers with a torque at its limit [%]."""
-    if (climber := case.known_climber) is None:
+    if (climber := case.run.climber) is None:
         return NAN
     limit = climber.max_wheel_torque * (1 - 1e-9)
     return share((np.abs(case.run.torques) >= limit).any(axis=1))
@@ -36,7 +32,7 @@ def power(case: Case, wheel: int) -> tuple[Array, Array]:
     joint = run.wheels[wheel]
     if len(joint):
         return run.seconds(joint), joint.values[:, 0] * joint.values[:, 1]
-    if (climber := case.known_climber) is None or not len(run.commands):
+    if (climber := run.climber) is None or not len(run.commands):
         return np.empty(0), np.empty(0)
     speed, _, yaw_rate = run.rates[run.is_answered].T
     state = State.rolling(run.pose[run.is_answered], speed, yaw_rate)
@@ -54,7 +50,7 @@ def reversals(case: Case) -> float:
     run = case.run
     if len(run.commands) < 2:
         return NAN
-    climber, told = case.known_climber, np.abs(run.torques).max()
+    climber, told = run.climber, np.abs(run.torques).max()
     least = NEGLIGIBLE * (climber.max_wheel_torque if climber else told)
     signs = (np.sign(wheel[np.abs(wheel) > least]) for wheel in run.torques.T)
     lasted = np.ptp(run.commands.stamps) / SECOND

@@ -3,15 +3,7 @@
 import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.report.metrics.metric import (
-    GAP,
-    NAN,
-    Case,
-    Metric,
-    deviation,
-    largest,
-    percentile,
-)
+from climber_uk.report.metrics.metric import GAP, NAN, Case, Metric, deviation, largest, percentile
 
 
 def periods(case: Case) -> Array:

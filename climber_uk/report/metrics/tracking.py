@@ -23,16 +23,8 @@ STRETCH = 1.0  # [s] over which drift is measured
 
 QUANTITIES: dict[str, tuple[str, str, Callable[[Case], Array]]] = {
     "distance": ("m", "distance from the reference", lambda case: case.run.distance),
-    "along_track": (
-        "m",
-        "error along the reference's heading",
-        lambda case: case.run.error[:, 0],
-    ),
-    "cross_track": (
-        "m",
-        "error across the reference's heading",
-        lambda case: case.run.error[:, 1],
-    ),
+    "along_track": ("m", "error along the reference's heading", lambda case: case.run.error[:, 0]),
+    "cross_track": ("m", "error across the reference's heading", lambda case: case.run.error[:, 1]),
     "heading": ("rad", "heading error", lambda case: case.run.error[:, 2]),
 }
 STATISTICS: dict[str, tuple[str, Callable[[Array], float]]] = {

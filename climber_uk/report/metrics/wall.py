@@ -17,7 +17,7 @@ SUCTION = "suction"  # of the controller's `adhesion`
 
 def friction(case: Case) -> float:
     """Coulomb friction f [N]: least squares over windows in which it moves one way."""
-    run, climber = case.run, case.known_climber
+    run, climber = case.run, case.run.climber
     if climber is None or len(run.commands) < 2:
         return NAN
     time, speed = run.seconds(run.commands), run.rates[run.is_answered, 0]
@@ -36,7 +36,7 @@ def friction(case: Case) -> float:
 
 
 def _margin(case: Case, column: int) -> Array:
-    return case.run.hold.values[:, column]
+    return case.run.margins.values[:, column]
 
 
 def slip_share(case: Case) -> float:
@@ -46,7 +46,7 @@ def slip_share(case: Case) -> float:
     """
     run = case.run
     aside = np.abs(run.path_rates[:, 1]) > np.maximum(ASIDE, ASKEW * np.abs(run.path_rates[:, 0]))
-    if not (len(run.hold) or len(run.recorded[topics.TRUTH]) or aside.any()):
+    if not (len(run.margins) or len(run.recorded[topics.TRUTH]) or aside.any()):
         return NAN
     return largest(np.array([share(_margin(case, 0) < 1), share(aside)]))
 
@@ -59,10 +59,6 @@ def max_side_slip(case: Case) -> float:
 def has_suction(case: Case) -> bool:
     """Whether suction holds the climber, as far as is known."""
     return case.run.parameters.get("adhesion", SUCTION) == SUCTION
-
-
-def _pressure(case: Case) -> Array:
-    return case.run.recorded[topics.PRESSURE].values.ravel()
 
 
 METRICS = (
@@ -88,16 +84,13 @@ METRICS = (
         lambda case: lowest(_margin(case, 1)),
     ),
     Metric(
-        "lowest_wheel_load",
-        "N",
-        "least load on the wheels",
-        lambda case: lowest(_margin(case, 2)),
+        "lowest_wheel_load", "N", "least load on the wheels", lambda case: lowest(_margin(case, 2))
     ),
     Metric(
         "lowest_pressure",
         "Pa",
         "least pressure difference of the suction",
-        lambda case: lowest(_pressure(case)),
+        lambda case: lowest(case.run.recorded[topics.PRESSURE].values),
         has_suction,
     ),
     Metric(
