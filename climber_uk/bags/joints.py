@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from climber_uk.bags.batches import Batch
-from climber_uk.bags.recorded import Samples, TimeSeries
-from climber_uk.bags.taking import are_sound
+from climber_uk.bags.extraction import are_sound
+from climber_uk.bags.time_series import Samples, TimeSeries
 from climber_uk.mechanics import Array, Stamps
 from climber_uk.messages.names import Names
 
-SIDES = "right", "left"
+WHEELS = "right", "left"
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,10 @@ def _missing(batch: Batch, count: int) -> Array:
 def wheel_names(parts: Sequence[Joints], parameters: Mapping[str, Any]) -> tuple[str, str]:
     """Names of the right and the left wheel; `ValueError` if they are not among the joints."""
     present, usual = sorted({name for part in parts for name in part.names}), vars(Names())
-    keys = [f"{side}_wheel_joint" for side in SIDES]
+    keys = [f"{side}_wheel_joint" for side in WHEELS]
     wanted = [str(parameters.get(key, usual[key])) for key in keys]
     if not set(keys) & parameters.keys() and not set(wanted) <= set(present):
-        by_side = [[name for name in present if side in name.lower()] for side in SIDES]
+        by_side = [[name for name in present if side in name.lower()] for side in WHEELS]
         if [len(names) for names in by_side] == [1, 1] and by_side[0] != by_side[1]:
             wanted = [names[0] for names in by_side]
     if missing := [name for name in wanted if name not in present]:

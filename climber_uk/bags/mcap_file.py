@@ -80,8 +80,8 @@ class McapFile:
                 if opcode == Opcode.MESSAGE:
                     channel, _, log_time, publish_time = MESSAGE_HEAD.unpack_from(data, start)
                     if channel in wanted and end - start <= LARGEST_MESSAGE:
-                        told = channel, publish_time, data[start + MESSAGE_HEAD.size : end]
-                        found.append((log_time, number, len(found), *told))
+                        message = data[start + MESSAGE_HEAD.size : end]
+                        found.append((log_time, number, len(found), channel, publish_time, message))
                     elif channel in wanted:
                         self.lose(f"a message larger than {LARGEST_MESSAGE >> 20} MiB is left out")
         except ValueError as error:

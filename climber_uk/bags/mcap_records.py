@@ -1,4 +1,4 @@
-"""Records of an MCAP file, told from damage by how they follow each other.
+"""Records of an MCAP file, distinguished from damage by how they follow each other.
 
 A record is its opcode, its length and its contents. One is sound if its own lengths agree and
 what comes behind it may be a record, or the end.
@@ -43,16 +43,16 @@ class Record(NamedTuple):
 
 
 class ChunkHead(NamedTuple):
-    """What a chunk tells of itself, and where its messages are."""
+    """Head of a chunk."""
 
     size: int  # [bytes] unpacked
     crc: int
     compression: str
-    packed: tuple[int, int]  # from where to where
+    packed: tuple[int, int]  # where its messages begin and end in the file
 
 
 class DamagedError(ValueError):
-    """Wrong bytes, of which some may be told all the same."""
+    """Bytes with a wrong checksum; some of what is in them may be right."""
 
     def __init__(self, what: str, data: bytes) -> None:
         super().__init__(what)
@@ -92,7 +92,7 @@ class RecordFile:
         return found if is_end or _may_begin(behind) else None
 
     def chunk_head(self, record: Record) -> ChunkHead | None:
-        """What a chunk tells of itself, if its lengths agree."""
+        """Return the head of a chunk, if its lengths agree, else None."""
         head = self.read(record.start, record.start + CHUNK_HEAD.size + 16)
         if record.opcode != Opcode.CHUNK or len(head) < CHUNK_HEAD.size + 8:
             return None

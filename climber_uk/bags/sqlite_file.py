@@ -1,7 +1,7 @@
 """Read sqlite3 files of rosbag2, as far as they are sound.
 
-Rows are told from damage by their numbers, which rise, and by their sizes, which are no more
-together than the file has. Behind a damaged page one is gone on with the next row that is found.
+A row is sound if its number is larger than the one before, and if the rows together are no larger
+than the file. Behind a damaged page reading goes on with the next row that is found.
 """
 
 import sqlite3
@@ -21,7 +21,7 @@ from climber_uk.bags.sqlite_database import (
     has_columns,
     open_database,
     recovered,
-    size_told,
+    stated_size,
 )
 from climber_uk.bags.unpacking import LARGEST_MESSAGE
 
@@ -49,7 +49,7 @@ class SqliteFile:
         self._endless = False  # whether to look for many rows at once had no end
         readable = recovered(path, scratch, self.lose)
         self.size = path.stat().st_size
-        if readable == path and self.size < size_told(path):
+        if readable == path and self.size < stated_size(path):
             self.lose("cut off, read up to the last whole message")
         elif readable != path:
             self.size += sum(file.stat().st_size for file in scratch.glob(f"{path.name}-*"))
@@ -86,10 +86,10 @@ class SqliteFile:
         for table, columns in TABLES.items():
             if not has_columns(self._database, table, columns):
                 raise ValueError(f"it has no table {table} with {', '.join(columns)}")
-        told = array("q")
+        rows = array("q")
         for row in self._sound_rows():
-            told.extend(row)
-        self._rows = np.array(told, np.int64).reshape(-1, 4)  # (n, 4)
+            rows.extend(row)
+        self._rows = np.array(rows, np.int64).reshape(-1, 4)  # (n, 4) as `Row`
         times = self._rows[:, 1]
         self.start, self.end = (int(times.min()), int(times.max())) if len(times) else (2**63, 0)
         self.connections = list(readable(self._connections(), self.lose))
@@ -140,15 +140,15 @@ class SqliteFile:
             yield Connection(number, topic, type_name, counts[number], text), str(encoding)
 
     def _definitions(self) -> dict[str, str]:
-        """Definitions by the names of types, as far as they are told."""
+        """Definitions by the names of types, as far as the file has them."""
         if not has_columns(self._database, "message_definitions", DEFINITIONS):
             return {}
-        told = self._selected(
+        found = self._selected(
             "SELECT topic_type, encoded_message_definition FROM message_definitions NOT INDEXED"
             " WHERE encoding = 'ros2msg' AND typeof(encoded_message_definition) = 'text'"
             f" AND length(encoded_message_definition) <= {LONGEST} LIMIT {MOST_TOPICS}"
         )
-        return dict(told)
+        return dict(found)
 
     def _selected(self, query: str, *values: int) -> Iterator[Any]:
         """Rows up to the first that is damaged."""
@@ -183,7 +183,7 @@ class SqliteFile:
         return found
 
     def _blocks(self, chosen: Any) -> Iterator[Any]:
-        """Rows (n, 4) with some indices, as many at a time as fit in memory."""
+        """Rows (n, 4) at the indices `chosen`, at most `BLOCK_SIZE` bytes of messages at a time."""
         while len(chosen):
             rows = self._rows[chosen[:BLOCK]]
             fitting = int(np.searchsorted(np.cumsum(rows[:, 3]), BLOCK_SIZE, "right"))

@@ -154,7 +154,7 @@ class _EndedStream:
 class Sqlite3:
     """A new SQLite database with version 4 of rosbag2's schema; `stem` and the rest as of `Mcap`.
 
-    `distro` is the distribution of ROS that is told in it.
+    `distro` is the name of the ROS distribution that is stored in it.
     """
 
     SCHEMA = """

@@ -1,6 +1,6 @@
-"""Which topics of a bag are a climber's."""
+"""Which topics of a bag belong to which climber."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from climber_uk.messages import topics
@@ -18,7 +18,7 @@ TYPES = {
     topics.CLOCK: "rosgraph_msgs/msg/Clock",
 }  # of those that are read message by message
 KNOWN = {*NAMES, topics.DIAGNOSTICS, topics.LOG}
-MOST_CLIMBERS = 100  # that are told of, unless they were chosen
+MOST_CLIMBERS = 100  # that are read, unless they are chosen by namespace
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,8 @@ class Topics:
         name = self.remapped.get(name, name)
         return name if name.startswith("/") else f"/{namespace}/{name}".replace("//", "/")
 
-    def of(self, namespace: str) -> Iterator[tuple[str, str]]:
-        """Full name, and name, of the topics of one climber."""
-        for name in NAMES:
-            yield self.full(name, namespace), name
-
     def namespaces(self, types: Mapping[str, str]) -> list[str]:
-        """Those of the climbers that have odometry in a bag with topics of some types.
+        """Namespaces of the climbers that have odometry, of a bag's `types` by topic.
 
         Raises `ValueError` if there are too many.
         """

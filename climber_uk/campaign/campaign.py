@@ -27,9 +27,9 @@ SEEDS = Uniform(0, 2**31)  # of the nodes, rounded down
 class Size:
     """Number of runs, their seed, and their duration."""
 
-    runs: int = parameter(10_000, "", "number of runs", at_least=1)
-    seed: int = parameter(0, "", "of all random numbers", at_least=0)
-    duration: float = parameter(20.0, "s", "duration of each run", above=0)
+    runs: int = parameter(10_000, "", "number of runs; too few: wide intervals", at_least=1)
+    seed: int = parameter(0, "", "of all draws: the same seed, the same runs", at_least=0)
+    duration: float = parameter(20.0, "s", "of each run; too short: late falls unseen", above=0)
 
 
 @dataclass(frozen=True)

@@ -35,9 +35,7 @@ ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHES
 PARAMETERS = {
     **_names(PLANNER, *TRAJECTORY_TYPES),
     **_names(CONTROLLER, *CONTROLLER_TYPES, *ON_WALL),
-    **_names(
-        PLANT, *((kind, "") for kind in (SimulationOptions, Climber, Physics, Motors, Sensors))
-    ),
+    **_names(PLANT, *((k, "") for k in (SimulationOptions, Climber, Physics, Motors, Sensors))),
     **_names(PLANT, *((k, f"{name}.") for group in VARIANTS.values() for name, k in group.items())),
     **_names(PLANT, *ON_WALL),
 }

@@ -59,9 +59,9 @@ class Ended(RuntimeError):  # noqa: N818 - it is what happened
 
 @parameters
 class DemoOptions:
-    """Duration of the demonstration."""
+    """How long the demonstration lasts."""
 
-    duration: float = parameter(20.0, "s", "how long the trajectory is run", above=0)
+    duration: float = parameter(20.0, "s", "of the trajectory; too short: it is cut off", above=0)
 
 
 class Demo(ClimberNode):

@@ -31,11 +31,13 @@ class ExpectedDriver:
     """Parameters of the controller that describe the driver."""
 
     control_period: float = parameter(
-        0.005, "s", "from an odometry to the next", above=0, at_most=1
+        0.005, "s", "from an odometry to the next; wrong: a warning on `rate`", above=0, at_most=1
     )
-    odometry_timeout: float = parameter(0.1, "s", "age above which odometry is refused", above=0)
+    odometry_timeout: float = parameter(
+        0.1, "s", "age above which odometry is refused; too short: `age` fails", above=0
+    )
     transport_delay: float = parameter(
-        0.0, "s", "from a torque's publication to its action", at_least=0
+        0.0, "s", "from a torque's publication to its action; wrong: `latency` warns", at_least=0
     )
 
 

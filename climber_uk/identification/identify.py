@@ -31,8 +31,8 @@ from climber_uk.system.command_line import Parser, between
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
-def tell(options: argparse.Namespace) -> None:
-    """Print and write what a bag tells; raises `ValueError` of what it does not."""
+def identify_bag(options: argparse.Namespace) -> None:
+    """Print and write the parameters; raises `ValueError` if one is not determined."""
     cut = Values(vars(options)).read(Cut)
     file, plant = parameters_of(CONTROLLER, options), plant_of(options)
     names = Topics({ODOMETRY: options.odometry})
@@ -41,9 +41,9 @@ def tell(options: argparse.Namespace) -> None:
     parameters = {**recorded, **file}
     believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
     reader.check_one_run(climber)
-    told = {**file, **recorded}
-    delay = told.get("transport_delay", 0.0) if options.delay is None else options.delay
-    motion, unfit = read_motion(reader, climber, told, believed.suction_pressure, delay)
+    then = {**file, **recorded}
+    delay = then.get("transport_delay", 0.0) if options.delay is None else options.delay
+    motion, unfit = read_motion(reader, climber, then, believed.suction_pressure, delay)
     for loss in reader.bag.losses:
         print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
     found = identify(motion, believed, cut, site)
@@ -60,8 +60,8 @@ def tell(options: argparse.Namespace) -> None:
         identification_figure.draw(motion, believed, found, options.figure)
     if options.output:
         write_changed(options.params, changes(found, believed), options.output)
-    if said := list(missing(found)):
-        raise ValueError("\n".join(said))
+    if sentences := list(missing(found)):
+        raise ValueError("\n".join(sentences))
 
 
 def plan(options: argparse.Namespace) -> None:
@@ -84,19 +84,21 @@ def plan(options: argparse.Namespace) -> None:
     print(
         f"{best.name}, {best.trajectory.duration:.1f} s, from ({x:.3f}, {y:.3f}) {heading:.3f} rad"
     )
-    for name, share, sought in zip(NAMES, best.tells.uncertainty, excitation.SOUGHT, strict=True):
+    for name, share, sought in zip(
+        NAMES, best.expected.uncertainty, excitation.SOUGHT, strict=True
+    ):
         if sought:
             print(f"{label_of(name, site)[0]} ± {share:.2%}")
 
 
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
-    """Those of a node in the parameter file; none without one."""
+    """Parameters of a node in the parameter file, by name; empty without a file."""
     name = Topics().full(node, options.namespace.strip("/"))
     return read_file(options.params, name) if options.params else {}
 
 
 def plant_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Parameters of the simulator in the parameter file; none if that has none for it."""
+    """Parameters of the simulator in the parameter file, by name; empty if it has none."""
     try:
         return parameters_of(PLANT, options)
     except ValueError:
@@ -104,7 +106,7 @@ def plant_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Tell, or plan."""
+    """Identify, or plan."""
     parser = Parser("identify", __doc__)
     parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
@@ -122,8 +124,8 @@ def main() -> None:
     for kind, of in (Cut, "of a bag"), (excitation.ExcitationLimits, "of a plan"):
         for field in fields(kind):
             rule, name = field.metadata, "--" + field.name.replace("_", "-")
-            said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
-            parser.add_argument(name, type=float, default=field.default, help=said)
+            meaning = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
+            parser.add_argument(name, type=float, default=field.default, help=meaning)
     options = parser.arguments()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
@@ -134,6 +136,6 @@ def main() -> None:
         if options.plan:
             plan(options)
         else:
-            tell(options)
+            identify_bag(options)
     except (ValueError, OSError) as error:
         sys.exit(f"identify: {error}")

@@ -26,10 +26,10 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 
 class Equations(NamedTuple):
-    """Of one window: target = start · unknowns + design · coefficients + noise.
+    """Equations of one window: target = start · unknowns + design · coefficients + noise.
 
-    Rows are the times of what is measured first, then those of what is measured second. `lacking`
-    is what an acceleration (a speed, of wheels) that the equations lack would add: a constant one
+    Rows are the times of the first measured quantity, then those of the second. `lacking` is what
+    an acceleration that is missing in the equations would add (of wheels: a speed): a constant one
     of 1, and one that goes from -√3 to √3 in the window.
     """
 
@@ -37,7 +37,7 @@ class Equations(NamedTuple):
     design: Array  # (rows, coefficients)
     target: Array  # (rows,)
     lacking: Array  # (rows, 2)
-    measured: int  # how many quantities
+    measured: int  # number of measured quantities
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,21 @@ class Site:
 class Cut:
     """How a motion is cut into windows, in which its direction does not change."""
 
-    window: float = parameter(1.0, "s", "length of a window", above=0)
-    least_speed: float = parameter(0.02, "m/s", "below which it may as well rest", above=0)
+    window: float = parameter(
+        1.0, "s", "length of a window: longer ones are less noisy, but fewer", above=0
+    )
+    least_speed: float = parameter(
+        0.02, "m/s", "speed that counts as motion: too low, and rest spoils the friction", above=0
+    )
     least_yaw_rate: float = parameter(
-        0.05, "rad/s", "below which it may as well not turn: friction there is any", above=0
+        0.05, "rad/s", "yaw rate that counts as turning: likewise", above=0
     )
 
     def windows(self, motion: RecordedMotion) -> list[Indices]:
         """Indices of the times in each window in which it drives one way."""
         return self._cut(motion, motion.speed, self.least_speed)
 
-    def turning(self, motion: RecordedMotion) -> list[Indices]:
+    def yaw_windows(self, motion: RecordedMotion) -> list[Indices]:
         """Indices of the times in each window in which it turns one way."""
         return self._cut(motion, motion.smooth_rates[:, 1], self.least_yaw_rate)
 
@@ -73,11 +77,11 @@ class Cut:
         windows: list[Indices] = []
         for run in np.split(np.arange(len(motion.time)), np.flatnonzero(breaks) + 1):
             time = motion.time[run]
-            # it may rest, and not rub, as long before and after as rates are smoothed
-            sure = run[(time >= time[0] + SMOOTHING) & (time <= time[-1] - SMOOTHING)]
-            duration = np.ptp(motion.time[sure]) if len(sure) else 0.0
+            # smoothed rates do not show rest, without friction, so close to a change of direction
+            inner = run[(time >= time[0] + SMOOTHING) & (time <= time[-1] - SMOOTHING)]
+            duration = np.ptp(motion.time[inner]) if len(inner) else 0.0
             count = int(duration / self.window + 1e-6) * int(moving[run[0]])
-            windows += np.array_split(sure, count) if count else []
+            windows += np.array_split(inner, count) if count else []
         return windows
 
 
@@ -94,7 +98,7 @@ def drive_equations(
     return [_driven(motion, w, 0, motion.way, resisted[w], known[w]) for w in windows]
 
 
-def turn_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
+def yaw_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
     """(15) in each window: b₁, b₂, b₃, and b₁ times how much later torques act than assumed."""
     found, yaw_rate = [], motion.smooth_rates[:, 1]
     for window in windows:
@@ -119,7 +123,7 @@ def wheel_equations(
 
 
 def friction_load(motion: RecordedMotion, climber: Climber, site: Site) -> Array:
-    """(1 - k) P S (n,) [N], of which the seal rubs with μ times as much; 1 N without a seal."""
+    """Normal force on the seal (1 - k) P S (n,) [N], μ of which is friction; 1 N without a seal."""
     if not site.has_seal:
         return np.ones(len(motion.time))
     return (1 - climber.wheel_load_share) * climber.suction_area * motion.pressure
@@ -152,7 +156,10 @@ def _driven(
 def _twice_integrated(
     time: Array, rate: Array | None, gone: Array, impulses: Array, known: Array
 ) -> Equations:
-    """Of a rate, if it is measured, and of how far it has `gone`; `known` is what it adds to it."""
+    """Equations of a rate, if it is measured (else None), and of its integral `gone` (m,).
+
+    `impulses` (m, c) multiply the coefficients, `known` (m,) is what adds to the rate without one.
+    """
     one, since = np.ones_like(time), time - time[0]
     lacking = _integral(_shapes(time), time)
     start, target = np.column_stack([since, one]), gone - gone[0] - _integral(known, time)
@@ -160,7 +167,7 @@ def _twice_integrated(
     if rate is None:
         return Equations(start, design, target, moved, 1)
     return Equations(
-        # of its own, for sensors of rates have a bias
+        # an unknown of its own, as sensors of rates have a bias
         np.concatenate([np.column_stack([one, 0 * start]), np.column_stack([0 * one, start])]),
         np.concatenate([impulses, design]),
         np.concatenate([rate - known, target]),

@@ -1,4 +1,4 @@
-"""By how much torques act later than assumed: a delay and a lag of first order, by search.
+"""Delay and lag of first order by which torques act later than assumed, by search.
 
 A delay of δ adds -a₁ δ τ to the speed, and -b₁ δ τ to the yaw rate. Where that coefficient shows,
 the delay and lag with the least cost are taken, and the coefficient is fitted all the same: what is

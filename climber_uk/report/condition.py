@@ -1,4 +1,4 @@
-"""Conditions such as rms_cross_track>0.01, under which a run has failed."""
+"""Conditions such as rms_cross_track>0.01; if one holds, a run has failed."""
 
 import math
 from dataclasses import dataclass

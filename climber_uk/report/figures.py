@@ -1,25 +1,22 @@
-"""Runs in pictures, one over the other."""
+"""Figures of runs, their curves over each other."""
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from io import BytesIO
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.bags.connection import one_line
 from climber_uk.bags.events import ERROR, OK
-from climber_uk.bags.recorded import TimeSeries
 from climber_uk.bags.run import RecordedRun
+from climber_uk.bags.time_series import TimeSeries
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 from climber_uk.messages import topics
+from climber_uk.report.plotting import plt
 
 Curves = tuple[Array, Array]  # times (n,) [s] and values (n, k)
 WIDTH = 9.0  # [in]
@@ -41,7 +38,7 @@ Runs = Sequence[tuple[str, RecordedRun]]
 
 
 def draw(runs: Runs) -> dict[str, bytes]:
-    """Figures of some named runs as PNG, by name; without those for which nothing is known."""
+    """Figures of named runs as PNG, by name, without those that would be empty."""
     with plt.rc_context(STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", category=UserWarning)  # letters without a glyph, no room
         shown = [(one_line(name), run) for name, run in runs]
@@ -120,8 +117,8 @@ def _modes(runs: Runs) -> Figure:
             waits = mode.level == OK and mode.text != Mode.FOLLOWING.value
             colour = "0.75" if waits else COLOURS[mode.level]
             axes.broken_barh([(begin, end - begin)], (row - 0.3, 0.6), color=colour)
-        told = [time for time, event in run.events if event.kind != "mode" and event.level]
-        axes.plot(told, [row] * len(told), "v", color="black", markersize=5)
+        warned = [time for time, event in run.events if event.kind != "mode" and event.level]
+        axes.plot(warned, [row] * len(warned), "v", color="black", markersize=5)
     axes.set_yticks(range(len(runs)), [label for label, _ in runs])
     axes.set_ylim(len(runs) - 0.5, -0.5)
     axes.set(xlabel="time [s]")

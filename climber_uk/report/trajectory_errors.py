@@ -1,4 +1,4 @@
-"""Errors of a planar trajectory as the field defines them (Sturm et al. 2012).
+"""Absolute and relative pose errors of a planar trajectory (Sturm et al. 2012).
 
     absolute: Qᵢ⁻¹ Pᵢ        relative: (Qᵢ⁻¹ Qⱼ)⁻¹ (Pᵢ⁻¹ Pⱼ)
 
@@ -38,5 +38,5 @@ def _moves(pose: Array) -> Array:
 
 
 def _sizes(error: Array) -> Array:
-    x, y, turn = unpack(error)
-    return pack(np.hypot(x, y), np.abs(wrapped(turn)))
+    x, y, angle = unpack(error)
+    return pack(np.hypot(x, y), np.abs(wrapped(angle)))

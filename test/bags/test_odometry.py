@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from made_bag import ODOMETRY, RADIUS, RATE, SECOND, STORE, Made, a_run, turn
 
 from climber_uk.bags.batches import decode
+from climber_uk.bags.extraction import FAULTS, heading
 from climber_uk.bags.recorded_run import read_runs
-from climber_uk.bags.taking import FAULTS, heading
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.reading import heading_of

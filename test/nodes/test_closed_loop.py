@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 import pytest
+from bag_contents import read_messages
 from evo.core import metrics
 from evo.tools import file_interface
 from world import CONFIG, World, executable, inhabitants
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.bags.recorded_run import read_run
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading

@@ -1,4 +1,4 @@
-"""What a metric is: a name for machines, a unit, a definition, and how it comes from a run."""
+"""What a metric is: a name for machines, a unit, a definition, and the function of a run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,13 +25,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Metric:
-    """A number of a run, in SI units; nan where the bag, or what is known, does not tell it."""
+    """A number of a run, in SI units; nan if the bag has not what it takes."""
 
     name: str
     unit: str
     definition: str
     of: Callable[[Case], float]
-    concerns: Callable[[Case], bool] = lambda _: True  # whether the climber has such a thing
+    concerns: Callable[[Case], bool] = lambda _: True  # whether it applies to the climber
 
 
 def rms(values: Array) -> float:

@@ -1,4 +1,4 @@
-"""How punctual odometry and torques were, and what of them was lost."""
+"""Latency, period and jitter of odometry and torques, and what of them was lost."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ def periods(case: Case) -> Array:
 
 
 def period(case: Case) -> float:
-    """The usual one [s]."""
+    """Median period of the odometry [s]."""
     return percentile(periods(case), 50)
 
 

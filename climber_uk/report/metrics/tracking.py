@@ -37,10 +37,10 @@ STATISTICS: dict[str, tuple[str, Callable[[Array], float]]] = {
 
 
 def _statistic(statistic: str, quantity: str) -> Metric:
-    said, evaluate = STATISTICS[statistic]
+    description, evaluate = STATISTICS[statistic]
     unit, meaning, values = QUANTITIES[quantity]
     name = f"{statistic}_{quantity}"
-    return Metric(name, unit, said.format(meaning), lambda case: evaluate(values(case)))
+    return Metric(name, unit, description.format(meaning), lambda case: evaluate(values(case)))
 
 
 def settling_time(case: Case) -> float:

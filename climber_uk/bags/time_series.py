@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from climber_uk.bags.taking import FAULTS, WIDEST, Faults
+from climber_uk.bags.extraction import FAULTS, WIDEST, Faults
 from climber_uk.mechanics import Array, Stamps
 
 
@@ -17,7 +17,7 @@ class Samples(NamedTuple):
     stamps: Stamps  # (n,) [ns]
     arrivals: Stamps  # (n,) log times [ns]
     values: Array  # (n, k)
-    faults: Faults  # (n,) what is wrong with each, as a place in `taking.FAULTS`
+    faults: Faults  # (n,) what is wrong with each, an index of `extraction.FAULTS`
 
     def where(self, chosen: Any) -> "Samples":
         """Those that a mask, or places (m,), choose."""
