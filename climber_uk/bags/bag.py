@@ -76,7 +76,7 @@ class Bag:
         what = one_line(what)
         if what not in self.losses and len(self.losses) <= MOST_LOSSES:
             too_many = len(self.losses) == MOST_LOSSES
-            self.losses.append("and more, which are not told" if too_many else what)
+            self.losses.append("and more, which are not listed" if too_many else what)
 
     def lose_message(self, topic: str, why: str) -> None:
         """Note that a message could not be read, once by topic."""

@@ -68,7 +68,7 @@ class BagWriter:
         """Store all messages taken."""
         messages, self._pending = self._in_order(self._pending), []
         # The metadata go first: rosbags does not read a topic they do not name, while a count
-        # that is too high by the messages of one flush misleads nobody.
+        # that is too high by the messages of one flush does no harm.
         self._write_metadata()
         try:
             self._storage.write(messages)

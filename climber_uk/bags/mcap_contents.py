@@ -139,7 +139,7 @@ class _Search:
         self.contents.rescue(self._damaged)
         nameless = self.contents.counts.keys() - self.contents.channels.keys()
         if count := sum(self.contents.counts[channel] for channel in nameless):
-            lose(f"{count} messages are left out: their topic is not told")
+            lose(f"{count} messages are left out: their topic is unknown")
 
     def _go_through(self) -> None:
         file, magic = self._file, len(MCAP0_MAGIC)

@@ -55,9 +55,8 @@ class SqliteFile:
             self.size += sum(file.stat().st_size for file in scratch.glob(f"{path.name}-*"))
         with ExitStack() as stack:
             try:
-                self._database = stack.enter_context(
-                    closing(open_database(readable, self._patience))
-                )
+                database = open_database(readable, self._patience)
+                self._database = stack.enter_context(closing(database))
                 self._look_into()
             except sqlite3.Error as error:
                 raise ValueError(f"no readable database: {error}") from None

@@ -1,7 +1,7 @@
 """The storage files of a rosbag2 directory, of which a killed writer loses only the last write.
 
-`rosbags` writes such files too, but nobody can open one that was not closed. These are whole after
-every `write`.
+`rosbags` writes such files too, but those that were not closed do not open. These are complete
+after every `write`.
 """
 
 import os

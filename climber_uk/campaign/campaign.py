@@ -34,7 +34,10 @@ class Size:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What runs share, and what is drawn for each: run k depends on the seed and k only."""
+    """Values that all runs share, and distributions of the others.
+
+    Run k depends on the seed and on k only.
+    """
 
     base: Path  # parameter file of the nodes
     size: Size
@@ -58,7 +61,7 @@ class Campaign:
         return own
 
     def described(self) -> dict[str, str]:
-        """All that the results depend on, as strings by name."""
+        """Everything that the results depend on, as strings by name."""
         size, shared = vars(self.size), self.scenario.values
         return {
             "climber_uk": version("climber_uk"),

@@ -1,4 +1,4 @@
-"""Closed loops that have the parameters of the nodes."""
+"""Batches of closed loops, made from the parameters of the nodes."""
 
 import math
 from collections.abc import Mapping

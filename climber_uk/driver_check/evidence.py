@@ -1,4 +1,4 @@
-"""What was seen of a driver: its topics, its odometry with times of arrival, torques of a trial.
+"""Data on a driver: its topics, its odometry with times of arrival, the torques of a trial.
 
 Stamps and times of arrival are integers in nanoseconds.
 """
@@ -6,6 +6,7 @@ Stamps and times of arrival are integers in nanoseconds.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,8 +15,7 @@ from numpy.typing import NDArray
 from climber_uk.control.twist import TwistKind
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import Motion as Rolling
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.messages import reading
 from climber_uk.parameters.declaration import parameter, parameters
 
@@ -92,15 +92,11 @@ class MotionSeen:
     @cached_property
     def has_mean_twist(self) -> bool:
         """Whether twists are means of the period before, as of encoders; see `TwistKind`."""
-        kind, motions = TwistKind(), self._motions()
-        for before, now, time in zip(motions, motions[1:], np.diff(self.time), strict=False):
-            kind.learn(before, now, float(time))
+        kind = TwistKind()
+        motions = [Motion.at(*row) for row in np.hstack([self.pose, self.reaction]).tolist()]
+        for (before, now), time in zip(pairwise(motions), np.diff(self.time).tolist(), strict=True):
+            kind.learn(before, now, time)
         return kind.is_mean
-
-    def _motions(self) -> list[Rolling]:
-        columns = [*self.pose.T, *np.cos(self.pose[:, 2:]).T, *np.sin(self.pose[:, 2:]).T]
-        rows = zip(*(column.tolist() for column in (*columns, *self.reaction.T)), strict=True)
-        return [Rolling(*row) for row in rows]
 
     @cached_property
     def reaction(self) -> Array:
@@ -136,7 +132,7 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class Evidence:
-    """All that was seen of a driver, for the checks."""
+    """All data on a driver that the checks use."""
 
     climber: Climber
     expected: ExpectedDriver
@@ -155,7 +151,7 @@ class Evidence:
 
     @cached_property
     def errors(self) -> list[str]:
-        """Messages of what is unfit in odometry, one for each that is."""
+        """Messages on unfit odometry, one for each."""
         errors = []
         for arrival in self.arrivals:
             try:

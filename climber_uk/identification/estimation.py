@@ -43,7 +43,7 @@ CUT, SITE, LEAST_WINDOWS = Cut(), Site(), 5
 SPREAD = 0.05  # of the speed: least difference of speeds that shows viscous friction
 REJECTIONS = 3  # times that windows are left out
 # [SI] of speed, way; yaw rate, heading; way; heading: noise to begin with, and a tenth of it is the
-# least that is believed of a sensor.
+# least that is assumed of a sensor.
 NOISE = {DRIVE: (1e-2, 1e-3), TURN: (1e-2, 1e-3), WAY: (1e-3,), HEADING: (1e-3,)}
 Windows = Mapping[str, list[Indices]]
 

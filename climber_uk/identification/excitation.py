@@ -60,9 +60,8 @@ class ExcitationPlan:
     @property
     def is_short(self) -> bool:
         """Whether it has too few windows, should some be lost to noise."""
-        return (
-            min(len(self.expected.windows[kind]) for kind in (DRIVE, TURN)) < AMPLE * LEAST_WINDOWS
-        )
+        counts = [len(self.expected.windows[kind]) for kind in (DRIVE, TURN)]
+        return min(counts) < AMPLE * LEAST_WINDOWS
 
     @property
     def worst(self) -> float:

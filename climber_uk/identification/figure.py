@@ -12,18 +12,18 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.report.plotting import plt, saved
 
 
-def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Path) -> Path:
+def draw(motion: RecordedMotion, assumed: Climber, found: Identified, path: Path) -> Path:
     """Write the figure as PNG; return its path."""
     figure, axes = plt.subplots(2, 2, figsize=(10, 6), sharex=True, layout="constrained")
     time = motion.time - motion.time[0]
-    now = np.array([getattr(believed, name, 0.0) for name in NAMES])
+    now = np.array([getattr(assumed, name, 0.0) for name in NAMES])
     values = np.where(np.isfinite(found.values), found.values, now)
     columns = (DRIVE, "drive [N]", "way [mm]"), (TURN, "moment [N m]", "heading [mrad]")
     for column, (kind, driven, measured) in enumerate(columns):
         windows, (above, below) = found.windows[kind], axes[:, column]
         middles = [time[window].mean() for window in windows]
         for model, style, label in ((now, "0.6", "nodes now"), (values, "tab:blue", "identified")):
-            wrenches = [model_wrench(motion, believed, found.site, model, w) for w in windows]
+            wrenches = [model_wrench(motion, assumed, found.site, model, w) for w in windows]
             above.plot(middles, [wrench[column] for wrench in wrenches], color=style, label=label)
         wrenches = [motors_wrench(motion, values, w) for w in windows]
         above.plot(middles, [wrench[column] for wrench in wrenches], "k.", label="motors")

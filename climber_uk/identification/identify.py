@@ -1,7 +1,7 @@
 """`identify BAG`: mass, inertia, friction and geometry of the climber that a bag was recorded of.
 
 `identify --plan FILE` writes a parameter file with a trajectory that shows them well. The status is
-1 if something cannot be told, or went wrong.
+1 if a parameter is not determined, or something went wrong.
 """
 
 import argparse
@@ -39,27 +39,27 @@ def identify_bag(options: argparse.Namespace) -> None:
     reader, climber = RunReader.read(options.bag, names, options.namespace.strip("/"), TOPICS)
     recorded = climber.first_parameters
     parameters = {**recorded, **file}
-    believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
+    assumed, site = Values(parameters).read(Climber), site_of(parameters, plant)
     reader.check_one_run(climber)
     then = {**file, **recorded}
     delay = then.get("transport_delay", 0.0) if options.delay is None else options.delay
-    motion, unfit = read_motion(reader, climber, then, believed.suction_pressure, delay)
+    motion, unfit = read_motion(reader, climber, then, assumed.suction_pressure, delay)
     for loss in reader.bag.losses:
         print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
-    found = identify(motion, believed, cut, site)
-    print(table(found, believed), end="")
+    found = identify(motion, assumed, cut, site)
+    print(table(found, assumed), end="")
     print(*remarks(found), sep="\n")
     for warning in (*differences(file, recorded, site), *assumed_away(parameters, plant)):
         print(warning)
     if unfit:
         print(f"{unfit} unfit messages were left out")
     if options.json:
-        text = json.dumps(list(rows(found, believed)), indent=2)
+        text = json.dumps(list(rows(found, assumed)), indent=2)
         options.json.write_text(text + "\n", encoding="utf-8")
     if options.figure:
-        identification_figure.draw(motion, believed, found, options.figure)
+        identification_figure.draw(motion, assumed, found, options.figure)
     if options.output:
-        write_changed(options.params, changes(found, believed), options.output)
+        write_changed(options.params, changes(found, assumed), options.output)
     if sentences := list(missing(found)):
         raise ValueError("\n".join(sentences))
 
@@ -69,11 +69,11 @@ def plan(options: argparse.Namespace) -> None:
     parameters = parameters_of(PLANNER, options)
     origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
     controller = parameters_of(CONTROLLER, options)
-    site, believed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
+    site, assumed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
     if not site.has_seal:
-        believed = replace(believed, seal_friction_coefficient=0.0)
+        assumed = replace(assumed, seal_friction_coefficient=0.0)
     limits = Values(vars(options)).read(excitation.ExcitationLimits)
-    best = excitation.plan(believed, limits, origin, site)
+    best = excitation.plan(assumed, limits, origin, site)
     x, y, heading = best.trajectory.at(0.0).pose.tolist()
     changed = {
         PLANNER: best.parameters,
@@ -113,7 +113,7 @@ def main() -> None:
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument("--odometry", default=ODOMETRY, help=f"topic (default: {ODOMETRY})")
     parser.add_argument(
-        "--delay", type=between(0.0, 10.0), help="[s] of torques, unless joint_states tells them"
+        "--delay", type=between(0.0, 10.0), help="[s] of torques, unless joint_states has them"
     )
     parser.add_argument("--output", "-o", type=Path, help="write a parameter file for the nodes")
     parser.add_argument("--json", type=Path, help="write the table as JSON")

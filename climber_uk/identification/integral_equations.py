@@ -4,7 +4,7 @@
     ω                    = ω₀ + b₁ ∫ (τR - τL) dt - b₂ ∫ sgn ω dt - b₃ ∫ ω dt             (15)
 
 and integrated once more, for the way and the heading; where wheel angles are known, way and heading
-as these tell them. g·e is gravity along the heading, u a side slip (0 of wheels that hold), and σ
+by these. g·e is gravity along the heading, u a side slip (0 of wheels that hold), and σ
 the direction in which the seal slides. Nothing is differentiated, and what is integrated are
 torques, which are known: only the noise of heading and way gets into the regressors, where it
 hardly counts. v₀, ω₀ and the like are different in each window, and projected out.

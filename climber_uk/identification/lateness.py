@@ -16,7 +16,7 @@ from climber_uk.identification.window_fit import WindowFit
 
 # [s] tried first; the last ones are the most that is found
 DELAYS, LAGS = (0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2), (0.0, 0.02, 0.04, 0.08)
-SURE = 4.0  # standard deviations of a delay that is believed
+SURE = 4.0  # standard deviations, above which a delay is significant
 EVALUATIONS = 60
 
 EquationsAt = Callable[[float, float], Mapping[str, Sequence[Equations]]]  # of delay and lag

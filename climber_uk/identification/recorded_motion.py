@@ -183,9 +183,8 @@ def _ratio(at_wheels: Torques, commanded: Torques) -> float:
     times = np.arange(first, min(at_wheels[0][-1], commanded[0][-1]), HALF_SECOND)
     if len(times) < 2:
         return 1.0
-    both = (np.diff(impulse(times, *of), axis=0).ravel() for of in (at_wheels, commanded))
-    actual, wanted = both
-    return float(actual @ wanted / (wanted @ wanted)) if wanted.any() else 1.0
+    at, by = (np.diff(impulse(times, *each), axis=0).ravel() for each in (at_wheels, commanded))
+    return float(at @ by / (by @ by)) if by.any() else 1.0
 
 
 def _angles(time: Array, wheels: TimeSeries) -> Array | None:

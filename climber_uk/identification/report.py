@@ -25,7 +25,7 @@ def label_of(name: str, site: Site) -> tuple[str, str]:
     return (name, UNITS[name]) if site.has_seal else WITHOUT_SEAL.get(name, (name, UNITS[name]))
 
 
-def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
+def rows(found: Identified, assumed: Climber) -> Iterator[dict[str, Any]]:
     """Row of each parameter, as in the JSON file; a reason in place of an undetermined value."""
     for name, value, half_width in zip(NAMES, found.values, found.half_widths, strict=True):
         label, unit = label_of(name, found.site)
@@ -35,7 +35,7 @@ def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
             "estimate": None if reason else float(value),
             "half_width": None if reason else float(half_width),
             "unit": unit,
-            "nodes_now": float(getattr(believed, label, 0.0)),
+            "nodes_now": float(getattr(assumed, label, 0.0)),
             "known": reason is None,
             "cause": reason and reason.cause,
             "reason": reason and reason.words,
@@ -43,10 +43,10 @@ def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
         }
 
 
-def table(found: Identified, believed: Climber) -> str:
+def table(found: Identified, assumed: Climber) -> str:
     """The rows as a Markdown table."""
     cells = []
-    for row in rows(found, believed):
+    for row in rows(found, assumed):
         digits = {"estimate": 5, "half_width": 2, "nodes_now": 5}
         numbers = [("" if row[key] is None else f"{row[key]:.{n}g}") for key, n in digits.items()]
         why = f"cannot be told: {row['reason']}" if row["reason"] else ""
@@ -104,10 +104,10 @@ def missing(found: Identified) -> Iterator[str]:
             yield f"{begin}{advice} (see --plan)"
 
 
-def changes(found: Identified, believed: Climber) -> dict[str, dict[str, Any]]:
+def changes(found: Identified, assumed: Climber) -> dict[str, dict[str, Any]]:
     """Parameters to change, by node: those that are determined."""
-    known = {row["parameter"]: row["estimate"] for row in rows(found, believed) if row["known"]}
-    climber = {name: value for name, value in known.items() if hasattr(believed, name)}
+    known = {row["parameter"]: row["estimate"] for row in rows(found, assumed) if row["known"]}
+    climber = {name: value for name, value in known.items() if hasattr(assumed, name)}
     controller, plant = dict(climber), dict(climber)
     if found.site.has_seal and _friction_is_known(found):
         controller[COULOMB] = max(0.0, found.friction / found.extent.load)

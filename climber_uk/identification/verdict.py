@@ -89,7 +89,8 @@ def _why(found: Identified, name: str) -> Reason:
     if goes_with[other] > TOGETHER:
         names = (*NAMES[FIRST[kind] :][:3], "the delay of torques")
         sought = [n for n in names if n not in NAMES or found.sought[NAMES.index(n)]]
-        return Reason("collinear", f"not apart from {_plain(sought[other])}: {shown}")
+        partner = sought[other].replace("_", " ")
+        return Reason("collinear", f"not apart from {partner}: {shown}")
     if fit.noise[0] > NOISY * USUAL * (1.0 if len(fit.noise) > 1 else 0.1):
         return Reason("noise", f"odometry is noisy: {shown}")
     return Reason("not excited", f"the motion hardly shows it: {shown}")
@@ -150,7 +151,3 @@ def _made_of_wheels(found: Identified, climber: Climber) -> Iterator[tuple[str, 
 
 def _is_surely_negative(found: Identified, name: str) -> bool:
     return -found[name] > SURE * found.half_width(name)
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")

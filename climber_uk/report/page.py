@@ -28,7 +28,7 @@ def page(title: str, columns: Sequence[Column], figures: Mapping[str, bytes]) ->
         losses="".join(map(_losses, columns)),
         modes="".join(_figure(name, figures[name]) for name in figures if name == TIME_LINE),
         figures="".join(_figure(name, figures[name]) for name in figures if name != TIME_LINE),
-        events="".join(map(_events, columns)) or "<p>Nothing was told.</p>",
+        events="".join(map(_events, columns)) or "<p>Nothing was reported.</p>",
         table=_table(columns),
         unknown=escape(", ".join(unknown(columns)) or "none"),
     )

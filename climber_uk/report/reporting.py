@@ -52,7 +52,7 @@ def parser(name: str, description: str | None) -> Parser:
         help="other name of a topic, as in odom:=/robot/odom; may be repeated",
     )
     made.add_argument(
-        "--params", type=Path, help="parameter file of the nodes (default: as the bag tells them)"
+        "--params", type=Path, help="parameter file of the nodes (default: those in the bag)"
     )
     made.add_argument(
         "--settled",

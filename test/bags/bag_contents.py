@@ -9,5 +9,7 @@ def read_messages(path, topics=None):
     `topics` selects by full names (default: all); what cannot be read is left out.
     """
     with open_bag(path) as bag:
-        for connection, log_time, _, message in bag.messages(topics or bag.types):
+        for connection, log_time, _, message in bag.messages(
+            bag.types if topics is None else topics
+        ):
             yield connection.topic, log_time, message

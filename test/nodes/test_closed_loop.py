@@ -104,7 +104,9 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
 
 def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     run = read_run(climber_bag)
-    assert run.margins.min() > 2.8  # as its parameter file says of its wheels, at worst
+    assert (
+        run.margins.values[:, :2].min() > 2.8
+    )  # as its parameter file says of its wheels, at worst
     assert np.abs(run.error[:, 1]).max() < 2e-3
     assert run.time[-1] > 56
     assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second

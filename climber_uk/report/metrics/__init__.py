@@ -8,7 +8,7 @@ RUN = (
     Metric(
         "travelled",
         "m",
-        "way of the centre, by the speed in the odometry, or by its poses if it tells no twist, "
+        "way of the centre, by the speed in the odometry, or by its poses if it has no twist, "
         "or one that contradicts them; straight over gaps in the recording",
         lambda case: case.run.travelled,
     ),

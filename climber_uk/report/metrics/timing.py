@@ -32,11 +32,6 @@ def unanswered(case: Case) -> float:
     return float(np.sum(~np.isin(odometry, answers)))
 
 
-def arrivals_off(case: Case) -> Array:
-    """How much longer than by their stamps it took from one odometry to the next (n - 1,) [s]."""
-    return np.diff(case.run.odometry.arrivals) / SECOND - periods(case)
-
-
 METRICS = (
     Metric(
         "latency_p50",
@@ -63,7 +58,7 @@ METRICS = (
         "s",
         "standard deviation of the time from one arrival of odometry to the next, less the time "
         "by their stamps: of wall-clock runs only, a simulation has its own pace",
-        lambda case: deviation(arrivals_off(case)),
+        lambda case: deviation(np.diff(case.run.odometry.arrivals) / SECOND - periods(case)),
     ),
     Metric("odometry_count", "", "odometry messages", lambda case: float(len(case.run.time))),
     Metric(

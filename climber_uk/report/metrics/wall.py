@@ -67,7 +67,7 @@ METRICS = (
         "lowest_slip_margin",
         "",
         "grip of the wheels over what is asked of it, at worst; below 1 they slip. As the "
-        "simulator tells it, else as the controller estimates it",
+        "simulator publishes it, else as the controller estimates it",
         lambda case: lowest(_margin(case, 0)),
     ),
     Metric(
