@@ -15,8 +15,8 @@ from climber_uk.identification.identified import (
     NAMES,
     NOTHING,
     OF_TURNING,
-    TURN,
     WAY,
+    YAW,
     Choice,
     Identified,
     Widths,
@@ -25,7 +25,7 @@ from climber_uk.identification.window_fit import WindowFit
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
-FIRST = {DRIVE: 0, TURN: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
+FIRST = {DRIVE: 0, YAW: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
 VISCOUS, LATE = 2, 3  # columns of (11) and (15)
 QUANTILE = 0.975  # of intervals of 95 %
 KNOWN = 0.1  # uncertainty, relative to the value or the drive, above which a value is of no use
@@ -72,7 +72,7 @@ def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identif
     """
     number = NAMES.index("turning_friction")
     scrubs = found.values[number] > SURE * found.half_widths[number]
-    is_told = TURN in found.fits and found.uncertainty[number] <= KNOWN
+    is_told = YAW in found.fits and found.uncertainty[number] <= KNOWN
     if HEADING not in found.fits or (is_told and not scrubs):
         return found
     track, effective = climber.half_track, found["half_track"]

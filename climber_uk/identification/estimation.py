@@ -17,8 +17,8 @@ from climber_uk.identification.identified import (
     DRIVE,
     HEADING,
     IN_TIME,
-    TURN,
     WAY,
+    YAW,
     Extent,
     Identified,
     Widths,
@@ -44,7 +44,7 @@ SPREAD = 0.05  # of the speed: least difference of speeds that shows viscous fri
 REJECTIONS = 3  # times that windows are left out
 # [SI] of speed, way; yaw rate, heading; way; heading: noise to begin with, and a tenth of it is the
 # least that is assumed of a sensor.
-NOISE = {DRIVE: (1e-2, 1e-3), TURN: (1e-2, 1e-3), WAY: (1e-3,), HEADING: (1e-3,)}
+NOISE = {DRIVE: (1e-2, 1e-3), YAW: (1e-2, 1e-3), WAY: (1e-3,), HEADING: (1e-3,)}
 Windows = Mapping[str, list[Indices]]
 
 
@@ -60,13 +60,13 @@ def identify(
     if (count := len(task.windows[DRIVE])) < LEAST_WINDOWS:
         raise ValueError(f"{count} windows of {cut.window} s in motion must be >= {LEAST_WINDOWS}")
     columns = _columns(task.extent)
-    first = {kind: (*columns[kind], LATE) for kind in task.kinds if kind in (DRIVE, TURN)}
+    first = {kind: (*columns[kind], LATE) for kind in task.kinds if kind in (DRIVE, YAW)}
     usual, fits = task.fitted(first)
     late = lateness(fits, lambda delay, lag: usual.acting(delay, lag).equations)
     if late != IN_TIME:  # and the coefficient by which that may still be wrong
         task, columns = task.acting(*late), {**columns, **first}
     kept, fits = task.fitted({kind: columns[kind] for kind in task.kinds})
-    left_out = sum(len(task.windows[kind]) - len(kept.windows[kind]) for kind in (DRIVE, TURN))
+    left_out = sum(len(task.windows[kind]) - len(kept.windows[kind]) for kind in (DRIVE, YAW))
     values = parameters(fits, columns, climber)
     found = Identified(*values, fits, task.extent, kept.windows, site, left_out, late)
     found = with_scrub(found, columns, climber)
@@ -102,15 +102,15 @@ class Task:
     @property
     def kinds(self) -> list[str]:
         """Kinds of equations with enough windows."""
-        yawing = [TURN] if len(self.windows[TURN]) >= LEAST_WINDOWS else []
+        yawing = [YAW] if len(self.windows[YAW]) >= LEAST_WINDOWS else []
         return [DRIVE, *yawing, *([] if self.motion.wheel_angles is None else [WAY, HEADING])]
 
     @property
     def equations(self) -> dict[str, list[Equations]]:
         """Equations of each window, by kind."""
         found = {DRIVE: drive_equations(self.motion, self.climber, self.site, self.windows[DRIVE])}
-        if TURN in self.kinds:
-            found[TURN] = yaw_equations(self.motion, self.windows[TURN])
+        if YAW in self.kinds:
+            found[YAW] = yaw_equations(self.motion, self.windows[YAW])
         if WAY in self.kinds:
             found[WAY], found[HEADING] = wheel_equations(self.motion, self.windows[WAY])
         return found
@@ -120,7 +120,7 @@ class Task:
         """What drove the climber, and how it moved."""
         load = friction_load(self.motion, self.climber, self.site)
         time, impulse, _, distance, _ = self._changes(DRIVE)
-        yaw_time, _, angular_impulse, _, angle = self._changes(TURN)
+        yaw_time, _, angular_impulse, _, angle = self._changes(YAW)
         speed, yaw_rate = distance / time, angle / yaw_time
         each = impulse / time, angular_impulse / yaw_time, load, speed, yaw_rate
         rms = [float(np.sqrt(np.mean(values**2))) if len(values) else 0.0 for values in each]
@@ -158,7 +158,7 @@ def _windows(motion: RecordedMotion, cut: Cut) -> Windows:
     known = motion.time >= motion.time[0] + DELAYS[-1]
     inner = replace(motion, stretch=np.where(known, motion.stretch, -1))
     driving, yawing = cut.windows(inner), cut.yaw_windows(inner)
-    return {DRIVE: driving, TURN: yawing, WAY: driving, HEADING: driving}
+    return {DRIVE: driving, YAW: yawing, WAY: driving, HEADING: driving}
 
 
 def _columns(extent: Extent) -> dict[str, tuple[int, ...]]:
@@ -166,7 +166,7 @@ def _columns(extent: Extent) -> dict[str, tuple[int, ...]]:
     # else noise would pass for a difference of speeds, which makes none in friction
     spreads = {
         DRIVE: extent.speed_spread >= SPREAD * extent.speed,
-        TURN: extent.yaw_rate_spread >= SPREAD * extent.yaw_rate,
+        YAW: extent.yaw_rate_spread >= SPREAD * extent.yaw_rate,
     }
     both = {kind: (0, 1, VISCOUS) if differs else (0, 1) for kind, differs in spreads.items()}
     return {**both, WAY: (0,), HEADING: (0,)}

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from climber_uk.identification.estimation import CUT, LEAST_WINDOWS, SITE, predicted
-from climber_uk.identification.identified import DRIVE, NAMES, TURN, Identified
+from climber_uk.identification.identified import DRIVE, NAMES, YAW, Identified
 from climber_uk.identification.integral_equations import Site
 from climber_uk.identification.recorded_motion import RecordedMotion
 from climber_uk.mechanics import Array, unpack
@@ -60,7 +60,7 @@ class ExcitationPlan:
     @property
     def is_short(self) -> bool:
         """Whether it has too few windows, should some be lost to noise."""
-        counts = [len(self.expected.windows[kind]) for kind in (DRIVE, TURN)]
+        counts = [len(self.expected.windows[kind]) for kind in (DRIVE, YAW)]
         return min(counts) < AMPLE * LEAST_WINDOWS
 
     @property
@@ -131,8 +131,8 @@ def driven(trajectory: Trajectory, climber: Climber) -> tuple[RecordedMotion, Ar
     reference = trajectory.at(time)
     heading, speed = np.unwrap(reference.heading), reference.speed
     resisted = climber.seal_friction * sign(speed) + climber.weight_along_wall * sin(heading)
-    turn = climber.yaw_inertia * unpack(reference.acceleration)[2]
-    torques = climber.wheel_torques(climber.mass * reference.forward_acceleration + resisted, turn)
+    force = climber.mass * reference.forward_acceleration + resisted
+    torques = climber.wheel_torques(force, climber.yaw_inertia * unpack(reference.acceleration)[2])
     motion = RecordedMotion(
         time=time,
         pose=np.column_stack([reference.pose[:, :2], heading]),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from climber_uk.identification.identified import DRIVE, NAMES, TURN, Identified
+from climber_uk.identification.identified import DRIVE, NAMES, YAW, Identified
 from climber_uk.identification.integral_equations import Site, friction_load, gravity_ahead
 from climber_uk.identification.recorded_motion import Indices, RecordedMotion
 from climber_uk.mechanics import Array
@@ -18,7 +18,7 @@ def draw(motion: RecordedMotion, assumed: Climber, found: Identified, path: Path
     time = motion.time - motion.time[0]
     now = np.array([getattr(assumed, name, 0.0) for name in NAMES])
     values = np.where(np.isfinite(found.values), found.values, now)
-    columns = (DRIVE, "drive [N]", "way [mm]"), (TURN, "moment [N m]", "heading [mrad]")
+    columns = (DRIVE, "drive [N]", "way [mm]"), (YAW, "moment [N m]", "heading [mrad]")
     for column, (kind, driven, measured) in enumerate(columns):
         windows, (above, below) = found.windows[kind], axes[:, column]
         middles = [time[window].mean() for window in windows]
@@ -52,15 +52,15 @@ def model_wrench(
     motion: RecordedMotion, climber: Climber, site: Site, values: Array, window: Indices
 ) -> Array:
     """Force [N] and moment [N m] (2,) that the motion in a window takes with parameters (8,)."""
-    mass, coefficient, viscous, inertia, turning, resistance, _, _ = values
+    mass, coefficient, viscous, inertia, coulomb, resistance, _, _ = values
     time, heading = motion.time[window], motion.pose[window, 2]
     gone = np.column_stack([motion.way[window], heading])
     gone = gone - gone.mean(axis=0)
-    (speed, yaw_rate), (faster, turning_faster) = (weak_mean(time, gone, order) for order in (1, 2))
+    (speed, yaw_rate), (speed_1, yaw_rate_1) = (weak_mean(time, gone, order) for order in (1, 2))
     pulled = weak_mean(time, gravity_ahead(motion, climber, site)[window], 0)
     load = weak_mean(time, friction_load(motion, climber, site)[window], 0)
-    drive = mass * (faster - pulled) + coefficient * load * np.sign(speed) + viscous * speed
-    moment = inertia * turning_faster + turning * np.sign(yaw_rate) + resistance * yaw_rate
+    drive = mass * (speed_1 - pulled) + coefficient * load * np.sign(speed) + viscous * speed
+    moment = inertia * yaw_rate_1 + coulomb * np.sign(yaw_rate) + resistance * yaw_rate
     return np.array([drive, moment])
 
 

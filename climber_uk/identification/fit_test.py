@@ -12,9 +12,9 @@ from climber_uk.identification.identified import (
     DRIVE,
     HEADING,
     NOTHING,
-    TURN,
     WAY,
     WEIGHT,
+    YAW,
     Identified,
     Lack,
 )
@@ -31,7 +31,7 @@ def lacks(found: Identified, motion: RecordedMotion, climber: Climber) -> Iterat
     extent = found.extent
     scales = {
         DRIVE: (_positive(found["mass"], climber.mass), extent.force),
-        TURN: (_positive(found["yaw_inertia"], climber.yaw_inertia), extent.moment),
+        YAW: (_positive(found["yaw_inertia"], climber.yaw_inertia), extent.moment),
         WAY: (1.0, extent.speed),
         HEADING: (1.0, extent.yaw_rate),
     }

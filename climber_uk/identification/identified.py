@@ -25,7 +25,7 @@ UNITS = {
 }
 NAMES = tuple(UNITS)
 OF_TURNING = ("yaw_inertia", "turning_friction", "turning_resistance")
-DRIVE, TURN, WAY, HEADING = "drive", "turn", "way", "heading"  # kinds of equations
+DRIVE, YAW, WAY, HEADING = "drive", "yaw", "way", "heading"  # kinds of equations
 IN_TIME = (0.0, 0.0)
 NOTHING = 1e-100
 WORTH_A_WORD = 0.01  # share of all drive: a model error below it is not reported
@@ -33,7 +33,7 @@ SLIGHT = 5e-4  # likewise, of a weight that is not as assumed: it shows less tha
 WEIGHT = ("the weight's part across the heading", "the height")  # explain a weight not as assumed
 WORDS = {
     DRIVE: ("the drive", "N"),
-    TURN: ("the moment", "N m"),
+    YAW: ("the moment", "N m"),
     WAY: ("the wheels' way", "m/s"),
     HEADING: ("the wheels' turn", "rad/s"),
 }

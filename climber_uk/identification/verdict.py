@@ -15,10 +15,10 @@ from climber_uk.identification.identified import (
     HEADING,
     NAMES,
     OF_TURNING,
-    TURN,
     UNITS,
     WAY,
     WEIGHT,
+    YAW,
     Identified,
     Reason,
 )
@@ -36,7 +36,7 @@ OFF = 0.2  # difference of the torques at the wheels from those commanded, above
 OF_DRIVING = ("mass", "seal_friction_coefficient", "viscous_friction")
 OF_WHEELS = ("wheel_radius", "half_track")
 OF_TORQUES = (*OF_DRIVING, *OF_TURNING)
-OF_KIND = {DRIVE: OF_DRIVING, TURN: OF_TURNING, WAY: ("wheel_radius",), HEADING: ("half_track",)}
+OF_KIND = {DRIVE: OF_DRIVING, YAW: OF_TURNING, WAY: ("wheel_radius",), HEADING: ("half_track",)}
 
 
 def reasons(
@@ -98,8 +98,8 @@ def _why(found: Identified, name: str) -> Reason:
 
 def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
     """Parameters that were not fitted, or not apart from another one."""
-    if TURN not in found.fits:
-        windows = f"{len(found.windows[TURN])} windows of {cut.window:g} s"
+    if YAW not in found.fits:
+        windows = f"{len(found.windows[YAW])} windows of {cut.window:g} s"
         words = f"it turns one way at more than {cut.least_yaw_rate:g} rad/s in only {windows}"
         yield from ((name, Reason("not excited", words)) for name in OF_TURNING)
     elif not found.sought[NAMES.index("turning_resistance")]:
@@ -126,7 +126,7 @@ def _lumped(found: Identified) -> Iterator[tuple[str, Reason]]:
     """Frictions of which only the sum is determined, as they are not Coulomb's and viscous."""
     groups = (
         (DRIVE, OF_DRIVING[1:], "speed", f"{found.friction:.3g} N"),
-        (TURN, OF_TURNING[1:], "yaw rate", f"{found.turning_moment:.3g} N m"),
+        (YAW, OF_TURNING[1:], "yaw rate", f"{found.turning_moment:.3g} N m"),
     )
     lacking = {lack.kind for lack in found.lacks if lack.size > 0}
     for kind, (coulomb, viscous), rate, together in groups:

@@ -61,11 +61,11 @@ class PrintedSystem:
         """M (..., 3, 3) of (19)."""
         heading = unpack(q)[2]
         r, m = self.climber.wheel_radius, self.climber.mass
-        turning = self.climber.yaw_inertia * r / self.climber.half_track
+        inertia = self.climber.yaw_inertia * r / self.climber.half_track
         cosine, sine, zero = np.cos(heading), np.sin(heading), 0 * heading
         M = [
             [m * r * cosine, m * r * sine, zero],
-            [zero, zero, zero + turning],
+            [zero, zero, zero + inertia],
             [sine, -cosine, zero],
         ]
         return np.moveaxis(np.array(M), (0, 1), (-2, -1))

@@ -302,10 +302,10 @@ LACKING = {
 def test_what_the_equations_lack_is_said_and_makes_no_number_wrong(name, scrub):
     motion = moved(lacking=LACKING[name], scrub=scrub, noise=1.0, wheels=True)
     found = identify(motion, BELIEVED)
-    what = "drive" if np.any(LACKING[name][0]) else "turn"
+    what = "drive" if np.any(LACKING[name][0]) else "yaw"
     of_turning = {"turning_friction": None, "turning_resistance": None}
     of_driving = {"seal_friction_coefficient": None, "viscous_friction": None}
-    truth = of_turning if what == "turn" else {"turning_friction": scrub}
+    truth = of_turning if what == "yaw" else {"turning_friction": scrub}
     if "friction" in name:  # what is lacking is one itself
         truth |= of_driving
     assert not wrong(found, **truth)
