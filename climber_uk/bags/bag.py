@@ -1,7 +1,7 @@
-"""Read rosbag2 directories, damaged and hostile ones and those of killed recorders included.
+"""Read rosbag2 directories, also damaged and hostile ones, and those of recorders that were killed.
 
-Nothing is written but copies in a temporary directory, and nothing is believed: see the readers of
-the two kinds of files.
+Nothing is written, except for copies in a temporary directory. No size, count or name that stands
+in a file is relied on: see `mcap_file` and `sqlite_file`.
 """
 
 from collections.abc import Collection, Iterator
@@ -21,8 +21,8 @@ from climber_uk.bags.connection import Connection, Logged, StorageFile, one_line
 from climber_uk.bags.definitions import LONGEST, defined, known
 from climber_uk.bags.unpacking import LARGEST_MESSAGE, ZSTD_MAGIC, Allowance, unpack
 
-MOST_LOSSES = 20  # that are told
-MOST_DEFINITIONS = 4  # of the longest that are read
+MOST_LOSSES = 20  # lines on what could not be read
+MOST_DEFINITIONS = 4  # times `LONGEST`: the characters of all definitions together
 
 
 @dataclass
@@ -30,8 +30,8 @@ class Bag:
     """An open bag: its topics, its messages, and what of it could not be read."""
 
     path: Path
-    files: list[StorageFile]
-    losses: list[str] = field(default_factory=list)  # in words, more while messages are read
+    files: list[StorageFile] = field(default_factory=list)  # in the order of their first log times
+    losses: list[str] = field(default_factory=list)  # a line each; more while messages are read
 
     def __post_init__(self) -> None:
         self._stores: dict[str, Typestore | None] = {}
@@ -44,52 +44,45 @@ class Bag:
 
     @property
     def types(self) -> dict[str, str]:
-        """Type of every topic; of two the one with more messages."""
+        """Type by topic; of two types of a topic, the one with more messages."""
         by_count = sorted(self.connections, key=attrgetter("msgcount"))
         return {connection.topic: connection.msgtype for connection in by_count}
 
     def count(self, topics: Collection[str]) -> int:
-        """Return how many messages of some topics there should be."""
+        """Return the number of messages of some topics, as the files state it."""
         return sum(c.msgcount for c in self.connections if c.topic in topics)
 
     def recorded(self, topics: Collection[str]) -> Iterator[Logged]:
         """Yield the serialised messages of some topics in the order of the log times."""
-        parts = [self._of(file, topics) for file in self.files]
+        parts = [self._of_file(file, topics) for file in self.files]
         ends = [(file.start, file.end) for file in self.files]
         is_split = all(end <= start for (_, end), (start, _) in pairwise(ends))
         yield from chain(*parts) if is_split else merge(*parts, key=lambda message: message[1])
 
-    def raw_messages(
-        self, topics: Collection[str], by_publishing: bool = False
-    ) -> Iterator[tuple[Connection, int, bytes]]:
-        """Yield connection, log time [ns] and serialised message in the order of the log times.
-
-        `by_publishing` gives the time of publishing in place of the log time.
-        """
-        for connection, log_time, publish_time, data in self.recorded(topics):
-            yield connection, publish_time if by_publishing else log_time, data
-
     def messages(self, topics: Collection[str]) -> Iterator[tuple[Connection, int, int, Any]]:
-        """Yield connection, log time, publishing time (0: not told) [ns] and message."""
+        """Yield connection, log time, publishing time (0: unknown) [ns] and message."""
         for connection, log_time, publish_time, data in self.recorded(topics):
             store = self.store(connection)
             assert store is not None
             try:
                 message = store.deserialize_cdr(data, connection.msgtype)
-            except Exception as error:  # there is no telling what damaged bytes do to it
-                self.lose_message(connection.topic, _said(error))
+            except Exception as error:  # damaged bytes can make it raise anything
+                self.lose_message(connection.topic, _words(error))
                 continue
             yield connection, log_time, publish_time, message
 
     def lose(self, what: str) -> None:
-        """Note something that could not be read, once."""
-        tell_loss(self.losses, what)
+        """Note in one line something that could not be read: once, and not too many of them."""
+        what = one_line(what)
+        if what not in self.losses and len(self.losses) <= MOST_LOSSES:
+            too_many = len(self.losses) == MOST_LOSSES
+            self.losses.append("and more, which are not listed" if too_many else what)
 
     def lose_message(self, topic: str, why: str) -> None:
         """Note that a message could not be read, once by topic."""
-        said = f"{topic}: a message cannot be read"
-        if not any(loss.startswith(said) for loss in self.losses):
-            self.lose(f"{said} ({why})")
+        line = f"{topic}: a message cannot be read"
+        if not any(loss.startswith(line) for loss in self.losses):
+            self.lose(f"{line} ({why})")
 
     def store(self, connection: Connection) -> Typestore | None:
         """Definition of a topic's type, as the bag gives it or as Jazzy has it; None if unknown."""
@@ -113,7 +106,7 @@ class Bag:
             self.lose(f"{connection.topic}: definition of {name} is not used: {error}")
             return known(name)
 
-    def _of(self, file: StorageFile, topics: Collection[str]) -> Iterator[Logged]:
+    def _of_file(self, file: StorageFile, topics: Collection[str]) -> Iterator[Logged]:
         wanted = [c for c in file.connections if c.topic in topics and self.store(c)]
         allowance = Allowance(file.size)
         for connection, log_time, publish_time, data in file.messages(wanted):
@@ -137,52 +130,25 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"there is no bag {one_line(str(path))}")
-    losses: list[str] = []
-    failures: list[str] = []
-
-    def lose(what: str) -> None:
-        tell_loss(losses, what)
-
+    bag, failures = Bag(path), []
     with ExitStack() as stack:
         scratch = Path(stack.enter_context(TemporaryDirectory(prefix="climber_bag_")))
-        files: list[StorageFile] = []
-        for number, file in enumerate(storage_files(path, lose)):
+        for number, file in enumerate(storage_files(path, bag.lose)):
             own = scratch / str(number)
             own.mkdir()
             try:
-                files.append(stack.enter_context(closing(open_file(file, own, lose))))
+                opened = open_file(file, own, bag.lose)
+                bag.files.append(stack.enter_context(closing(opened)))
             except (ValueError, OSError) as error:
-                tell_loss(failures, f"{file.name}: {_said(error)}")
-        if not files:
+                failures.append(f"{file.name}: {_words(error)}")
+        if not bag.files:
             why = "; ".join(failures) or "neither metadata.yaml nor an .mcap or .db3 file in it"
             raise ValueError(one_line(f"{path} is no readable bag: {why}{other_files(path)}"))
         for failure in failures:
-            lose(f"{failure}: not read")
-        yield Bag(path, sorted(files, key=attrgetter("start")), losses)
+            bag.lose(f"{failure}: not read")
+        bag.files.sort(key=attrgetter("start"))
+        yield bag
 
 
-def tell_loss(losses: list[str], what: str) -> None:
-    """Add a loss, unless it was told, or too many were."""
-    what = one_line(what)
-    if what in losses or len(losses) > MOST_LOSSES:
-        return
-    losses.append(what if len(losses) < MOST_LOSSES else "and more, which are not told")
-
-
-def read_messages(
-    path: str | Path, topics: Collection[str] | None = None
-) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, log time [ns] and deserialised message in the order of the log times.
-
-    `topics` selects by full names (default: all). Raises as `open_bag` does; what cannot be read,
-    or is of an unknown type, is left out.
-    """
-    with open_bag(path) as bag:
-        for connection, log_time, _, message in bag.messages(
-            bag.types if topics is None else topics
-        ):
-            yield connection.topic, log_time, message
-
-
-def _said(error: Exception) -> str:
+def _words(error: Exception) -> str:
     return str(error) or type(error).__name__

@@ -1,4 +1,4 @@
-"""Which files a bag consists of, and what kind they are, by how they begin."""
+"""Which files a bag consists of, and their formats, by their first bytes."""
 
 import os
 import re
@@ -26,7 +26,7 @@ MOST_FILES = 10_000  # of a directory that are looked at
 MCAP, SQLITE, ZSTD = "MCAP", "SQLite", "zstd"
 MAGICS = {MCAP0_MAGIC: MCAP, SQLITE_MAGIC: SQLITE, ZSTD_MAGIC: ZSTD}
 SUFFIXES = {".mcap": MCAP, ".db3": SQLITE, ".zstd": ZSTD, ".zst": ZSTD}
-# what else people have, and what would make a bag of it
+# other files that are given for bags, by their first bytes, and how to make a bag of them
 OTHERS = {
     b"#ROSBAG": "a ROS 1 bag; `rosbags-convert --src FILE --dst BAG` makes one of ROS 2 of it",
     b"PK\3\4": "a zip archive; unpack it",
@@ -48,7 +48,7 @@ TAR = slice(257, 262), b"ustar"
 
 
 def storage_files(bag: Path, lose: Lose) -> list[Path]:
-    """Storage files of a bag: those that metadata.yaml names, else those that are there.
+    """Storage files of a bag: those that metadata.yaml names, else those in the directory.
 
     Raises `ValueError` if there are none.
     """
@@ -56,7 +56,8 @@ def storage_files(bag: Path, lose: Lose) -> list[Path]:
         return [bag]
     present = _present(bag)
     try:
-        names = list(dict.fromkeys(Path(name).name or name for name in _named(bag / METADATA)))
+        listed_files = _listed_files(bag / METADATA)
+        names = list(dict.fromkeys(Path(name).name or name for name in listed_files))
     except (OSError, ValueError):
         lose(f"{METADATA}: missing or damaged, not needed")
         return [bag / name for name in present]
@@ -82,24 +83,24 @@ def open_file(path: Path, scratch: Path, lose: Lose) -> StorageFile:
     """
     if not path.is_file():
         raise ValueError("no regular file")
-    if _begins(path) == ZSTD or (_begins(path) is None and SUFFIXES.get(path.suffix) == ZSTD):
+    if _kind(path) == ZSTD or (_kind(path) is None and SUFFIXES.get(path.suffix) == ZSTD):
         path = _unpacked(path, scratch, lose)
-    match _begins(path) or SUFFIXES.get(path.suffix):
+    match _kind(path) or SUFFIXES.get(path.suffix):
         case "MCAP":
             kind: type[McapFile] | type[SqliteFile] = McapFile
         case "SQLite":
             kind = SqliteFile
         case _:
-            raise ValueError(f"no MCAP or sqlite3 file, but {told(path)}")
+            raise ValueError(f"no MCAP or sqlite3 file, but {description(path)}")
     try:
         return kind(path, scratch, lose)
     except ValueError as error:
-        what = f"; it is {told(path)}" if _begins(path) is None else ""
+        what = f"; it is {description(path)}" if _kind(path) is None else ""
         raise ValueError(f"{error}{what}") from None
 
 
-def told(path: Path) -> str:
-    """What kind of file this is, and what would make a bag of it, in words."""
+def description(path: Path) -> str:
+    """What a file is, in words, by its first bytes, and how to make a bag of it."""
     with path.open("rb") as stream:
         start = stream.read(1024)
     if not start:
@@ -114,11 +115,11 @@ def told(path: Path) -> str:
 
 
 def other_files(bag: Path) -> str:
-    """What there is in a directory that is no bag, as far as it says what would be needed."""
+    """Hint, in words, at what is in a directory that is no bag; '' if nothing helps."""
     if not bag.is_dir():
         return ""
     for entry in _entries(bag):
-        if entry.is_file() and (what := told(entry)) in OTHERS.values():
+        if entry.is_file() and (what := description(entry)) in OTHERS.values():
             return f"; {entry.name} is {what}"
         if entry.is_dir() and ((entry / METADATA).exists() or _present(entry)):
             return f"; there is a bag {entry.name} in it"
@@ -126,12 +127,12 @@ def other_files(bag: Path) -> str:
 
 
 def _present(bag: Path) -> list[str]:
-    """Names of the storage files in a directory: by their names, else by how they begin."""
+    """Names of the storage files in a directory: by their suffixes, else by their first bytes."""
     entries = _entries(bag)
-    named = [entry.name for entry in entries if _is_named(entry)]
+    named = [entry.name for entry in entries if _has_suffix(entry)]
     unpacked = {f"{name}{packed}" for name in named for packed in SUFFIXES}
     return [name for name in named if name not in unpacked] or [
-        entry.name for entry in entries if entry.is_file() and _begins(entry)
+        entry.name for entry in entries if entry.is_file() and _kind(entry)
     ]
 
 
@@ -139,21 +140,21 @@ def _entries(directory: Path) -> list[Path]:
     return sorted(islice(directory.iterdir(), MOST_FILES))
 
 
-def _is_named(file: Path) -> bool:
+def _has_suffix(file: Path) -> bool:
     inner = Path(file.stem).suffix if SUFFIXES.get(file.suffix) == ZSTD else file.suffix
     return SUFFIXES.get(inner, ZSTD) != ZSTD
 
 
-def _begins(file: Path) -> str | None:
+def _kind(file: Path) -> str | None:
     with file.open("rb") as stream:
         start = stream.read(max(map(len, MAGICS)))
     return next((kind for magic, kind in MAGICS.items() if start.startswith(magic)), None)
 
 
-def _named(metadata: Path) -> list[str]:
+def _listed_files(metadata: Path) -> list[str]:
     """Names of the files that a metadata.yaml lists; raises `ValueError` if it has no list.
 
-    Nothing but the list is looked at: what YAML can do else, no bag needs.
+    Nothing but the list is parsed: whatever else YAML can do is of no use in a bag.
     """
     if not metadata.is_file() or metadata.stat().st_size > LARGEST_METADATA:
         raise ValueError("missing, or too large")

@@ -29,7 +29,7 @@ class BagWriter:
         self._identifier = storage
         self._distro = distro
         self._storage = STORAGES[storage](path / f"{path.absolute().name}_0", distro)
-        self.custom_data: dict[str, str] = {}  # that the metadata are to tell besides
+        self.custom_data: dict[str, str] = {}  # more entries of the metadata, by name
         self._pending: list[Message] = []
         self._start, self._end = NEVER, 0
         self.flush()
@@ -68,7 +68,7 @@ class BagWriter:
         """Store all messages taken."""
         messages, self._pending = self._in_order(self._pending), []
         # The metadata go first: rosbags does not read a topic they do not name, while a count
-        # that is too high by the messages of one flush misleads nobody.
+        # that is too high by the messages of one flush does no harm.
         self._write_metadata()
         try:
             self._storage.write(messages)
@@ -85,8 +85,8 @@ class BagWriter:
             self._storage.close(to_yaml(self._metadata()).strip())
 
     def _in_order(self, messages: list[Message]) -> list[Message]:
-        # Nor may log times fall from one flush to the next: who has to scan the file of a killed
-        # recorder takes its messages as they come.
+        # Nor may log times fall from one flush to the next: readers that have to scan the file of
+        # a killed recorder yield its messages as they stand.
         ordered = []
         for log_time, publish_time, topic_id, data in sorted(messages, key=itemgetter(0)):
             self._start = min(self._start, log_time)

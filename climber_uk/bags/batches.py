@@ -79,10 +79,10 @@ def read_batches(
         for batch in batches:
             yield topic, batch
 
-    for connection, log_time, data in bag.raw_messages(topics, by_publishing):
+    for connection, log_time, publish_time, data in bag.recorded(topics):
         key = connection.topic, connection.msgtype
         connections[key] = connection
-        waiting[key].append((log_time, data))
+        waiting[key].append((publish_time if by_publishing else log_time, data))
         sizes[key] += len(data)
         if len(waiting[key]) == CHUNK or sizes[key] > CHUNK_SIZE:
             yield from decoded(key)

@@ -1,6 +1,7 @@
-"""How fast a body moves in its own frame, by its poses alone.
+"""Speeds of a body in its own frame, by its poses alone.
 
-Each step between two poses is turned by the heading midway, which is exact on an arc of a circle.
+The step from a pose to the next is resolved along the heading midway between the two, which is
+exact on an arc of a circle.
 """
 
 import numpy as np
@@ -10,16 +11,17 @@ from climber_uk.mechanics.quantities import across, along
 
 
 def body_rates(time: Array, pose: Array, reach: float) -> Array:
-    """Rates (n, 3) forwards, to the left [m/s], about z [rad/s], over ± `reach` [s].
+    """Mean speeds (n, 3) forwards, to the left [m/s], and about z [rad/s] over ± `reach` [s].
 
-    `time` (n,) [s] rises, `pose` (n, 3) is x [m], y [m], θ [rad]; nan if there is one only.
+    `time` (n,) [s] rises, `pose` (n, 3) is x [m], y [m], θ [rad] in the wall's frame. nan for a
+    single pose.
     """
     if len(time) < 2:
         return np.full((len(time), 3), np.nan)
-    turn = np.unwrap(pose[:, 2])
-    step, midway = np.diff(pose[:, :2], axis=0), (turn[:-1] + turn[1:]) / 2
-    ways = (np.cumsum(part(midway, step)) for part in (along, across))
-    gone = [*(np.concatenate([[0.0], way]) for way in ways), turn]
+    heading = np.unwrap(pose[:, 2])
+    step, midway = np.diff(pose[:, :2], axis=0), (heading[:-1] + heading[1:]) / 2
+    distances = (np.cumsum(component(midway, step)) for component in (along, across))
+    travelled = [*(np.concatenate([[0.0], distance]) for distance in distances), heading]
     first, last = np.maximum(time - reach, time[0]), np.minimum(time + reach, time[-1])
-    moved = [np.interp(last, time, way) - np.interp(first, time, way) for way in gone]
+    moved = [np.interp(last, time, each) - np.interp(first, time, each) for each in travelled]
     return np.column_stack(moved) / (last - first)[:, None]

@@ -1,10 +1,10 @@
-"""All that a bag tells of its climbers, read in one go."""
+"""What a bag has of its climbers, read in one pass over its messages."""
 
 import math
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from operator import itemgetter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from tqdm import tqdm
@@ -13,111 +13,97 @@ from climber_uk.bags import events
 from climber_uk.bags.bag import Bag
 from climber_uk.bags.batches import Batch, read_batches
 from climber_uk.bags.events import Event
+from climber_uk.bags.extraction import EXTRACTORS, STRAY
 from climber_uk.bags.joints import Joints
-from climber_uk.bags.recorded import FilePart, in_order
-from climber_uk.bags.reference import Points
-from climber_uk.bags.restarts import (
-    are_copies,
-    are_many,
-    are_strays,
-    disagreement,
-    windows,
-)
-from climber_uk.bags.taking import STRAY, TAKEN
-from climber_uk.bags.topics import KNOWN, Topics
-from climber_uk.mechanics import Array, Stamps
+from climber_uk.bags.reference import Previews
+from climber_uk.bags.restarts import are_copies, are_many, are_strays, disagreement, windows
+from climber_uk.bags.time_series import Samples, in_order
+from climber_uk.bags.topics import KNOWN, NAMES, Topics
 from climber_uk.messages import topics
 
-PATIENCE = 2.0  # [s] after which progress is told
+T = TypeVar("T", Samples, Joints, Previews)
+PROGRESS_DELAY = 2.0  # [s] of reading, after which progress is shown
 
 
 class Collected:
-    """What was read so far of one climber."""
+    """What was read of one climber: arrays, by the names of its topics."""
 
     def __init__(self) -> None:
-        self.parts: dict[str, list[FilePart]] = defaultdict(list)
+        self.samples: dict[str, list[Samples]] = defaultdict(list)
         self.joints: dict[str, list[Joints]] = defaultdict(list)
-        self.reference: list[Points] = []
+        self.reference: list[Previews] = []
         self.parameters: list[tuple[int, dict[str, Any]]] = []  # with the log time [ns]
         self.frames: dict[str, str] = {}  # of poses, by the topic's name
-        self.lost_previews = 0
+        self.lost_previews = 0  # with an unfit point
         self.begin, self.end = -math.inf, math.inf  # log times [ns] of its run
 
-    def take(self, name: str, batch: Batch) -> None:
-        """Take the numbers of a batch; `KeyError` or `ValueError` if it has not what it should."""
+    def add(self, name: str, batch: Batch) -> None:
+        """Add the numbers of a batch; raises `KeyError` or `ValueError` if a field is not right."""
         if name == topics.REFERENCE:
-            self.reference.append(points := Points.of(batch))
-            self.lost_previews += len(batch) - len(points.arrivals)
+            self.reference.append(previews := Previews.of(batch))
+            self.lost_previews += len(batch) - len(previews.arrivals)
         elif name == topics.PARAMETERS:
             self.parameters += _parameters(batch)
         elif name in (topics.TORQUES, topics.JOINTS):
             self.joints[name].append(Joints.of(batch))
         else:
-            taken = TAKEN[name](batch)  # first, as what is of another type has no say in the frame
+            extracted = EXTRACTORS[name](batch)  # raises, if the type is another, before `frames`
             frame = batch.strings["header.frame_id"]
             if frame != (first := self.frames.setdefault(name, frame)):
                 raise ValueError(f"frame_id={frame!r}, others have {first!r}")
-            self.parts[name].append((batch.stamps, batch.log_times, *taken))
+            self.samples[name].append(Samples(batch.stamps, batch.log_times, *extracted))
 
     @property
     def first_parameters(self) -> dict[str, Any]:
-        """Those that the controller told first; none if it did not."""
+        """Parameters of the controller as they were first recorded; empty if they were not."""
         return min(self.parameters, key=itemgetter(0), default=(0, {}))[1]
 
     def runs(self) -> list["Collected"]:
-        """What belongs to each run: they differ where the odometry's time starts again."""
-        found = windows(*self._fit_odometry()[:2])
-        return [self.within(*window) for window in found] if len(found) > 1 else [self]
+        """The same for each run: a new one begins where the odometry's stamps start again."""
+        odometry = self._fit_odometry()
+        spans = windows(odometry.stamps, odometry.arrivals)
+        return [self.within(*span) for span in spans] if len(spans) > 1 else [self]
 
     def leave_out_strays(self) -> None:
-        """Mark odometry whose stamp cannot be as unfit, unless there is so much of it."""
-        if parts := self.parts[topics.ODOMETRY]:
-            stamps, arrivals, values, faults = in_order(parts)
-            fit = np.flatnonzero(faults == 0)
-            if not are_many(strays := are_strays(stamps[fit])):
-                faults[fit[strays]] = STRAY
-            self.parts[topics.ODOMETRY] = [(stamps, arrivals, values, faults)]
+        """Mark odometry as unfit whose stamp is far off its neighbours', if it is little."""
+        if parts := self.samples[topics.ODOMETRY]:
+            samples = in_order(parts)
+            fit = np.flatnonzero(samples.faults == 0)
+            if not are_many(strays := are_strays(samples.stamps[fit])):
+                samples.faults[fit[strays]] = STRAY
+            self.samples[topics.ODOMETRY] = [samples]
 
     @property
     def disagreement(self) -> str:
         """Why the odometry is not of one run, in words; empty if it may be."""
-        stamps, _, values = self._fit_odometry()
-        return disagreement(stamps, values[:, :2])
+        odometry = self._fit_odometry()
+        return disagreement(odometry.stamps, odometry.values[:, :2])
 
     @property
     def contradictions(self) -> int:
         """How many messages of odometry have the stamp of another, but not its values."""
-        stamps = self._fit_odometry()[0]
+        stamps = self._fit_odometry().stamps
         return len(stamps) - len(np.unique(stamps))
 
-    def _fit_odometry(self) -> tuple[Stamps, Stamps, Array]:
-        """Stamps, log times and values of what is fit, each message once."""
-        stamps, arrivals, values, faults = in_order(self.parts[topics.ODOMETRY])
-        fit = (faults == 0) & ~are_copies(stamps, values)
-        return stamps[fit], arrivals[fit], values[fit]
+    def _fit_odometry(self) -> Samples:
+        """The fit messages, each once, in the order of log times."""
+        odometry = in_order(self.samples[topics.ODOMETRY])
+        return odometry.where(~are_copies(odometry.stamps, odometry.values)).fit
 
     def within(self, begin: float, end: float) -> "Collected":
         """What was recorded between two log times [ns], with the parameters known by the end."""
-        chosen = Collected()
-        chosen.begin, chosen.end = begin, end
-        chosen.frames, chosen.lost_previews = self.frames, self.lost_previews
-        for name, parts in self.parts.items():
-            for part in parts:
-                stamps, arrivals, values, faults = part
-                mask = (begin <= arrivals) & (arrivals < end)
-                chosen.parts[name].append(
-                    (stamps[mask], arrivals[mask], values[mask], faults[mask])
-                )
-        for name, joints in self.joints.items():
-            chosen.joints[name] = [
-                part.where((begin <= part.arrivals) & (part.arrivals < end)) for part in joints
-            ]
-        chosen.reference = [
-            points.where((begin <= points.arrivals) & (points.arrivals < end))
-            for points in self.reference
-        ]
-        chosen.parameters = [told for told in self.parameters if told[0] < end]
-        return chosen
+
+        def chosen(parts: list[T]) -> list[T]:
+            return [p.where((begin <= p.arrivals) & (p.arrivals < end)) for p in parts]
+
+        run = Collected()
+        run.begin, run.end = begin, end
+        run.frames, run.lost_previews = self.frames, self.lost_previews
+        run.samples |= {name: chosen(parts) for name, parts in self.samples.items()}
+        run.joints |= {name: chosen(parts) for name, parts in self.joints.items()}
+        run.reference = chosen(self.reference)
+        run.parameters = [(at, values) for at, values in self.parameters if at < end]
+        return run
 
 
 def collect(
@@ -127,57 +113,57 @@ def collect(
     of: Collection[str] = KNOWN,
     by_publishing: bool = False,
 ) -> tuple[dict[str, Collected], list[Event]]:
-    """Return what a bag tells of the climbers in some namespaces, and all events.
+    """Return what a bag has of the climbers in some namespaces, by namespace, and all events.
 
-    Of the topics with the names `of` only; `by_publishing` gives arrivals as the times of
-    publishing, not of recording.
+    Only topics with the names `of` are read. `by_publishing` has times of publishing in place of
+    log times. What cannot be read is noted in the bag's losses.
     """
     collected = {namespace: Collected() for namespace in namespaces}
-    takers = {
-        topic: (name, found)
-        for namespace, found in collected.items()
-        for topic, name in names.of(namespace)
+    receivers = {
+        names.full(name, namespace): (name, climber)
+        for namespace, climber in collected.items()
+        for name in NAMES
         if name in of
     }
-    texts = {
-        names.full(name, ""): tell
-        for name, tell in ((topics.DIAGNOSTICS, events.statuses), (topics.LOG, events.warnings))
+    event_readers = {
+        names.full(name, ""): read
+        for name, read in ((topics.DIAGNOSTICS, events.statuses), (topics.LOG, events.warnings))
         if name in of
     }
-    wanted = [topic for topic in bag.types if topic in takers or topic in texts]
-    told: list[Event] = []
+    wanted = [topic for topic in bag.types if topic in receivers or topic in event_readers]
+    found: list[Event] = []
     with tqdm(
-        total=bag.count(wanted), unit=" messages", delay=PATIENCE, leave=False, disable=None
+        total=bag.count(wanted), unit=" messages", delay=PROGRESS_DELAY, leave=False, disable=None
     ) as progress:
         for topic, batch in read_batches(bag, wanted, by_publishing):
             progress.update(len(batch))
             try:
-                if topic in texts:
-                    told += texts[topic](batch)
+                if topic in event_readers:
+                    found += event_readers[topic](batch)
                 else:
-                    name, found = takers[topic]
-                    found.take(name, batch)
+                    name, climber = receivers[topic]
+                    climber.add(name, batch)
             except (KeyError, IndexError, ValueError) as error:
                 bag.lose(f"{topic}: messages are not what they should be ({error})")
-    for found in collected.values():
-        found.leave_out_strays()
-    return collected, told
+    for climber in collected.values():
+        climber.leave_out_strays()
+    return collected, found
 
 
 def _parameters(batch: Batch) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Log time [ns] and values by name, of messages with all of a node's parameters."""
+    """Log time [ns] and values by name, of each message with all of a node's parameters."""
     for row, log_time in enumerate(batch.log_times.tolist()):
-        told: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for i in range(batch.lengths["new_parameters"]):
             place = f"new_parameters.{i}"
             name, value = batch.strings[f"{place}.name"], f"{place}.value"
             match int(batch[f"{value}.type"][row]):
                 case 1:
-                    told[name] = bool(batch[f"{value}.bool_value"][row])
+                    values[name] = bool(batch[f"{value}.bool_value"][row])
                 case 2:
-                    told[name] = int(batch[f"{value}.integer_value"][row])
+                    values[name] = int(batch[f"{value}.integer_value"][row])
                 case 3:
-                    told[name] = float(batch[f"{value}.double_value"][row])
+                    values[name] = float(batch[f"{value}.double_value"][row])
                 case 4:
-                    told[name] = batch.strings[f"{value}.string_value"]
-        yield log_time, told
+                    values[name] = batch.strings[f"{value}.string_value"]
+        yield log_time, values

@@ -1,12 +1,13 @@
 """What the storage files of bags have in common."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 CDR = "cdr"
 MOST_TOPICS = 65535  # of a file, as many as MCAP can have
-LONGEST_NAME, LONGEST_LINE = 500, 1000  # characters of a topic or a type, and of what is told
+LONGEST_NAME, LONGEST_LINE = 500, 1000  # characters of a topic or a type, and of a line to print
 
 
 @dataclass(frozen=True)
@@ -17,12 +18,12 @@ class Connection:
     topic: str
     msgtype: str
     msgcount: int
-    definition: str  # of its type, with those of the types it contains; '' if not told
+    definition: str  # of its type, with those of the types it contains; '' if unknown
 
 
-# connection, log time, publishing time (0: not told) [ns] and serialised message
+# connection, log time, publishing time (0: unknown) [ns] and serialised message
 Logged = tuple[Connection, int, int, bytes]
-Lose = Callable[[str], None]  # is told what could not be read
+Lose = Callable[[str], None]  # is called with a line on what could not be read
 
 
 class StorageFile(Protocol):
@@ -40,10 +41,22 @@ class StorageFile(Protocol):
         """Close the file."""
 
 
-def tell_encodings(name: str, others: dict[str, list[str]], lose: Lose) -> None:
-    """Say which topics of a file are left out, by their encodings."""
+def readable(found: Iterable[tuple[Connection, str]], lose: Lose) -> Iterator[Connection]:
+    """Yield those of a file's topics, each with its encoding, that can be read.
+
+    `lose` gets a line on the others: an unprintable name, another encoding than CDR.
+    """
+    others: dict[str, list[str]] = defaultdict(list)
+    for connection, encoding in found:
+        topic = connection.topic
+        if not (type(connection.id) is int and is_name(topic) and is_name(connection.msgtype)):
+            lose(f"a topic that cannot be called so is left out: {topic!r:.60}")
+        elif encoding != CDR:
+            others[encoding].append(topic)
+        else:
+            yield connection
     for encoding, topics in others.items():
-        lose(f"{name}: {listed(topics)} left out: encoded as {encoding or 'nothing'}, not {CDR}")
+        lose(f"{listed(topics)} left out: encoded as {encoding or 'nothing'}, not {CDR}")
 
 
 def listed(names: Sequence[str]) -> str:
@@ -53,12 +66,12 @@ def listed(names: Sequence[str]) -> str:
 
 
 def is_name(name: object) -> bool:
-    """Whether a topic or a type may be called so; no terminal obeys what may."""
+    """Whether it can be the name of a topic or of a type: printable, and not too long."""
     return isinstance(name, str) and len(name) <= LONGEST_NAME and name.isprintable()
 
 
 def one_line(text: str) -> str:
-    r"""One line to print, of what a file tells: what a terminal could obey is written as `\x1b`."""
+    r"""Text of a file as one line that is safe to print: control characters become `\x1b`."""
     shown = "".join(
         character if character.isprintable() else character.encode("unicode_escape").decode()
         for character in " ".join(text[:LONGEST_LINE].split())

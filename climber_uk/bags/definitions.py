@@ -1,4 +1,4 @@
-"""Types of messages as a bag defines them, if they are of a size that messages have."""
+"""Types of messages as a bag defines them, within the sizes that messages have."""
 
 from typing import Any
 
@@ -14,12 +14,12 @@ LONGEST_ARRAY = 2**20  # numbers, of a length that a type fixes
 
 
 def known(name: str) -> Typestore | None:
-    """Return what Jazzy knows of a type."""
+    """Return Jazzy's store of types if the type is in it, else None."""
     return TYPESTORE if name in TYPESTORE.fielddefs else None
 
 
 def defined(name: str, definition: str) -> Typestore:
-    """Return what a definition tells of a type; raises `ValueError` if that cannot be."""
+    """Return a store with the type of a definition; raises `ValueError` if it is not sound."""
     try:
         types = get_types_from_msg(definition, name)
         _count(types, name, ())
@@ -28,7 +28,7 @@ def defined(name: str, definition: str) -> Typestore:
         store.get_msgdef(name)
     except ValueError:
         raise
-    except Exception:  # there is no telling what a definition does to its readers
+    except Exception:  # a hostile definition can make its parser raise anything
         raise ValueError("it cannot be parsed") from None
     return store
 
@@ -38,7 +38,7 @@ def _count(types: Any, name: str, within: tuple[str, ...]) -> int:
     if name in within:
         raise ValueError(f"{name} contains itself")
     if name not in types:
-        raise ValueError(f"it does not tell {name}")
+        raise ValueError(f"it does not define {name}")
     count = 0
     for _, (kind, what) in types[name][1]:
         times = 1

@@ -12,10 +12,10 @@ LOG_LEVELS = {30: WARNING, 40: ERROR, 50: ERROR}
 
 @dataclass(frozen=True)
 class Event:
-    """Something that a node told."""
+    """Something that a node reported."""
 
     arrival: int  # log time [ns]
-    stamp: int | None  # [ns]
+    stamp: int | None  # [ns]; None: a line of the log, which has none
     node: str
     kind: str  # mode, state or log
     level: int
@@ -23,7 +23,10 @@ class Event:
 
 
 def statuses(batch: Batch) -> Iterator[Event]:
-    """All statuses of diagnostic messages, of which most repeat what is known."""
+    """States of the nodes and modes of the controller, of all diagnostic messages.
+
+    Most repeat the one before: see `changes`.
+    """
     for i in range(batch.lengths["status"]):
         place = f"status.{i}"
         node, text = batch.strings[f"{place}.name"], batch.strings[f"{place}.message"]
@@ -50,24 +53,24 @@ def warnings(batch: Batch) -> Iterator[Event]:
 
 
 def changes(events: Iterable[Event]) -> list[Event]:
-    """Those that tell something new: another mode, another level of a state."""
+    """Events, by arrival, with another mode or level than before; all lines of the log."""
     last: dict[tuple[str, str], object] = {}
     changed = []
     for event in sorted(events, key=lambda event: event.arrival):
         key = event.node, event.kind
-        told = event.text if event.kind == "mode" else event.level
+        value = event.text if event.kind == "mode" else event.level
         usual = OK if event.kind == "state" else None
-        if event.kind == "log" or told != last.get(key, usual):
+        if event.kind == "log" or value != last.get(key, usual):
             changed.append(event)
-        last[key] = told
+        last[key] = value
     return changed
 
 
 def is_of(event: Event, namespace: str) -> bool:
-    """Whether a node in `namespace` told it."""
+    """Whether an event is of a node in `namespace`."""
     return event.node.split(":")[0].rsplit("/", 1)[0].strip("/") == namespace.strip("/")
 
 
 def is_fault(mode: str) -> bool:
-    """Whether a mode of the controller is one that nobody asked for."""
+    """Whether a mode of the controller is a fault; one that is unknown counts as such."""
     return mode not in {known.value for known in Mode if not known.is_fault}

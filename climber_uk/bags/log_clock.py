@@ -7,9 +7,10 @@ STEP = 10_000_000  # [ns] by which the clock is set, not drifting
 
 
 class LogClock:
-    """The system clock, ahead of it by what it was set back: by steps, seen beside a steady clock.
+    """A clock that follows the system clock, but is not set back with it.
 
-    Times are integers in nanoseconds; where the clock is set forwards again, that is made up for.
+    A step of the system clock is seen by comparing it with a steady one. After a step back this
+    clock is `ahead` by as much, until the system clock is set forwards. Times are integers [ns].
     """
 
     def __init__(
@@ -22,7 +23,7 @@ class LogClock:
         self._offset = self._measured()
 
     def look(self) -> int:
-        """Take notice of a step of the system clock since the last look, and return it, else 0."""
+        """Step [ns] of the system clock since the last call, which is made up for; 0: none."""
         before, self._offset = self._offset, self._measured()
         step = self._offset - before
         if abs(step) < STEP:
@@ -31,19 +32,19 @@ class LogClock:
         return step
 
     def at(self, steady: int) -> int:
-        """Log time of a time of the steady clock, as of the last look."""
+        """Log time [ns] of a time [ns] of the steady clock, as of the last `look`."""
         return steady + self._offset + self.ahead
 
     def shift(self, received: int) -> int:
-        """How much later the log time of what was received lately is than it.
+        """Log time less system time [ns] of a message `received` [ns] a short while ago.
 
-        It may have been received before the last step, and taken after it.
+        It may have been received before the last step of the system clock.
         """
         now = self.at(self._steady())
         return min((self.ahead, self._ahead_before), key=lambda ahead: abs(received + ahead - now))
 
     def _measured(self) -> int:
-        """System clock less steady clock: of three tries the one least interrupted."""
+        """System clock less steady clock [ns]: of three tries the one that took least time."""
         tries = []
         for _ in range(3):
             before, now, after = self._steady(), self._system(), self._steady()

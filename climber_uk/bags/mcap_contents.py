@@ -1,7 +1,7 @@
 """What is in an MCAP file: from its summary, or from all of its records as far as they are sound.
 
-A file that was closed has a summary with a checksum, which tells where all chunks are. Any other
-file is gone through, past what is damaged.
+A file that was closed has a summary with a checksum, which says where all chunks are. In any other
+file all records are visited, past what is damaged.
 """
 
 import re
@@ -59,7 +59,7 @@ class Contents:
     counts: "Counter[int]" = field(default_factory=Counter)  # messages by channel
 
     def take(self, opcode: int, data: bytes) -> None:
-        """Keep what a schema, channel, chunk index or the statistics tell, all else not."""
+        """Keep a schema, a channel, a chunk index or the statistics; other records do not count."""
         if opcode == Opcode.SCHEMA and (schema := parsed(Schema, data)):
             self.schemas.setdefault(schema.id, schema)
         elif opcode == Opcode.CHANNEL and (channel := parsed(Channel, data)):
@@ -80,9 +80,9 @@ class Contents:
         return counted == indexed and indexed <= self.channels.keys()
 
     def rescue(self, damaged: bytearray) -> None:
-        """Keep channels, and names of schemas, that can be told from damaged bytes.
+        """Keep channels, and names of schemas, that are found among damaged bytes.
 
-        Of two with one number nobody knows which is right.
+        Where two differ under one number, neither is kept.
         """
         schemas: dict[int, list[str]] = defaultdict(list)
         for number, size, name in SCHEMA.findall(damaged):
@@ -95,13 +95,13 @@ class Contents:
         for number, schema, size, topic in CHANNEL.findall(damaged):
             if len(topic) == _int(size):
                 channels[_int(number)].append((topic.decode(), _int(schema)))
-        for number, told in channels.items():
-            if len(set(told)) == 1:
-                self.channels.setdefault(number, Channel(number, told[0][0], CDR, {}, told[0][1]))
+        for number, pairs in channels.items():
+            if len(set(pairs)) == 1:
+                self.channels.setdefault(number, Channel(number, pairs[0][0], CDR, {}, pairs[0][1]))
 
 
 def from_summary(file: RecordFile) -> Contents | None:
-    """What a file's summary tells, if its checksum is right and it tells all."""
+    """Contents by a file's summary, if its checksum is right and it is complete, else None."""
     ending = file.read(max(0, file.size - ENDING), file.size)
     if not ending.startswith(FOOTER) or not ending.endswith(MCAP0_MAGIC):
         return None
@@ -121,7 +121,7 @@ def from_summary(file: RecordFile) -> Contents | None:
 
 
 def from_records(file: RecordFile, lose: Lose) -> Contents:
-    """What all records tell, past damage; raises `ValueError` if there are none."""
+    """Contents by all records of a file, past damage; raises `ValueError` if there are none."""
     return _Search(file, lose).contents
 
 
@@ -139,7 +139,7 @@ class _Search:
         self.contents.rescue(self._damaged)
         nameless = self.contents.counts.keys() - self.contents.channels.keys()
         if count := sum(self.contents.counts[channel] for channel in nameless):
-            lose(f"{count} messages are left out: their topic is not told")
+            lose(f"{count} messages are left out: their topic is unknown")
 
     def _go_through(self) -> None:
         file, magic = self._file, len(MCAP0_MAGIC)
@@ -193,7 +193,7 @@ class _Search:
             self._row.clear()
 
     def _look_into(self, place: Record) -> None:
-        """Keep what a chunk, or a row of messages, tells."""
+        """Keep what is in a chunk, or in a row of messages."""
         if len(self.contents.parts) == MOST_PARTS:
             self._lose(f"more than {MOST_PARTS} chunks, of which the others are left out")
             return

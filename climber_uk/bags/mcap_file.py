@@ -1,6 +1,5 @@
 """Read MCAP files, as far as they are sound: past damage, with or without their indexes."""
 
-from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping
 from heapq import merge
 from itertools import chain, pairwise
@@ -11,14 +10,7 @@ from typing import Any
 from mcap.opcode import Opcode
 from mcap.records import Schema
 
-from climber_uk.bags.connection import (
-    CDR,
-    Connection,
-    Logged,
-    Lose,
-    is_name,
-    tell_encodings,
-)
+from climber_uk.bags.connection import Connection, Logged, Lose, readable
 from climber_uk.bags.mcap_contents import NOTHING, FilePart, from_records, from_summary
 from climber_uk.bags.mcap_records import MESSAGE_HEAD, RecordFile, records_in
 from climber_uk.bags.unpacking import LARGEST_MESSAGE, Allowance
@@ -37,7 +29,7 @@ class McapFile:
             self.close()
             raise
         self._contents.parts.sort(key=attrgetter("start"))
-        self.connections = list(self._connections())
+        self.connections = list(readable(self._connections(), self.lose))
         self.start = min((part.start for part in self._contents.parts), default=NOTHING[0])
         self.end = max((part.end for part in self._contents.parts), default=NOTHING[1])
 
@@ -64,20 +56,14 @@ class McapFile:
         """Say what could not be read."""
         self._lose(f"{self.name}: {what}")
 
-    def _connections(self) -> Iterator[Connection]:
-        others: dict[str, list[str]] = defaultdict(list)
+    def _connections(self) -> Iterator[tuple[Connection, str]]:
+        """All topics, with their encodings."""
         for channel in self._contents.channels.values():
             schema = self._contents.schemas.get(channel.schema_id, Schema(0, b"", "", ""))
-            if not (is_name(channel.topic) and is_name(schema.name)):
-                self.lose(f"a topic that cannot be called so is left out: {channel.topic!r:.60}")
-                continue
-            if channel.message_encoding != CDR:
-                others[channel.message_encoding].append(channel.topic)
-                continue
-            told = schema.data.decode("utf-8", "replace") if schema.encoding == "ros2msg" else ""
+            text = schema.data.decode("utf-8", "replace") if schema.encoding == "ros2msg" else ""
             count = self._contents.counts[channel.id]
-            yield Connection(channel.id, channel.topic, schema.name, count, told)
-        tell_encodings(self.name, others, self._lose)
+            found = Connection(channel.id, channel.topic, schema.name, count, text)
+            yield found, channel.message_encoding
 
     def _messages(
         self, number: int, part: FilePart, wanted: Mapping[int, Any], allowance: Allowance
@@ -94,8 +80,8 @@ class McapFile:
                 if opcode == Opcode.MESSAGE:
                     channel, _, log_time, publish_time = MESSAGE_HEAD.unpack_from(data, start)
                     if channel in wanted and end - start <= LARGEST_MESSAGE:
-                        told = channel, publish_time, data[start + MESSAGE_HEAD.size : end]
-                        found.append((log_time, number, len(found), *told))
+                        message = data[start + MESSAGE_HEAD.size : end]
+                        found.append((log_time, number, len(found), channel, publish_time, message))
                     elif channel in wanted:
                         self.lose(f"a message larger than {LARGEST_MESSAGE >> 20} MiB is left out")
         except ValueError as error:

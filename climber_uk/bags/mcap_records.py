@@ -1,4 +1,4 @@
-"""Records of an MCAP file, told from damage by how they follow each other.
+"""Records of an MCAP file, distinguished from damage by how they follow each other.
 
 A record is its opcode, its length and its contents. One is sound if its own lengths agree and
 what comes behind it may be a record, or the end.
@@ -43,18 +43,16 @@ class Record(NamedTuple):
 
 
 class ChunkHead(NamedTuple):
-    """What a chunk tells of itself, and where its messages are."""
+    """Head of a chunk."""
 
-    start: int  # log times [ns]
-    end: int
     size: int  # [bytes] unpacked
     crc: int
     compression: str
-    packed: tuple[int, int]  # from where to where
+    packed: tuple[int, int]  # where its messages begin and end in the file
 
 
 class DamagedError(ValueError):
-    """Wrong bytes, of which some may be told all the same."""
+    """Bytes with a wrong checksum; some of what is in them may be right."""
 
     def __init__(self, what: str, data: bytes) -> None:
         super().__init__(what)
@@ -94,11 +92,11 @@ class RecordFile:
         return found if is_end or _may_begin(behind) else None
 
     def chunk_head(self, record: Record) -> ChunkHead | None:
-        """What a chunk tells of itself, if its lengths agree."""
+        """Return the head of a chunk, if its lengths agree, else None."""
         head = self.read(record.start, record.start + CHUNK_HEAD.size + 16)
         if record.opcode != Opcode.CHUNK or len(head) < CHUNK_HEAD.size + 8:
             return None
-        start, end, size, crc, length = CHUNK_HEAD.unpack_from(head)
+        _, _, size, crc, length = CHUNK_HEAD.unpack_from(head)
         behind = CHUNK_HEAD.size + length + 8
         if length > 4 or record.start + behind > record.end:
             return None
@@ -106,7 +104,7 @@ class RecordFile:
         packed = record.start + behind, record.end
         if int.from_bytes(head[behind - 8 : behind], "little") != packed[1] - packed[0]:
             return None
-        return ChunkHead(start, end, size, crc, compression.decode("ascii", "replace"), packed)
+        return ChunkHead(size, crc, compression.decode("ascii", "replace"), packed)
 
     def unpacked(self, place: Record, allowance: Allowance) -> bytes:
         """Messages of a chunk, or of a row of them; raises `ValueError` if they cannot be read."""

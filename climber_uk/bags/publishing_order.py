@@ -14,22 +14,25 @@ from climber_uk.bags.bag import Bag
 
 
 def read_published(
-    bag: Bag, topics: Mapping[str, str], known: bool
+    bag: Bag, types: Mapping[str, str], by_publishing: bool
 ) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, publishing time [ns], the log time if those are not `known`, and message.
+    """Yield topic, time [ns] and message, in the order of these times.
 
-    Messages are those of some topics that have the type which `topics` tells.
+    They are times of publishing, or log times unless `by_publishing`. `types` has the topics that
+    are read, with their types: messages of another type are left out.
     """
-    streams = [_published(bag, topic, of, known) for topic, of in topics.items()]
+    streams = [_published(bag, *pair, by_publishing) for pair in types.items()]
     yield from merge(*streams, key=lambda message: message[1])
 
 
-def are_known(bag: Bag, topics: Collection[str]) -> bool:
-    """Whether a bag tells when the messages of some topics were published."""
+def has_publishing_times(bag: Bag, topics: Collection[str]) -> bool:
+    """Whether a bag has the times of publishing of all messages of some topics."""
     return all(publish_time for _, _, publish_time, _ in bag.recorded(topics))
 
 
-def _published(bag: Bag, topic: str, of: str, known: bool) -> Iterator[tuple[str, int, Any]]:
+def _published(
+    bag: Bag, topic: str, type_name: str, by_publishing: bool
+) -> Iterator[tuple[str, int, Any]]:
     for connection, log_time, publish_time, message in bag.messages([topic]):
-        if connection.msgtype == of:
-            yield topic, publish_time if known else log_time, message
+        if connection.msgtype == type_name:
+            yield topic, publish_time if by_publishing else log_time, message

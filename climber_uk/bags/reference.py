@@ -1,4 +1,4 @@
-"""The reference at any number of times, from all that a bag tells of it."""
+"""The reference at any number of times, from all previews of it in a bag."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from climber_uk.bags.batches import Batch
-from climber_uk.bags.taking import heading
+from climber_uk.bags.extraction import heading
 from climber_uk.mechanics import Array, Stamps
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import quintic
@@ -16,16 +16,19 @@ AT_ONCE = 65536  # times
 
 
 @dataclass(frozen=True)
-class Points:
-    """Points of n previews with k points each."""
+class Previews:
+    """n previews of the reference, with k points each."""
 
     arrivals: Stamps  # (n,) log times [ns]
     times: Stamps  # (n, k) [ns]
     motion: Array  # (n, k, 3, 3): pose, velocity and acceleration in x, y and θ
 
     @classmethod
-    def of(cls, batch: Batch) -> "Points":
-        """Those of a batch of messages; `KeyError` if a point has not one joint."""
+    def of(cls, batch: Batch) -> "Previews":
+        """Previews of a batch of messages, without those that have an unfit point.
+
+        Raises `KeyError` if a field is missing.
+        """
         places = [f"points.{i}" for i in range(batch.lengths["points"])]
         if not places:
             raise KeyError("points")
@@ -35,16 +38,16 @@ class Points:
         times = batch.stamps[:, None] + since
         return cls(batch.log_times, times, motion).where(fit)
 
-    def where(self, chosen: Any) -> "Points":
-        """Those of the previews that a mask chooses."""
-        return Points(self.arrivals[chosen], self.times[chosen], self.motion[chosen])
+    def where(self, chosen: Any) -> "Previews":
+        """Those that a mask (n,) chooses."""
+        return Previews(self.arrivals[chosen], self.times[chosen], self.motion[chosen])
 
 
 def _motion(batch: Batch, place: str) -> Array:
     pose = f"{place}.transforms.0"
-    turn, faults = heading(batch, f"{pose}.rotation")
+    angle, faults = heading(batch, f"{pose}.rotation")
     position = batch.columns(f"{pose}.translation.x", f"{pose}.translation.y")
-    rows = [np.column_stack([position, np.where(faults == 0, turn, np.nan)])]
+    rows = [np.column_stack([position, np.where(faults == 0, angle, np.nan)])]
     for of in ("velocities", "accelerations"):
         planar = f"{place}.{of}.0"
         rows.append(
@@ -53,7 +56,7 @@ def _motion(batch: Batch, place: str) -> Array:
     return np.stack(rows, axis=1)
 
 
-def poses_at(parts: Sequence[Points], stamps: Stamps) -> Array:
+def poses_at(parts: Sequence[Previews], stamps: Stamps) -> Array:
     """Poses (n, 3) at stamps (n,) [ns]; nan where no preview covers them.
 
     Where two previews have a point at the same time the later one's holds. Between points by
@@ -76,12 +79,12 @@ def poses_at(parts: Sequence[Points], stamps: Stamps) -> Array:
     return poses
 
 
-def _joined(parts: Sequence[Points]) -> tuple[Stamps, Array]:
-    """Times (m,) and motions (m, 3, 3) of all points, the later told where there are two."""
-    told = np.concatenate([np.repeat(part.arrivals, part.times.shape[1]) for part in parts])
+def _joined(parts: Sequence[Previews]) -> tuple[Stamps, Array]:
+    """Times (m,) [ns] and motions (m, 3, 3) of all points; of two at one time the later one's."""
+    arrivals = np.concatenate([np.repeat(part.arrivals, part.times.shape[1]) for part in parts])
     times = np.concatenate([part.times.ravel() for part in parts])
     motion = np.concatenate([part.motion.reshape(-1, 3, 3) for part in parts])
-    order = np.argsort(-told, kind="stable")
+    order = np.argsort(-arrivals, kind="stable")
     times, latest = np.unique(times[order], return_index=True)
     return times, motion[order[latest]]
 
@@ -93,7 +96,7 @@ def _interpolated(times: Stamps, motion: Array, stamps: Stamps) -> Array:
     (p, v, a), (p_end, v_end, a_end) = (
         (at[:, 0], at[:, 1] * h, at[:, 2] * h * h) for at in (motion[i], motion[i + 1])
     )
-    way = p_end - p
-    way[:, 2] = wrapped(way[:, 2])
-    c_3, c_4, c_5 = quintic(way, v, a, v_end, a_end)
+    step = p_end - p
+    step[:, 2] = wrapped(step[:, 2])
+    c_3, c_4, c_5 = quintic(step, v, a, v_end, a_end)
     return p + u * (v + u * (a / 2 + u * (c_3 + u * (c_4 + u * c_5))))

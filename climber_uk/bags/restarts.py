@@ -1,7 +1,7 @@
-"""Whether a recording is of one run, or where time starts again in it, or of several at once.
+"""Whether a recording is of one run, or of several, one after the other or at once.
 
-Time starts again where the simulation is started again, or the clock is set back. All is told from
-the stamps of one topic in the order of arrival, and the places that it tells.
+Time starts again where the simulation is started again, or the clock is set back. All of it is
+judged by the stamps and positions of one topic, in the order of arrival.
 """
 
 from itertools import pairwise
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from climber_uk.mechanics import SECOND, Array, Stamps
 
-AROUND = 5  # messages before and after, by which a restart is told
-RECENT = 16  # messages before, that may tell of the same time again
-TWICE = 1.5  # times as many messages as there should be in a time that is told of twice
+AROUND = 5  # messages before and after, by which a restart is recognised
+RECENT = 16  # messages before, that may be of the same time as those after a restart
+TWICE = 1.5  # times as many messages as usual in a time of which there are messages twice
 JITTER = 0.4  # [periods] of stamps
 AT_LEAST = 2  # messages that go on: fewer are late
 TOLERANCE = SECOND  # by which a stamp may be off those around it
@@ -26,9 +26,9 @@ NEAR, RETURNING = 0.2, 0.75  # share of a leap, and of all leaps
 def restarts(stamps: Stamps) -> list[int]:
     """Places in the stamps (n,) of one topic, in the order of arrival, where they start again.
 
-    There the next few all lie before most of the last few, or are among them and tell of the same
-    time once more, and go on from each other. A message that comes late, or with a wrong stamp,
-    lies back or ahead too, but those around it do not, and it fills a gap.
+    There the next few stamps all lie before most of the last few, or among them as a second set of
+    the same time, and rise. A message that comes late, or with a wrong stamp, lies back or ahead
+    too, but those around it do not, and it fills a gap.
     """
     different = np.flatnonzero(np.diff(stamps, prepend=stamps[:1] - 1))
     stamps = stamps[different]
@@ -38,7 +38,7 @@ def restarts(stamps: Stamps) -> list[int]:
     for i in (np.flatnonzero(steps < 0) + 1).tolist():
         is_new = not found or i - found[-1] >= AROUND
         before, after = stamps[max(0, i - RECENT, *found[-1:]) : i], stamps[i : i + AROUND]
-        if is_new and (_lies_back(before, after, period) or _tells_again(before, after, period)):
+        if is_new and (_lies_back(before, after, period) or _repeats_time(before, after, period)):
             found.append(i)
     return [int(different[i]) for i in found]
 
@@ -51,8 +51,8 @@ def _lies_back(before: Stamps, after: Stamps, period: float) -> bool:
     return bool(goes_on and after.max() < last[len(last) // 2])
 
 
-def _tells_again(before: Stamps, after: Stamps, period: float) -> bool:
-    """Whether the time after a small step back was told of before."""
+def _repeats_time(before: Stamps, after: Stamps, period: float) -> bool:
+    """Whether there were messages before of the time after a small step back."""
     beyond = np.append(after > before.max() + JITTER * period, True)
     after = after[: int(np.argmax(beyond))]
     if len(after) < AT_LEAST or (np.diff(after) < 0).any():
@@ -66,7 +66,7 @@ def _tells_again(before: Stamps, after: Stamps, period: float) -> bool:
 def windows(stamps: Stamps, arrivals: Stamps) -> list[tuple[float, float]]:
     """Log times [ns] between which each run was recorded, by messages in the order of arrival.
 
-    Of those that are mixed there is but one, which is none.
+    One window without end, if the stamps alternate between clocks: then `disagreement` says so.
     """
     if are_mixed(stamps):
         return [(-np.inf, np.inf)]
@@ -96,9 +96,9 @@ def are_mixed(stamps: Stamps) -> bool:
 
 
 def are_copies(stamps: Stamps, values: Array) -> NDArray[np.bool]:
-    """Which of some messages (n,) were there shortly before, with the same values (n, k).
+    """Which messages (n,) repeat one shortly before: the same stamp, the same values (n, k).
 
-    Those of a whole run that repeats itself were there long before.
+    Those of a run that is repeated as a whole come long after, and are none.
     """
     _, first, same = np.unique(stamps, return_index=True, return_inverse=True)
     before, here = first[same], np.arange(len(stamps))
@@ -109,8 +109,8 @@ def are_copies(stamps: Stamps, values: Array) -> NDArray[np.bool]:
 def disagreement(stamps: Stamps, places: Array) -> str:
     """Why messages in the order of arrival are not of one run, in words; empty if they may be.
 
-    `places` (n, 2) [m] are told by them. As where two plants run at once, or where a second run has
-    the log times of the first: their messages lie between each other.
+    `places` (n, 2) are their positions [m]. Messages of two runs alternate where two plants run at
+    once, or where a second run has the log times of the first.
     """
     why = "two runs, or two publishers"
     _, first, same = np.unique(stamps, return_index=True, return_inverse=True)
@@ -126,7 +126,7 @@ def disagreement(stamps: Stamps, places: Array) -> str:
 
 
 def _leaps(track: Array | Stamps, least: float) -> int:
-    """How often messages alternate between a few ways (n, k); 0 if they do not."""
+    """How often messages (n, k) leap between a few curves, by more than `least`; 0: not at all."""
     steps = np.linalg.norm(np.diff(track, axis=0), axis=1)
     leaps = np.flatnonzero(steps > least)
     if len(leaps) < OFTEN:

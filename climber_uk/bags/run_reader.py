@@ -1,6 +1,9 @@
-"""Runs of one climber from what a bag tells of it, and what of that is of no use, in words."""
+"""Runs of one climber, made of the arrays that were collected of it.
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+What of them is left out, and why, is noted in the bag's losses.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
@@ -12,11 +15,11 @@ from climber_uk.bags import events
 from climber_uk.bags.bag import Bag, open_bag
 from climber_uk.bags.collecting import Collected, collect
 from climber_uk.bags.events import Event
-from climber_uk.bags.joints import Joints, of_both, of_one, wheel_names
-from climber_uk.bags.recorded import TimeSeries
+from climber_uk.bags.extraction import EXTRACTORS
+from climber_uk.bags.joints import Joints, commanded_torques, rates_and_torques
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
-from climber_uk.bags.taking import TAKEN
+from climber_uk.bags.time_series import TimeSeries
 from climber_uk.bags.topics import KNOWN, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
@@ -25,22 +28,23 @@ from climber_uk.parameters.parameter_file import Values
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
 NOTHING = TimeSeries.of([])
-NAMES = "left_wheel_joint", "right_wheel_joint", "adhesion"
-Told = Mapping[str, Any]  # parameters of a controller, by name
+# parameters that are taken from the bag if those that are given in their place have none
+RECORDED_DEFAULTS = "left_wheel_joint", "right_wheel_joint", "adhesion"
+Parameters = Mapping[str, Any]  # by name
 
 
 class NoRunError(ValueError):
-    """There is not enough odometry of a climber, and why."""
+    """There is too little odometry of a climber to make a run of; the message says why."""
 
 
 @dataclass(frozen=True)
 class RunReader:
-    """Makes runs of one climber from what was collected, and says what of it is of no use."""
+    """Makes runs of the climber in `namespace`; notes in `bag` what is left out, and why."""
 
     bag: Bag
     names: Topics
     namespace: str
-    parameters: Callable[[str], Told] | None = None  # of a namespace, in place of those in the bag
+    parameters: Callable[[str], Parameters] | None = None  # of a namespace, in place of the bag's
 
     def topic(self, name: str) -> str:
         """Full name of one of the climber's topics."""
@@ -50,25 +54,25 @@ class RunReader:
     def read(
         cls, path: Path, names: Topics, namespace: str, of: Collection[str] = KNOWN
     ) -> tuple["RunReader", Collected]:
-        """Read what a bag tells on the topics `of` of one climber; raises as `open_bag` does."""
+        """Reader of one climber, and what its topics `of` have; raises as `open_bag` does."""
         with open_bag(path) as bag:
             reader = cls(bag, names, namespace)
             return reader, collect(bag, names, [namespace], of)[0][namespace]
 
-    def runs(self, found: Collected, told: Collection[Event]) -> list[RecordedRun]:
-        """All runs; raises `NoRunError`."""
-        if not found.parts[topics.ODOMETRY]:
+    def runs(self, collected: Collected, reported: Collection[Event]) -> list[RecordedRun]:
+        """All runs, with those of the `reported` events that are theirs; raises `NoRunError`."""
+        if not collected.samples[topics.ODOMETRY]:
             raise NoRunError(f"no odometry on {self.topic(topics.ODOMETRY)}")
-        if found.lost_previews:
+        if collected.lost_previews:
             topic = self.topic(topics.REFERENCE)
-            self.bag.lose(f"{topic}: {found.lost_previews} messages left out: a point is unfit")
-        self.check_truth(found)
-        parts = self.parts(found)
+            self.bag.lose(f"{topic}: {collected.lost_previews} messages left out: a point is unfit")
+        self.check_truth(collected)
+        parts = self.split(collected)
         runs, reasons = [], []
         for number, part in enumerate(parts, start=1):
             try:
                 name = f"run {number} of {len(parts)}" if len(parts) > 1 else ""
-                runs.append(self.run(part, told, name))
+                runs.append(self.run(part, reported, name))
             except NoRunError as nothing:
                 reasons.append(str(nothing))
         if not runs:
@@ -77,47 +81,48 @@ class RunReader:
             self.bag.lose(reason)
         return runs
 
-    def parts(self, found: Collected) -> list[Collected]:
-        """What belongs to each run; says if there are several."""
-        parts = found.runs()
+    def split(self, collected: Collected) -> list[Collected]:
+        """What was collected, for each run; notes if there are several."""
+        parts = collected.runs()
         if len(parts) > 1:
             topic = self.topic(topics.ODOMETRY)
             self.bag.lose(f"{topic}: time starts again, there are {len(parts)} runs")
         return parts
 
-    def check_one_run(self, found: Collected) -> None:
+    def check_one_run(self, collected: Collected) -> None:
         """Raise `ValueError` if there are several runs, one after the other or at once."""
-        if not found.parts[topics.ODOMETRY]:
+        if not collected.samples[topics.ODOMETRY]:
             return
-        path, topic, count = self.bag.path, self.topic(topics.ODOMETRY), len(found.runs())
+        path, topic, count = self.bag.path, self.topic(topics.ODOMETRY), len(collected.runs())
         if count > 1:
-            said = f"time starts again, there are {count} runs: want one"
-            raise ValueError(f"{path}: {topic}: {said}")
-        if found.disagreement:
-            raise ValueError(f"{path}: no run on {topic}: {found.disagreement}")
+            raise ValueError(
+                f"{path}: {topic}: time starts again, there are {count} runs: want one"
+            )
+        if collected.disagreement:
+            raise ValueError(f"{path}: no run on {topic}: {collected.disagreement}")
 
-    def check_truth(self, found: Collected) -> None:
-        """Do not use poses of which it is not known where they are to the odometry's."""
-        here, there = (found.frames.get(name, "") for name in (topics.ODOMETRY, topics.TRUTH))
+    def check_truth(self, collected: Collected) -> None:
+        """Drop the ground truth, and note it, if its frame is another than the odometry's."""
+        here, there = (collected.frames.get(name, "") for name in (topics.ODOMETRY, topics.TRUTH))
         if here and there and here != there:
-            del found.parts[topics.TRUTH]
+            del collected.samples[topics.TRUTH]
             topic = self.topic(topics.TRUTH)
             self.bag.lose(f"{topic}: not used, frame_id={there!r} is not the odometry's, {here!r}")
 
-    def check_agreement(self, found: Collected) -> None:
-        """Raise `NoRunError` if what is read as one run cannot be."""
-        if found.disagreement:
-            raise NoRunError(f"no run on {self.topic(topics.ODOMETRY)}: {found.disagreement}")
-        if count := found.contradictions:
+    def check_agreement(self, collected: Collected) -> None:
+        """Raise `NoRunError` if the odometry cannot be of one run; note stamps with two values."""
+        if collected.disagreement:
+            raise NoRunError(f"no run on {self.topic(topics.ODOMETRY)}: {collected.disagreement}")
+        if count := collected.contradictions:
             self.bag.lose(
                 f"{self.topic(topics.ODOMETRY)}: {count} messages have the stamp of another, but "
                 "not its values: the first one counts"
             )
 
-    def run(self, found: Collected, told: Collection[Event], part: str) -> RecordedRun:
-        """One run; raises `NoRunError`."""
-        whole = odometry = self.recorded(found, topics.ODOMETRY)
-        reference = self.reference(found, odometry.stamps)
+    def run(self, collected: Collected, reported: Collection[Event], part: str) -> RecordedRun:
+        """One run, called `part` if the bag has several of the climber; raises `NoRunError`."""
+        whole = odometry = self.series(collected, topics.ODOMETRY)
+        reference = self.reference(collected, odometry.stamps)
         known = np.flatnonzero(np.isfinite(reference[:, 0]))
         if len(known):
             first, last = known[0], known[-1]
@@ -125,21 +130,17 @@ class RunReader:
             reference = reference[first : last + 1]
         if len(odometry) < 2:
             raise NoRunError(self.too_few(whole))
-        self.check_agreement(found)
-        start, parameters = int(odometry.stamps[0]), self.known(found)
+        self.check_agreement(collected)
+        start, parameters = int(odometry.stamps[0]), self.parameters_of(collected)
         recorded = {
-            name: self.within(self.recorded(found, name), name, odometry)
-            for name in TAKEN.keys() - {topics.ODOMETRY}
+            name: self.within(self.series(collected, name), name, odometry)
+            for name in EXTRACTORS.keys() - {topics.ODOMETRY}
         }
-        commands = self.within(self.commands(found, parameters), topics.TORQUES, odometry)
-        right, left = (
-            self.within(wheel, topics.JOINTS, odometry) for wheel in self.wheels(found, parameters)
-        )
-        own = [
-            event
-            for event in told
-            if events.is_of(event, self.namespace) and found.begin <= event.arrival < found.end
-        ]
+        commands = self.within(self.commands(collected, parameters), topics.TORQUES, odometry)
+        wheels = self.wheels(collected, parameters)
+        right, left = (self.within(wheel, topics.JOINTS, odometry) for wheel in wheels)
+        begin, end = collected.begin, collected.end
+        own = [e for e in reported if begin <= e.arrival < end and events.is_of(e, self.namespace)]
         news = [(_seconds(event, whole, start), event) for event in events.changes(own)]
         run = RecordedRun(
             name=self.namespace,
@@ -149,7 +150,7 @@ class RunReader:
             commands=commands.where(np.isin(commands.stamps, odometry.stamps)),
             unanswerable=np.setdiff1d(commands.stamps, whole.stamps),
             wheels=(right, left),
-            truth_reference=self.reference(found, recorded[topics.TRUTH].stamps),
+            truth_reference=self.reference(collected, recorded[topics.TRUTH].stamps),
             recorded=recorded,
             events=sorted(news, key=itemgetter(0)),
             is_diagnosed=any(event.kind == "state" for event in own),
@@ -160,92 +161,91 @@ class RunReader:
             self.bag.lose(f"{self.topic(topics.ODOMETRY)}: {run.contradiction}")
         return run
 
-    def reference(self, found: Collected, stamps: Stamps) -> Array:
-        """Reference (n, 3) at stamps (n,) [ns]: where it waited for the climber, that place.
+    def reference(self, collected: Collected, stamps: Stamps) -> Array:
+        """Poses of the reference (n, 3) at stamps (n,) [ns]; nan where there is none.
 
-        The controller tells 20 times a second; between, its reference went on evenly.
+        Where the reference waited for the climber, that is counted in: `reference_time` has the
+        delay 20 times a second, which is interpolated linearly.
         """
-        told = TimeSeries.of(found.parts[topics.REFERENCE_TIME])
-        if len(told):
-            begin = told.stamps[0]
-            behind = np.interp(stamps - begin, told.stamps - begin, told.values[:, 0])
+        delays = TimeSeries.of(collected.samples[topics.REFERENCE_TIME])
+        if len(delays):
+            begin = delays.stamps[0]
+            behind = np.interp(stamps - begin, delays.stamps - begin, delays.values[:, 0])
             stamps = stamps - np.round(behind * SECOND).astype(np.int64)
-        return poses_at(found.reference, stamps)
+        return poses_at(collected.reference, stamps)
 
-    def recorded(self, found: Collected, name: str) -> TimeSeries:
-        """The messages of a topic; says how many are left out, and why."""
-        return self.judged(TimeSeries.of(found.parts[name]), name)
+    def series(self, collected: Collected, name: str) -> TimeSeries:
+        """The fit messages of a topic; notes how many are left out, and why."""
+        return self.noted(TimeSeries.of(collected.samples[name]), name)
 
-    def judged(self, recorded: TimeSeries, name: str) -> TimeSeries:
-        """The same; says how many messages are left out, and why."""
+    def noted(self, recorded: TimeSeries, name: str) -> TimeSeries:
+        """The same series; notes how many messages of its topic are left out, and why."""
         if recorded.unfit:
             count, repeated = sum(recorded.unfit.values()), recorded.repeated
-            of = count + len(recorded) + repeated
+            total = count + len(recorded) + repeated
             why = ", ".join(f"{reason} ({n})" for reason, n in recorded.unfit.items())
-            self.bag.lose(f"{self.topic(name)}: {count} of {of} messages left out: {why}")
+            self.bag.lose(f"{self.topic(name)}: {count} of {total} messages left out: {why}")
         return recorded
 
     def within(self, recorded: TimeSeries, name: str, odometry: TimeSeries) -> TimeSeries:
-        """The messages of a topic in the time of the odometry; says if there are none."""
+        """The messages of a topic in the time of the odometry; notes if there are none."""
         within = recorded.within(int(odometry.stamps[0]), int(odometry.stamps[-1]))
         if len(recorded) and not len(within):
             self.bag.lose(f"{self.topic(name)}: no message has a time of the odometry's")
         return within
 
     def too_few(self, odometry: TimeSeries) -> str:
-        """Why there is no run."""
+        """Why there is no run, in words."""
         topic, count = self.topic(topics.ODOMETRY), len(odometry)
         if count > 1:
             return f"no run on {topic}: one message only has a reference"
         others = f", {odometry.repeated} with the stamp of another" if odometry.repeated else ""
         return f"no run on {topic}: {count or 'no'} message of use{others}"
 
-    def known(self, found: Collected) -> Told:
-        """The parameters of the controller: as given, but names may be those that it told."""
-        told = self.told(found)
+    def parameters_of(self, collected: Collected) -> Parameters:
+        """Parameters of the controller: those given; of the bag, what these leave open."""
+        recorded = self.recorded_parameters(collected)
         if self.parameters is None:
-            return told
-        names = {name: told[name] for name in NAMES if name in told}
-        return names | dict(self.parameters(self.namespace))
+            return recorded
+        defaults = {name: recorded[name] for name in RECORDED_DEFAULTS if name in recorded}
+        return defaults | dict(self.parameters(self.namespace))
 
-    def told(self, found: Collected) -> Told:
-        """The parameters of the controller, as it told them last; says what is wrong with them."""
-        told = max(found.parameters, key=itemgetter(0), default=(0, {}))[1]
+    def recorded_parameters(self, collected: Collected) -> Parameters:
+        """Parameters of the controller as last recorded; none, and a note why, if one is wrong."""
+        _, values = max(collected.parameters, key=itemgetter(0), default=(0, {}))
         try:
-            Values(told).read(Climber)
+            Values(values).read(Climber)
         except (ValueError, TypeError) as error:
             self.bag.lose(f"{self.topic(topics.PARAMETERS)}: not used, {error}")
             return {}
-        return told
+        return values
 
-    def commands(self, found: Collected, parameters: Told) -> TimeSeries:
-        """Torques right, left that were commanded; says why there are none."""
-        parts = found.joints[topics.TORQUES]
-        if not parts:
-            return NOTHING
+    def commands(self, collected: Collected, parameters: Parameters) -> TimeSeries:
+        """Torques right, left (n, 2) [N m] that were commanded; notes why there are none."""
+        return self.of_wheels(
+            collected, topics.TORQUES, lambda parts: [commanded_torques(parts, parameters)]
+        )[0]
+
+    def wheels(self, collected: Collected, parameters: Parameters) -> tuple[TimeSeries, TimeSeries]:
+        """Rate and torque (n, 2) of the right and the left wheel; notes why there are none."""
+        right, left = self.of_wheels(
+            collected, topics.JOINTS, lambda parts: rates_and_torques(parts, parameters)
+        )[:2]
+        return right, left
+
+    def of_wheels(
+        self,
+        collected: Collected,
+        name: str,
+        read: Callable[[Sequence[Joints]], Sequence[TimeSeries]],
+    ) -> Sequence[TimeSeries]:
+        """What `read` makes of a topic's joints; empty ones, and a note why, if it raises."""
         try:
-            return self.judged(
-                of_both(parts, wheel_names(_names(parts), parameters)), topics.TORQUES
-            )
+            if parts := collected.joints[name]:
+                return [self.noted(series, name) for series in read(parts)]
         except ValueError as error:
-            self.bag.lose(f"{self.topic(topics.TORQUES)}: not used, {error}")
-            return NOTHING
-
-    def wheels(self, found: Collected, parameters: Told) -> tuple[TimeSeries, TimeSeries]:
-        """What joint_states tell of the right and the left wheel; says why they do not."""
-        parts = found.joints[topics.JOINTS]
-        if not parts:
-            return NOTHING, NOTHING
-        try:
-            right, left = (of_one(parts, name) for name in wheel_names(_names(parts), parameters))
-            return self.judged(right, topics.JOINTS), self.judged(left, topics.JOINTS)
-        except ValueError as error:
-            self.bag.lose(f"{self.topic(topics.JOINTS)}: not used, {error}")
-            return NOTHING, NOTHING
-
-
-def _names(parts: Iterable[Joints]) -> set[str]:
-    return {name for part in parts for name in part.names}
+            self.bag.lose(f"{self.topic(name)}: not used, {error}")
+        return [NOTHING, NOTHING]
 
 
 def _seconds(event: Event, odometry: TimeSeries, start: int) -> float:

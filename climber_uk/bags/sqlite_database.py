@@ -1,9 +1,9 @@
-"""Open databases of which nothing is known, so that they can do nothing.
+"""Open untrusted SQLite databases, so that nothing but rows can be read from them.
 
 A database is opened immutable: SQLite neither writes to it nor looks at what lies beside it. What
 its recorder left beside it when it was killed, a log or a journal, is brought into a private copy
-first. Of the SQL in a database only plain tables are believed: views, triggers and generated
-columns can tell anything, and take for ever.
+first. Only plain tables are read: views, triggers and generated columns run SQL of the database,
+which can return anything, and take for ever.
 """
 
 import re
@@ -29,7 +29,7 @@ TABLES = "sqlite_master", "topics", "messages", "message_definitions"
 
 
 class Patience:
-    """How long SQLite may still go on without a row: a tree of pages may have no end."""
+    """Until when SQLite may search for the next row: damaged pages may form a circle."""
 
     def __init__(self) -> None:
         self.renew()
@@ -63,9 +63,9 @@ def open_database(path: Path, patience: Patience) -> sqlite3.Connection:
 
 def has_columns(database: sqlite3.Connection, table: str, columns: Collection[str]) -> bool:
     """Whether there is a table with some columns that are stored, not computed."""
-    told = database.execute(f"PRAGMA table_xinfo({table})").fetchall()
-    stored = {name for _, name, _, _, _, _, hidden in told if not hidden}
-    return stored >= set(columns) and "_rowid_" not in {name.lower() for _, name, *_ in told}
+    found = database.execute(f"PRAGMA table_xinfo({table})").fetchall()
+    stored = {name for _, name, _, _, _, _, hidden in found if not hidden}
+    return stored >= set(columns) and "_rowid_" not in {name.lower() for _, name, *_ in found}
 
 
 def recovered(path: Path, scratch: Path, lose: Callable[[str], None]) -> Path:
@@ -91,8 +91,8 @@ def recovered(path: Path, scratch: Path, lose: Callable[[str], None]) -> Path:
     return copy
 
 
-def size_told(path: Path) -> int:
-    """Size [bytes] that a database says it has; raises `ValueError` if it is none."""
+def stated_size(path: Path) -> int:
+    """Size [bytes] by a database's header; raises `ValueError` if the file is none."""
     with path.open("rb") as stream:
         header = stream.read(100)
     if not header:

@@ -1,34 +1,27 @@
 """Read sqlite3 files of rosbag2, as far as they are sound.
 
-Rows are told from damage by their numbers, which rise, and by their sizes, which are no more
-together than the file has. Behind a damaged page one is gone on with the next row that is found.
+A row is sound if its number is larger than the one before, and if the rows together are no larger
+than the file. Behind a damaged page reading goes on with the next row that is found.
 """
 
 import sqlite3
 from array import array
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from climber_uk.bags.connection import (
-    CDR,
-    MOST_TOPICS,
-    Connection,
-    Logged,
-    Lose,
-    is_name,
-    tell_encodings,
-)
+from climber_uk.bags.connection import MOST_TOPICS, Connection, Logged, Lose, readable
 from climber_uk.bags.definitions import LONGEST
 from climber_uk.bags.sqlite_database import (
     Patience,
     has_columns,
     open_database,
     recovered,
-    size_told,
+    stated_size,
 )
 from climber_uk.bags.unpacking import LARGEST_MESSAGE
 
@@ -56,22 +49,18 @@ class SqliteFile:
         self._endless = False  # whether to look for many rows at once had no end
         readable = recovered(path, scratch, self.lose)
         self.size = path.stat().st_size
-        if readable == path and self.size < size_told(path):
+        if readable == path and self.size < stated_size(path):
             self.lose("cut off, read up to the last whole message")
         elif readable != path:
             self.size += sum(file.stat().st_size for file in scratch.glob(f"{path.name}-*"))
-        try:
-            self._database = open_database(readable, self._patience)
-        except sqlite3.Error as error:
-            raise ValueError(f"no readable database: {error}") from None
-        try:
-            self._look_into()
-        except sqlite3.Error as error:
-            self.close()
-            raise ValueError(f"no readable database: {error}") from None
-        except BaseException:
-            self.close()
-            raise
+        with ExitStack() as stack:
+            try:
+                database = open_database(readable, self._patience)
+                self._database = stack.enter_context(closing(database))
+                self._look_into()
+            except sqlite3.Error as error:
+                raise ValueError(f"no readable database: {error}") from None
+            stack.pop_all()  # it stays open
 
     def close(self) -> None:
         """Close the file."""
@@ -96,13 +85,13 @@ class SqliteFile:
         for table, columns in TABLES.items():
             if not has_columns(self._database, table, columns):
                 raise ValueError(f"it has no table {table} with {', '.join(columns)}")
-        told = array("q")
+        rows = array("q")
         for row in self._sound_rows():
-            told.extend(row)
-        self._rows = np.array(told, np.int64).reshape(-1, 4)  # (n, 4)
+            rows.extend(row)
+        self._rows = np.array(rows, np.int64).reshape(-1, 4)  # (n, 4) as `Row`
         times = self._rows[:, 1]
         self.start, self.end = (int(times.min()), int(times.max())) if len(times) else (2**63, 0)
-        self.connections = list(self._connections())
+        self.connections = list(readable(self._connections(), self.lose))
 
     def _sound_rows(self) -> Iterator[Row]:
         for _ in self._selected("SELECT 1 FROM messages NOT INDEXED WHERE _rowid_ < 1 LIMIT 1"):
@@ -138,33 +127,27 @@ class SqliteFile:
             most = f"{LARGEST_MESSAGE >> 20} MiB"
             self.lose(f"{unfit} rows are left out: no message, or larger than {most}")
 
-    def _connections(self) -> Iterator[Connection]:
+    def _connections(self) -> Iterator[tuple[Connection, str]]:
+        """All topics, with their encodings."""
         definitions = self._definitions()
         counts = Counter(self._rows[:, 2].tolist())
-        others: dict[str, list[str]] = defaultdict(list)
         columns = ", ".join(TABLES["topics"])
         for number, topic, type_name, encoding in self._selected(
             f"SELECT {columns} FROM topics NOT INDEXED LIMIT {MOST_TOPICS}"
         ):
-            if type(number) is not int or not (is_name(topic) and is_name(type_name)):
-                self.lose(f"a topic that cannot be called so is left out: {topic!r:.60}")
-            elif encoding != CDR:
-                others[str(encoding)].append(topic)
-            else:
-                told = definitions.get(type_name, "")
-                yield Connection(number, topic, type_name, counts[number], told)
-        tell_encodings(self.name, others, self._lose)
+            text = definitions.get(type_name, "")
+            yield Connection(number, topic, type_name, counts[number], text), str(encoding)
 
     def _definitions(self) -> dict[str, str]:
-        """Definitions by the names of types, as far as they are told."""
+        """Definitions by the names of types, as far as the file has them."""
         if not has_columns(self._database, "message_definitions", DEFINITIONS):
             return {}
-        told = self._selected(
+        found = self._selected(
             "SELECT topic_type, encoded_message_definition FROM message_definitions NOT INDEXED"
             " WHERE encoding = 'ros2msg' AND typeof(encoded_message_definition) = 'text'"
             f" AND length(encoded_message_definition) <= {LONGEST} LIMIT {MOST_TOPICS}"
         )
-        return dict(told)
+        return dict(found)
 
     def _selected(self, query: str, *values: int) -> Iterator[Any]:
         """Rows up to the first that is damaged."""
@@ -199,7 +182,7 @@ class SqliteFile:
         return found
 
     def _blocks(self, chosen: Any) -> Iterator[Any]:
-        """Rows (n, 4) with some indices, as many at a time as fit in memory."""
+        """Rows (n, 4) at the indices `chosen`, at most `BLOCK_SIZE` bytes of messages at a time."""
         while len(chosen):
             rows = self._rows[chosen[:BLOCK]]
             fitting = int(np.searchsorted(np.cumsum(rows[:, 3]), BLOCK_SIZE, "right"))

@@ -1,7 +1,7 @@
 """The storage files of a rosbag2 directory, of which a killed writer loses only the last write.
 
-`rosbags` writes such files too, but nobody can open one that was not closed. These are whole after
-every `write`.
+`rosbags` writes such files too, but those that were not closed do not open. These are complete
+after every `write`.
 """
 
 import os
@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any, Protocol, cast
+from typing import IO, Any, cast
 
 import yaml
 from mcap.data_stream import RecordBuilder
@@ -62,28 +62,11 @@ class Topic:
         return to_yaml(list(self.offered_qos)).strip()
 
 
-class Storage(Protocol):
-    """The file of a bag that holds the messages."""
-
-    def __init__(self, stem: Path, distro: str) -> None:
-        """Create the file, whose path without suffix is `stem`, of a distribution of ROS."""
-
-    @property
-    def path(self) -> Path:
-        """The file's path."""
-
-    def add_topic(self, topic: Topic) -> None:
-        """Store what readers have to know of the topic."""
-
-    def write(self, messages: Sequence[Message]) -> None:
-        """Store the messages and leave a file that opens, whatever comes."""
-
-    def close(self, metadata: str) -> None:
-        """Finish the file with a copy of the bag's metadata in it."""
-
-
 class Mcap:
-    """An MCAP file of uncompressed chunks, with all its indexes once it is closed."""
+    """A new MCAP file of uncompressed chunks, with all its indexes once it is closed.
+
+    `stem` is its path without the suffix. It opens after every `write`, whatever comes.
+    """
 
     def __init__(self, stem: Path, _: str) -> None:
         self.path = stem.with_name(f"{stem.name}.mcap")
@@ -113,7 +96,7 @@ class Mcap:
         self._writer.flush()
 
     def close(self, metadata: str) -> None:
-        """Append metadata and summary."""
+        """Append the bag's metadata, and a summary."""
         self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata})
         self._writer.finish()
         self._stream.close()
@@ -169,7 +152,10 @@ class _EndedStream:
 
 
 class Sqlite3:
-    """A SQLite database with version 4 of rosbag2's schema."""
+    """A new SQLite database with version 4 of rosbag2's schema; `stem` and the rest as of `Mcap`.
+
+    `distro` is the name of the ROS distribution that is stored in it.
+    """
 
     SCHEMA = """
         CREATE TABLE schema (schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
@@ -217,7 +203,7 @@ class Sqlite3:
             database.executemany("INSERT INTO messages VALUES (NULL, ?, ?, ?)", rows)
 
     def close(self, metadata: str) -> None:
-        """Insert the metadata."""
+        """Insert the bag's metadata."""
         with closing(self._database), self._transaction() as database:
             database.execute("INSERT INTO metadata VALUES (NULL, 9, ?)", (metadata,))
 
@@ -230,7 +216,7 @@ class Sqlite3:
             raise OSError(f"{self.path}: {error}") from error
 
 
-STORAGES: dict[str, type[Storage]] = {"mcap": Mcap, "sqlite3": Sqlite3}
+STORAGES: dict[str, type[Mcap | Sqlite3]] = {"mcap": Mcap, "sqlite3": Sqlite3}
 
 
 def is_known(type_name: str) -> bool:

@@ -1,39 +1,24 @@
-"""Which topics of a bag are a climber's."""
+"""Which topics of a bag belong to which climber."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from climber_uk.messages.topics import (
-    CLOCK,
-    DIAGNOSTICS,
-    FORCE,
-    JOINTS,
-    LOG,
-    MARGINS,
-    ODOMETRY,
-    PARAMETERS,
-    PRESSURE,
-    REFERENCE,
-    REFERENCE_TIME,
-    TORQUES,
-    TRUTH,
-)
+from climber_uk.messages import topics
+from climber_uk.messages.topics import ODOMETRY
 
 NAMES = (
-    *(ODOMETRY, TRUTH, REFERENCE, REFERENCE_TIME, TORQUES, JOINTS, PRESSURE, PARAMETERS, FORCE),
-    *MARGINS,
+    *(ODOMETRY, topics.TRUTH, topics.REFERENCE, topics.REFERENCE_TIME, topics.TORQUES),
+    *(topics.JOINTS, topics.PRESSURE, topics.PARAMETERS, topics.FORCE, *topics.MARGINS),
 )
 TYPES = {
-    **dict.fromkeys((ODOMETRY, TRUTH), "nav_msgs/msg/Odometry"),
-    **dict.fromkeys((TORQUES, JOINTS), "sensor_msgs/msg/JointState"),
-    REFERENCE: "trajectory_msgs/msg/MultiDOFJointTrajectory",
-    PRESSURE: "sensor_msgs/msg/FluidPressure",
-    PARAMETERS: "rcl_interfaces/msg/ParameterEvent",
-    CLOCK: "rosgraph_msgs/msg/Clock",
-    DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+    ODOMETRY: "nav_msgs/msg/Odometry",
+    topics.TORQUES: "sensor_msgs/msg/JointState",
+    topics.REFERENCE: "trajectory_msgs/msg/MultiDOFJointTrajectory",
+    topics.PRESSURE: "sensor_msgs/msg/FluidPressure",
+    topics.CLOCK: "rosgraph_msgs/msg/Clock",
 }  # of those that are read message by message
-KNOWN = {*NAMES, DIAGNOSTICS, LOG}
-MOST_CLIMBERS = 100  # that are told of, unless they were chosen
+KNOWN = {*NAMES, topics.DIAGNOSTICS, topics.LOG}
+MOST_CLIMBERS = 100  # that are read, unless they are chosen by namespace
 
 
 @dataclass(frozen=True)
@@ -60,13 +45,8 @@ class Topics:
         name = self.remapped.get(name, name)
         return name if name.startswith("/") else f"/{namespace}/{name}".replace("//", "/")
 
-    def of(self, namespace: str) -> Iterator[tuple[str, str]]:
-        """Full name, and name, of the topics of one climber."""
-        for name in NAMES:
-            yield self.full(name, namespace), name
-
     def namespaces(self, types: Mapping[str, str]) -> list[str]:
-        """Those of the climbers that have odometry in a bag with topics of some types.
+        """Namespaces of the climbers that have odometry, of a bag's `types` by topic.
 
         Raises `ValueError` if there are too many.
         """
@@ -83,13 +63,3 @@ class Topics:
                 f"odometry of {len(found)} climbers, more than {MOST_CLIMBERS}: choose by namespace"
             )
         return found
-
-
-def types_of(topics: Iterable[str]) -> dict[str, str]:
-    """Type that each of some topics should have, by their full names, which end in ours."""
-    return {
-        topic: of
-        for topic in topics
-        for name, of in TYPES.items()
-        if f"/{topic}".endswith(f"/{name.lstrip('/')}")
-    }

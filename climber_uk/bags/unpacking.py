@@ -1,4 +1,4 @@
-"""Unpack what others packed, within bounds: a small file may hold more than any memory."""
+"""Decompress untrusted data within bounds: a small file may expand beyond any memory."""
 
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
@@ -46,6 +46,6 @@ def unpack(data: bytes, compression: str, most: int) -> bytes:
 
 
 def zstandard_reader(packed: object) -> zstandard.ZstdDecompressionReader:
-    """What reads unpacked bytes, from bytes or from a file."""
+    """Stream of the unpacked bytes of packed ones, or of a file."""
     unpacker = zstandard.ZstdDecompressor(max_window_size=WINDOW)
     return unpacker.stream_reader(packed, read_across_frames=True)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""`campaign`: in how many of many runs does it fall? Parameters, starts and noise are drawn.
+"""`campaign`: the share of runs that fall, with parameters, starts and noise drawn at random.
 
 A campaign's file -> `campaign.read` (`names`, `distributions`, `limits`; all is checked before
 anything runs) -> parts of runs (`running`, in processes) -> each part's draws as closed loops

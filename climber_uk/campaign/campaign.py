@@ -27,14 +27,17 @@ SEEDS = Uniform(0, 2**31)  # of the nodes, rounded down
 class Size:
     """Number of runs, their seed, and their duration."""
 
-    runs: int = parameter(10_000, "", "number of runs", at_least=1)
-    seed: int = parameter(0, "", "of all random numbers", at_least=0)
-    duration: float = parameter(20.0, "s", "duration of each run", above=0)
+    runs: int = parameter(10_000, "", "number of runs; too few: wide intervals", at_least=1)
+    seed: int = parameter(0, "", "of all draws: the same seed, the same runs", at_least=0)
+    duration: float = parameter(20.0, "s", "of each run; too short: late falls unseen", above=0)
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """What runs share, and what is drawn for each: run k depends on the seed and k only."""
+    """Values that all runs share, and distributions of the others.
+
+    Run k depends on the seed and on k only.
+    """
 
     base: Path  # parameter file of the nodes
     size: Size
@@ -58,7 +61,7 @@ class Campaign:
         return own
 
     def described(self) -> dict[str, str]:
-        """All that the results depend on, as strings by name."""
+        """Everything that the results depend on, as strings by name."""
         size, shared = vars(self.size), self.scenario.values
         return {
             "climber_uk": version("climber_uk"),

@@ -25,7 +25,7 @@ class Distribution(Protocol):
 
 @dataclass(frozen=True)
 class Uniform:
-    """`[lowest, highest]`, all alike."""
+    """`[lowest, highest]`, all equally likely."""
 
     lowest: float
     highest: float

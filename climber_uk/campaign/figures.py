@@ -6,11 +6,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
 import numpy as np
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 from climber_uk.campaign.campaign import Campaign
@@ -21,6 +17,7 @@ from climber_uk.campaign.parts import Store
 from climber_uk.campaign.results import broken, wilson
 from climber_uk.mechanics import Array
 from climber_uk.messages.topics import PLANT
+from climber_uk.report.plotting import plt, saved
 
 POINTS = 5000  # in a scatter figure: the first runs, which are random as all are
 BARS = 60  # in a histogram
@@ -52,7 +49,7 @@ def _histograms(campaign: Campaign, store: Store, directory: Path) -> Path:
                 axes.axvline(limit.bound, color="tab:red", linestyle="--", label=str(limit))
                 axes.legend(fontsize="small")
     figure.suptitle(f"How often, in {campaign.size.runs} runs")
-    return _written(figure, directory / "histograms.png")
+    return saved(figure, directory / "histograms.png")
 
 
 def _failures(campaign: Campaign, store: Store, directory: Path) -> Path:
@@ -68,7 +65,7 @@ def _failures(campaign: Campaign, store: Store, directory: Path) -> Path:
         axes.set(xlabel=_parameter(name), ylabel="broken [%]", ylim=(0, None))
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.suptitle("Runs that broke a limit, by each parameter (95 % intervals)")
-    return _written(figure, directory / "failures.png")
+    return saved(figure, directory / "failures.png")
 
 
 def binned(campaign: Campaign, store: Store) -> Mapping[str, Array]:
@@ -96,7 +93,7 @@ def _scatters(campaign: Campaign, store: Store, directory: Path) -> Iterator[Pat
             by_name = dict(zip(campaign.drawn, correlation, strict=True))
             figure = _scatter(some, failed, metric, by_name)
             figure.suptitle(f"{metric} by each parameter ({shown})")
-            yield _written(figure, directory / f"scatter_{metric}.png")
+            yield saved(figure, directory / f"scatter_{metric}.png")
 
 
 def first(store: Store, names: Sequence[str]) -> dict[str, Array]:
@@ -142,9 +139,3 @@ def _parameter(name: str) -> str:
 
 def _label(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
-
-
-def _written(figure: Any, path: Path) -> Path:
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
-    return path

@@ -1,7 +1,5 @@
 """Metrics of a run, and the limits within which it succeeds."""
 
-import operator
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +8,7 @@ import numpy as np
 
 from climber_uk.closed_loop.outcome import Outcome
 from climber_uk.mechanics import Array
+from climber_uk.report.comparison import OPERATORS, parse
 
 METRICS: dict[str, tuple[str, Callable[[Outcome], Array]]] = {
     "rms_distance": ("m", lambda outcome: outcome.rms),
@@ -23,13 +22,6 @@ METRICS: dict[str, tuple[str, Callable[[Outcome], Array]]] = {
     "fell": ("", lambda outcome: np.isfinite(outcome.fell).astype(float)),
     "fall_time": ("s", lambda outcome: outcome.fell),
 }
-RELATIONS: dict[str, Callable[[Any, Any], Any]] = {
-    "<=": operator.le,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "<": operator.lt,
-    ">": operator.gt,
-}
 
 
 @dataclass(frozen=True)
@@ -37,35 +29,25 @@ class Limit:
     """A bound that a metric must keep."""
 
     metric: str
-    relation: str
+    comparison: str
     bound: float
 
     @classmethod
     def read(cls, text: Any) -> "Limit":
-        """Limit of a text like 'max_distance < 0.05'; `ValueError` if it is none."""
-        found = re.fullmatch(r"\s*(\w+)\s*([<>=]+)\s*(\S+)\s*", str(text))
-        try:
-            metric, relation, bound = found.groups() if found else ("", "", "")
-            limit = cls(metric, relation, float(bound))
-        except ValueError:
-            raise ValueError(f"{text!r} must be like 'max_distance < 0.05'") from None
-        if metric not in METRICS:
-            raise ValueError(f"{metric} of {text!r} must be one of {', '.join(METRICS)}")
-        if relation not in RELATIONS or not np.isfinite(limit.bound):
-            raise ValueError(f"{text!r} must have one of {' '.join(RELATIONS)}, and a number")
-        return limit
+        """Limit of a text like 'max_distance < 0.05'; raises `ValueError` if it is none."""
+        return cls(*parse(str(text), METRICS))
 
     def __str__(self) -> str:
-        return f"{self.metric} {self.relation} {self.bound:.12g}"
+        return f"{self.metric} {self.comparison} {self.bound:.12g}"
 
     def holds(self, values: Array) -> Any:
         """Whether values (n,) of the metric keep the bound; nan does not."""
-        return RELATIONS[self.relation](values, self.bound)
+        return OPERATORS[self.comparison](values, self.bound)
 
     def excess(self, values: Array) -> Array:
         """Excess (n,) of values (n,) over the bound; infinite for nan."""
         over = values - self.bound
-        over = {"<": over, ">": -over, "=": np.abs(over)}[self.relation[0]]
+        over = {"<": over, ">": -over}.get(self.comparison[0], np.abs(over))
         return np.where(np.isnan(over), np.inf, over)
 
 

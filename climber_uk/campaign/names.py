@@ -1,4 +1,4 @@
-"""Parameters of the nodes in a campaign: which can be drawn, which are fixed, which do not matter.
+"""Parameters of the nodes in a campaign: those that can be drawn, are fixed, or have no effect.
 
 A name is that of a node and of its parameter, as in `plant_simulator.mass`.
 """
@@ -35,9 +35,7 @@ ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHES
 PARAMETERS = {
     **_names(PLANNER, *TRAJECTORY_TYPES),
     **_names(CONTROLLER, *CONTROLLER_TYPES, *ON_WALL),
-    **_names(
-        PLANT, *((kind, "") for kind in (SimulationOptions, Climber, Physics, Motors, Sensors))
-    ),
+    **_names(PLANT, *((k, "") for k in (SimulationOptions, Climber, Physics, Motors, Sensors))),
     **_names(PLANT, *((k, f"{name}.") for group in VARIANTS.values() for name, k in group.items())),
     **_names(PLANT, *ON_WALL),
 }
@@ -58,7 +56,7 @@ VARIED = {
     *(f"{CONTROLLER}.{n}" for n in ("friction_speed", "observer.bandwidth")),
 }
 VARIED -= {MEASURED}
-# What closed loops by the thousand have one kind of only
+# Values that all campaigns have: batches of closed loops have no others
 REQUIRED = {
     f"{CONTROLLER}.pacing.catch_up": 0.0,
     f"{CONTROLLER}.least_pressure": 0.0,
@@ -78,11 +76,8 @@ REQUIRED = {
     f"{PLANT}.odometry_source": "truth",
     f"{PLANT}.odometry_delay": 0.0,
 }
-# Values that they have instead of the defaults: each controller would have a timing of its own
-WITHOUT = {
-    f"{CONTROLLER}.learn_delay": False,
-    f"{CONTROLLER}.observer.twist": "instantaneous",
-}
+# Values that batches have in place of the defaults, which would give each run a timing of its own
+WITHOUT = {f"{CONTROLLER}.learn_delay": False, f"{CONTROLLER}.observer.twist": "instantaneous"}
 
 
 def check_drawn(name: str, constraints: str) -> None:
@@ -116,4 +111,4 @@ def _check_known(name: str) -> None:
     if name == MEASURED:
         raise ValueError(f"{name} is measured: set {PRESSURE}")
     if name not in PARAMETERS:
-        raise ValueError(f"{name} is not a parameter that a campaign knows")
+        raise ValueError(f"{name} is not a parameter of a campaign")

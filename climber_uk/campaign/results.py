@@ -20,7 +20,7 @@ WORST = 3  # runs that are reported for each limit
 
 
 def wilson(count: int, number: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of the probability of what came `count` times in `number`."""
+    """Wilson's 95 % interval of a probability, of `count` events in `number` trials."""
     interval = binomtest(count, number).proportion_ci(confidence_level=0.95, method="wilson")
     return float(interval.low), float(interval.high)
 

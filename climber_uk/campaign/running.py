@@ -1,4 +1,4 @@
-"""Computes the missing parts of a campaign: in processes here, or on a Dask cluster."""
+"""Compute the missing parts of a campaign, in processes of this computer or on a Dask cluster."""
 
 import sys
 from collections.abc import Iterator

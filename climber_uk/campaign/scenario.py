@@ -1,4 +1,4 @@
-"""Closed loops that have the parameters of the nodes."""
+"""Batches of closed loops, made from the parameters of the nodes."""
 
 import math
 from collections.abc import Mapping
@@ -34,12 +34,7 @@ class Node:
 
     def read(self, kind: type[T], prefix: str = "") -> T:
         """Instance of `kind`; raises `ValueError` naming parameter, value and bound."""
-        own = f"{self.name}."
-        mine = {n.removeprefix(own): v for n, v in self.values.items() if n.startswith(own)}
-        try:
-            return Values(mine).read(kind, prefix)
-        except ValueError as error:
-            raise ValueError(f"{own}{error}") from None
+        return Values(self.values).read(kind, f"{self.name}.{prefix}")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""`run_demo --config FILE`: the nodes and a recorder, in processes of their own, once.
+"""`run_demo --config FILE`: run the nodes and a recorder, in processes of their own, once.
 
 They run on this computer, in a ROS domain of their own unless ROS_DOMAIN_ID is set.
 """
@@ -40,7 +40,7 @@ from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
-# One topic of each node that the recorder alone subscribes, which it does once it knows the node
+# One topic of each node that only the recorder subscribes, once it has discovered the node
 RECORDED = REFERENCE_PATH, FORCE, JOINTS
 FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
@@ -59,9 +59,9 @@ class Ended(RuntimeError):  # noqa: N818 - it is what happened
 
 @parameters
 class DemoOptions:
-    """Duration of the demonstration."""
+    """How long the demonstration lasts."""
 
-    duration: float = parameter(20.0, "s", "how long the trajectory is run", above=0)
+    duration: float = parameter(20.0, "s", "of the trajectory; too short: it is cut off", above=0)
 
 
 class Demo(ClimberNode):
@@ -154,7 +154,7 @@ class Demo(ClimberNode):
 
 
 def has_answered(torques: list[JointState]) -> bool:
-    """Whether one of the torques answers an odometry: the safe output without one has stamp 0."""
+    """Whether one of the torques answers an odometry; the safe output without odometry: stamp 0."""
     return any(reading.nanoseconds(message.header.stamp) for message in torques)
 
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
+from itertools import pairwise
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
@@ -32,10 +33,10 @@ from climber_uk.parameters.parameter_file import Section, nothing_for, read_sect
 from climber_uk.parameters.parameter_files import paths
 from climber_uk.ros.running import in_a_line
 from climber_uk.ros.transport import use_udp
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, between
 from climber_uk.system.signals import Interrupted, on_end
 
-NODE = "check_driver"
+NODE, FILE = "check_driver", "--params-file"
 DISCOVERY_TIMEOUT = 10.0  # [s] for a publisher to be found
 COPIES = 3  # of an odometry that waits for torques
 FLUSH_TIME = 0.2  # [s] in which odometry from before the trial is received
@@ -64,17 +65,9 @@ def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
             raise ValueError(nothing_for(CONTROLLER, path, sections))
     with NamedTemporaryFile("w", suffix=".yaml") as file:
         write_sections([*as_controller, *own], Path(file.name))
-        first = ["--ros-args", "--params-file", file.name, "--"] if files else []
-        yield [*first, *without_files(arguments)]
-
-
-def without_files(arguments: Sequence[str]) -> Iterator[str]:
-    """Arguments without parameter files."""
-    skipped = False
-    for word in arguments:
-        if not skipped and word != "--params-file":
-            yield word
-        skipped = word == "--params-file"
+        first = ["--ros-args", FILE, file.name, "--"] if files else []
+        others = (w for before, w in pairwise(["", *arguments]) if FILE not in (before, w))
+        yield [*first, *others]
 
 
 class Spinner:
@@ -167,13 +160,6 @@ def say(text: str) -> None:
     print(f"check_driver: {text}", file=sys.stderr, flush=True)
 
 
-def positive(text: str) -> float:
-    """Finite number above 0, for `argparse`; raises `ValueError`."""
-    if not 0 < (value := float(text)) < float("inf"):
-        raise ValueError
-    return value
-
-
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Options of the command line."""
     parser = Parser(
@@ -184,7 +170,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--move", action="store_true", help="try small torques: the climber moves")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument(
-        "--duration", type=positive, default=3.0, metavar="SECONDS", help="to listen (default: 3)"
+        "--duration",
+        type=between(0.01, 1e6),
+        default=3.0,
+        metavar="SECONDS",
+        help="to listen (default: %(default)s)",
     )
     return parser.arguments(arguments)
 

@@ -1,4 +1,4 @@
-"""What was seen of a driver: its topics, its odometry with times of arrival, torques of a trial.
+"""Data on a driver: its topics, its odometry with times of arrival, the torques of a trial.
 
 Stamps and times of arrival are integers in nanoseconds.
 """
@@ -6,6 +6,7 @@ Stamps and times of arrival are integers in nanoseconds.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,8 +15,7 @@ from numpy.typing import NDArray
 from climber_uk.control.twist import TwistKind
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import Motion as Rolling
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.messages import reading
 from climber_uk.parameters.declaration import parameter, parameters
 
@@ -31,11 +31,13 @@ class ExpectedDriver:
     """Parameters of the controller that describe the driver."""
 
     control_period: float = parameter(
-        0.005, "s", "from an odometry to the next", above=0, at_most=1
+        0.005, "s", "from an odometry to the next; wrong: a warning on `rate`", above=0, at_most=1
     )
-    odometry_timeout: float = parameter(0.1, "s", "age above which odometry is refused", above=0)
+    odometry_timeout: float = parameter(
+        0.1, "s", "age above which odometry is refused; too short: `age` fails", above=0
+    )
     transport_delay: float = parameter(
-        0.0, "s", "from a torque's publication to its action", at_least=0
+        0.0, "s", "from a torque's publication to its action; wrong: `latency` warns", at_least=0
     )
 
 
@@ -90,15 +92,11 @@ class MotionSeen:
     @cached_property
     def has_mean_twist(self) -> bool:
         """Whether twists are means of the period before, as of encoders; see `TwistKind`."""
-        kind, motions = TwistKind(), self._motions()
-        for before, now, time in zip(motions, motions[1:], np.diff(self.time), strict=False):
-            kind.learn(before, now, float(time))
+        kind = TwistKind()
+        motions = [Motion.at(*row) for row in np.hstack([self.pose, self.reaction]).tolist()]
+        for (before, now), time in zip(pairwise(motions), np.diff(self.time).tolist(), strict=True):
+            kind.learn(before, now, time)
         return kind.is_mean
-
-    def _motions(self) -> list[Rolling]:
-        columns = [*self.pose.T, *np.cos(self.pose[:, 2:]).T, *np.sin(self.pose[:, 2:]).T]
-        rows = zip(*(column.tolist() for column in (*columns, *self.reaction.T)), strict=True)
-        return [Rolling(*row) for row in rows]
 
     @cached_property
     def reaction(self) -> Array:
@@ -106,7 +104,7 @@ class MotionSeen:
         return self.twist[:, [0, 2]]
 
 
-class Command(NamedTuple):
+class TorqueCommand(NamedTuple):
     """Torques in force from a time [ns] on."""
 
     time: int
@@ -126,7 +124,7 @@ class TrialRecord:
     """The torques of a trial, and why it was stopped if it was."""
 
     pulses: Sequence[PulseTimes]
-    commands: Sequence[Command]
+    commands: Sequence[TorqueCommand]
     highest: float  # [N m] limit of a wheel's torque in the trial
     silence: tuple[int, int] | None = None  # begin and end [ns] without commands
     trouble: str = ""  # why it was stopped before the end
@@ -134,7 +132,7 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class Evidence:
-    """All that was seen of a driver, for the checks."""
+    """All data on a driver that the checks use."""
 
     climber: Climber
     expected: ExpectedDriver
@@ -153,7 +151,7 @@ class Evidence:
 
     @cached_property
     def errors(self) -> list[str]:
-        """Messages of what is unfit in odometry, one for each that is."""
+        """Messages on unfit odometry, one for each."""
         errors = []
         for arrival in self.arrivals:
             try:
@@ -165,16 +163,9 @@ class Evidence:
     @cached_property
     def covariances(self) -> Array:
         """Covariances (n, 6), on the diagonal: of x, y, θ, and of their rates."""
-        return np.array(
-            [
-                [
-                    covariance[i]
-                    for covariance in (m.pose.covariance, m.twist.covariance)
-                    for i in PLANAR
-                ]
-                for m in (a.message for a in self.arrivals)
-            ]
-        ).reshape(-1, 6)
+        messages = [arrival.message for arrival in self.arrivals]
+        both = np.array([(m.pose.covariance, m.twist.covariance) for m in messages])
+        return both.reshape(-1, 2, 36)[:, :, PLANAR].reshape(-1, 6)
 
     @cached_property
     def motion(self) -> MotionSeen:

@@ -11,7 +11,7 @@ from climber_uk.driver_check.evidence import Endpoint, Graph
 from climber_uk.messages.topics import CLOCK, ODOMETRY, TORQUES
 from climber_uk.ros.running import BEST_EFFORT
 
-# the controller's offer of torques, as the middleware knows it
+# the QoS profile that the controller offers for torques
 OFFERED = QoSProfile(
     depth=10,
     deadline=Infinite,

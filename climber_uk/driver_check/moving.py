@@ -10,6 +10,7 @@ from climber_uk.driver_check import thresholds
 from climber_uk.driver_check.evidence import Evidence, MotionSeen
 from climber_uk.driver_check.report import Finding, failed, graded, skipped, warned
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.quantities import across, along
 
 DEGREES = math.degrees(1)
 TINY = 1e-12  # [m] in place of 0 in a denominator
@@ -49,9 +50,7 @@ def displacements(motion: MotionSeen) -> Displacements:
         for way in (gone, motion.pose)
     )
     middle = places[:-1, 2] + by_pose[:, 2] / 2
-    cosine, sine = np.cos(middle), np.sin(middle)
-    x, y = by_pose[:, 0], by_pose[:, 1]
-    in_body = np.stack([x * cosine + y * sine, y * cosine - x * sine], axis=-1)
+    in_body = np.stack([along(middle, by_pose), across(middle, by_pose)], axis=-1)
     columns = by_pose[:, 2], by_twist[:, 2], by_pose[:, :2], in_body, by_twist[:, :2]
     return Displacements(*(column[heard] for column in columns))
 

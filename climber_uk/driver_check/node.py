@@ -165,7 +165,7 @@ class DriverNode(ClimberNode):
         return [a._replace(simulated=clock[bisect_right(came, a.wall)]) for a in self.arrivals]
 
     def evidence(self) -> Evidence:
-        """Evidence of all that was seen until now."""
+        """Evidence collected until now."""
         return Evidence(
             climber=self.parameters.read(Climber),
             expected=self.parameters.read(ExpectedDriver),

@@ -6,8 +6,6 @@ so that friction and weight need not be known, and no torque is higher than it h
 Times are in seconds.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from climber_uk.driver_check.response import PAIR, expected_gain
@@ -30,22 +28,11 @@ PUSH_TIME, PUSHED_BY = 0.15, 0.5  # [s], [rad/s²] of yawing, before commands st
 LOOK_TIME = 0.25  # [s] after the watchdog's time, in which the motion is judged
 
 
-class Stage(Protocol):
-    """Torques for a while."""
-
-    def torques(self, time: float, state: State) -> Array | None:
-        """Torques (2,) (right, left) [N m] at `time` [s] since the begin; None: send nothing."""
-
-    def finish(self) -> None:
-        """From now on only damp the motion."""
-
-    @property
-    def done(self) -> bool:
-        """Whether the stage is over."""
-
-
 class Pulse:
-    """A pair of torques τR = ±τL that rises, falls, and damps the motion that is left."""
+    """A pair of torques τR = ±τL that rises, falls, and damps the motion that is left.
+
+    It is `done` when the climber rests, or should.
+    """
 
     def __init__(
         self, turns: bool, sign: float, climber: Climber, period: float, limit: float
@@ -66,7 +53,7 @@ class Pulse:
         self.falls = self.done = False
 
     def torques(self, time: float, state: State) -> Array:
-        """See `Stage`."""
+        """Torques (2,) (right, left) [N m] at `time` [s] since the pulse's begin."""
         self.start = self.start or state
         # missed periods are not made up for: their reaction was not seen
         step, self.last = min(time - self.last, self.longest_step), time
@@ -102,7 +89,7 @@ class Pulse:
         return self.rest(shares) if stopped or level < -LOWEST * self.top else level
 
     def finish(self) -> None:
-        """See `Stage`."""
+        """From now on only damp the motion."""
         self.top = max(self.top, abs(self.level))
         self.rests = True
 
@@ -125,7 +112,7 @@ class Silence:
         self.resumes_at = PUSH_TIME + watchdog_time + LOOK_TIME
 
     def torques(self, time: float, state: State) -> Array | None:
-        """See `Stage`."""
+        """Torques as a `Pulse` has them; None: send nothing."""
         if time < min(PUSH_TIME, self.resumes_at):
             return self.torque * PAIR[1]
         if time < self.resumes_at:
@@ -134,10 +121,14 @@ class Silence:
         return self.after.torques(time - self.resumes_at, state)
 
     def finish(self) -> None:
-        """See `Stage`."""
+        """From now on only damp the motion."""
         self.resumes_at = 0.0
 
     @property
     def done(self) -> bool:
-        """Whether the stage is over."""
+        """Whether it is over."""
         return self.after.done
+
+
+Stage = Pulse | Silence
+"""What a trial consists of."""

@@ -49,15 +49,15 @@ def gain(seen: Evidence) -> Finding:
     response = response_of(seen)
     if response is None:
         return NOT_MOVED
-    drive, turn = np.diag(response.gains).tolist()
-    off_drive, off_turn = (max(g, 1 / g) if math.isfinite(g) else 1.0 for g in (drive, turn))
-    if max(drive / turn, turn / drive) < thresholds.GAIN_OFF:
+    drive, yaw = np.diag(response.gains).tolist()
+    off_drive, off_yaw = (max(g, 1 / g) if math.isfinite(g) else 1.0 for g in (drive, yaw))
+    if max(drive / yaw, yaw / drive) < thresholds.GAIN_OFF:
         hint = "see wheel_radius, here and in the driver, and its N m per ampere"
     else:
-        hint = "see mass" if off_drive > off_turn else "see yaw_inertia and half_track"
-    said = f"drives {drive:.2f} times, turns {turn:.2f} times as fast as the parameters say"
+        hint = "see mass" if off_drive > off_yaw else "see yaw_inertia and half_track"
+    said = f"drives {drive:.2f} times, turns {yaw:.2f} times as fast as the parameters say"
     bounds = thresholds.GAIN_OFF, thresholds.GAIN_WRONG
-    return graded(max(off_drive, off_turn), bounds, said, hint, drive=drive, turn=turn)
+    return graded(max(off_drive, off_yaw), bounds, said, hint, drive=drive, turn=yaw)
 
 
 def latency(seen: Evidence) -> Finding:

@@ -78,14 +78,8 @@ def as_json(report: Report) -> str:
     """Report as JSON: the rows, and `ok` if none has failed."""
     rows = [
         {
-            "check": name,
-            "verdict": finding.verdict.value,
-            "said": finding.said,
-            "hint": finding.hint,
-            "values": {
-                key: value if math.isfinite(value) else None
-                for key, value in finding.values.items()
-            },
+            **{"check": name, **vars(finding), "verdict": finding.verdict.value},
+            "values": {n: v if math.isfinite(v) else None for n, v in finding.values.items()},
         }
         for name, finding in report.items()
     ]

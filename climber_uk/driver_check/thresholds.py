@@ -22,7 +22,7 @@ GAP = 4.0  # periods from which on messages, and their twist, are lost
 TELLING = 0.2  # of a block's largest displacement: smaller ones are mostly noise
 NO_TWIST = 5e-4  # of the pose's displacement: less than a speed in km/s would be
 UNIT_OFF = 0.2  # by which a wrong unit may be missed, of 57.3
-SAME_FRAME = 0.05  # of the way: too small a difference to tell body from wall
+SAME_FRAME = 0.05  # of the way: too small a difference between the frames of body and wall
 SLIP, MUCH_SLIP = 0.02, 0.1  # sideways, of the speed: noise; a wheel that slides or is misaligned
 
 # Reaction to torques

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from climber_uk.driver_check import evidence, thresholds
-from climber_uk.driver_check.evidence import Arrival, Command, motion_of
+from climber_uk.driver_check.evidence import Arrival, TorqueCommand, motion_of
 from climber_uk.driver_check.pulses import PUSHED_BY, Pulse, Silence, Stage
 from climber_uk.driver_check.response import expected_gain, respond
 from climber_uk.mechanics import SECOND, Array
@@ -28,12 +28,20 @@ class Bounds:
     """Limits of a trial: torque, travel, yaw, and the watchdog's time."""
 
     torque_share: float = parameter(
-        0.5, "", "of `max_wheel_torque` that a trial commands at most", above=0, at_most=1
+        0.5,
+        "",
+        "of `max_wheel_torque` that a trial commands at most; too low: it does not move",
+        above=0,
+        at_most=1,
     )
-    max_travel: float = parameter(0.15, "m", "distance at which a trial is stopped", above=0)
-    max_turn: float = parameter(0.6, "rad", "yaw angle at which a trial is stopped", above=0)
+    max_travel: float = parameter(
+        0.15, "m", "distance at which a trial is stopped; too short: it is not completed", above=0
+    )
+    max_turn: float = parameter(
+        0.6, "rad", "yaw angle at which a trial is stopped; too small: likewise", above=0
+    )
     watchdog_time: float = parameter(
-        0.5, "s", "from the last command to the end of its torque, at most", above=0
+        0.5, "s", "longest torque without a command; below the driver's: `watchdog` fails", above=0
     )
 
 
@@ -58,7 +66,7 @@ class Trial:
         self.late = round(max(LATE, LATE_PERIODS * period) * SECOND)
         ages = [a.wall - reading.nanoseconds(a.message.header.stamp) for a in heard]
         self.usual_age = float(np.median(ages))  # [ns]
-        self.commands: list[Command] = []
+        self.commands: list[TorqueCommand] = []
         self.pulses: list[evidence.PulseTimes] = []
         self.silence: tuple[int, int] | None = None
         self.trouble = ""
@@ -122,7 +130,7 @@ class Trial:
                 self.stage.finish()
             torques = self.stage_torques(self.stage, stamp, state)
         if torques is not None:
-            self.commands.append(Command(max(stamp, now), torques))
+            self.commands.append(TorqueCommand(max(stamp, now), torques))
         return torques
 
     def keep_within_bounds(self, state: State) -> None:

@@ -6,5 +6,5 @@ A bag -> arrays (`recorded_motion`, smoothed by `even_time`) and what it was dri
 `coefficients` as parameters with intervals (`estimation` calls these in turn) -> what the equations
 lack (`fit_test`) and what is not determined, and why (`verdict`) -> `identified.Identified` ->
 `report`, `figure`, a parameter file. `identify` is the command line; `excitation` plans a
-trajectory that tells more.
+trajectory that shows more.
 """

@@ -15,8 +15,8 @@ from climber_uk.identification.identified import (
     NAMES,
     NOTHING,
     OF_TURNING,
-    TURN,
     WAY,
+    YAW,
     Choice,
     Identified,
     Widths,
@@ -25,18 +25,21 @@ from climber_uk.identification.window_fit import WindowFit
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
-FIRST = {DRIVE: 0, TURN: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
+FIRST = {DRIVE: 0, YAW: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
 VISCOUS, LATE = 2, 3  # columns of (11) and (15)
 QUANTILE = 0.975  # of intervals of 95 %
-KNOWN = 0.1  # of a value, or of all that drives: the widest interval that is of use
-SURE = 2.0  # half widths of its interval, of a friction that is not left to chance
+KNOWN = 0.1  # uncertainty, relative to the value or the drive, above which a value is of no use
+SURE = 2.0  # half widths of its interval from zero, above which a friction is significant
 Columns = Mapping[str, tuple[int, ...]]
 
 
 def parameters(
     fits: Mapping[str, WindowFit], columns: Columns, climber: Climber, track: float | None = None
 ) -> tuple[Array, Widths, Choice]:
-    """Values, widths, and which were sought; `track` is that of the contacts, if it is known."""
+    """Values (8,), half widths, and which were sought, from the fits by kind of equation.
+
+    `track` is the half track of the contacts [m], if it is not to be taken from the wheel angles.
+    """
     r, d = climber.wheel_radius, climber.half_track
     coefficients = np.array([np.nan, 0, 0, np.nan, 0, 0, r, r / d])
     sought, chosen = np.zeros(len(NAMES), bool), {}
@@ -62,13 +65,14 @@ def parameters(
 
 
 def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identified:
-    """The same where wheels scrub, or may: they overstate the track; moments need the contacts'.
+    """The same, corrected where wheels scrub, or may: their angles show too wide a track.
 
-    That is the climber's; by how much it is off if it is the other one goes into the intervals.
+    Inertia and moments need the track of the contacts: that of `climber` is taken, and its
+    difference from the one that the angles show is added to their intervals.
     """
     number = NAMES.index("turning_friction")
     scrubs = found.values[number] > SURE * found.half_widths[number]
-    is_told = TURN in found.fits and found.uncertainty[number] <= KNOWN
+    is_told = YAW in found.fits and found.uncertainty[number] <= KNOWN
     if HEADING not in found.fits or (is_told and not scrubs):
         return found
     track, effective = climber.half_track, found["half_track"]
@@ -84,14 +88,14 @@ def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identif
 def _parameters(coefficients: Array, track: float | None) -> Array:
     """Parameters (8,) of coefficients (8,)."""
     a_1, a_2, a_3, b_1, b_2, b_3, r, per_track = coefficients
-    with np.errstate(all="ignore"):  # what nothing tells is not finite
+    with np.errstate(all="ignore"):  # what was not fitted is not finite
         d = r / per_track
         m, J = 1 / (r * a_1), (track or d) / (r * b_1)
         return np.array([m, a_2 * m, a_3 * m, J, b_2 * J, b_3 * J, r, d])
 
 
 def _slopes(coefficients: Array, track: float | None) -> Array:
-    """Of the parameters by the coefficients (8, 8); exact, by a complex step."""
+    """Derivatives of the parameters by the coefficients (8, 8); exact, by a complex step."""
     step = 1e-20
     moved = [_parameters(coefficients + 1j * step * unit, track) for unit in np.eye(len(NAMES))]
     slopes = np.stack(moved, axis=1).imag / step
@@ -99,10 +103,10 @@ def _slopes(coefficients: Array, track: float | None) -> Array:
 
 
 def _interval(squares: Array, most: Array) -> Array:
-    """Half widths (p,) of intervals, from squares (n, p) that sum up to variances.
+    """Half widths (p,) of 95 % intervals, from squares (n, p) that sum up to variances.
 
-    With as many degrees of freedom as they have if they are those of normal numbers, each with a
-    variance of its own: E x⁴ = 3 (E x²)²; `most` (p,) are possible.
+    By Student's t. Its degrees of freedom, at most `most` (p,), are those of normal numbers each
+    with a variance of its own, for which E x⁴ = 3 (E x²)².
     """
     variance = squares.sum(axis=0)
     ratio = variance**2 / np.maximum((squares**2).sum(axis=0), NOTHING)

@@ -1,8 +1,8 @@
 """Mass, inertia, friction and geometry of a climber from how it moved and what drove it.
 
 The coefficients of `integral_equations` are fitted (`window_fit`), each equation in windows of its
-own, and give the parameters (`coefficients`). What the data do not determine is not told, but why
-(`identification_verdict`).
+own, and give the parameters (`coefficients`). For those that the data do not determine there is a
+reason in place of a value (`verdict`).
 """
 
 from collections.abc import Mapping
@@ -17,8 +17,8 @@ from climber_uk.identification.identified import (
     DRIVE,
     HEADING,
     IN_TIME,
-    TURN,
     WAY,
+    YAW,
     Extent,
     Identified,
     Widths,
@@ -29,8 +29,8 @@ from climber_uk.identification.integral_equations import (
     Site,
     drive_equations,
     friction_load,
-    turn_equations,
     wheel_equations,
+    yaw_equations,
 )
 from climber_uk.identification.lateness import DELAYS, lateness
 from climber_uk.identification.recorded_motion import Indices, RecordedMotion
@@ -43,29 +43,30 @@ CUT, SITE, LEAST_WINDOWS = Cut(), Site(), 5
 SPREAD = 0.05  # of the speed: least difference of speeds that shows viscous friction
 REJECTIONS = 3  # times that windows are left out
 # [SI] of speed, way; yaw rate, heading; way; heading: noise to begin with, and a tenth of it is the
-# least that is believed of a sensor.
-NOISE = {DRIVE: (1e-2, 1e-3), TURN: (1e-2, 1e-3), WAY: (1e-3,), HEADING: (1e-3,)}
+# least that is assumed of a sensor.
+NOISE = {DRIVE: (1e-2, 1e-3), YAW: (1e-2, 1e-3), WAY: (1e-3,), HEADING: (1e-3,)}
 Windows = Mapping[str, list[Indices]]
 
 
 def identify(
     motion: RecordedMotion, climber: Climber, cut: Cut = CUT, site: Site = SITE
 ) -> Identified:
-    """Parameters of a climber that is believed to be `climber`; raises `ValueError`.
+    """Parameters of a climber, of which `climber` is assumed beforehand.
 
-    Believed are its geometry, without wheel angles, its suction, and the inclination.
+    Used of it are suction, inclination, and, without wheel angles, the geometry. Raises
+    `ValueError` if there are too few windows in motion.
     """
     task = Task(motion, climber, site, _windows(motion, cut))
     if (count := len(task.windows[DRIVE])) < LEAST_WINDOWS:
         raise ValueError(f"{count} windows of {cut.window} s in motion must be >= {LEAST_WINDOWS}")
     columns = _columns(task.extent)
-    first = {kind: (*columns[kind], LATE) for kind in task.kinds if kind in (DRIVE, TURN)}
+    first = {kind: (*columns[kind], LATE) for kind in task.kinds if kind in (DRIVE, YAW)}
     usual, fits = task.fitted(first)
     late = lateness(fits, lambda delay, lag: usual.acting(delay, lag).equations)
     if late != IN_TIME:  # and the coefficient by which that may still be wrong
         task, columns = task.acting(*late), {**columns, **first}
     kept, fits = task.fitted({kind: columns[kind] for kind in task.kinds})
-    left_out = sum(len(task.windows[kind]) - len(kept.windows[kind]) for kind in (DRIVE, TURN))
+    left_out = sum(len(task.windows[kind]) - len(kept.windows[kind]) for kind in (DRIVE, YAW))
     values = parameters(fits, columns, climber)
     found = Identified(*values, fits, task.extent, kept.windows, site, left_out, late)
     found = with_scrub(found, columns, climber)
@@ -76,7 +77,7 @@ def identify(
 def predicted(
     motion: RecordedMotion, climber: Climber, cut: Cut = CUT, site: Site = SITE
 ) -> Identified:
-    """What would be found of `climber` if it moved like this, with the noise to begin with."""
+    """What would be found of `climber` if it moved like this, with noise of `NOISE`."""
     task = Task(motion, climber, site, _windows(motion, cut))
     columns = _columns(task.extent)
     fits = {
@@ -91,7 +92,7 @@ def predicted(
 
 @dataclass(frozen=True)
 class Task:
-    """What to fit."""
+    """The equations that are fitted: a motion, cut into windows, of a climber on its site."""
 
     motion: RecordedMotion
     climber: Climber
@@ -100,72 +101,72 @@ class Task:
 
     @property
     def kinds(self) -> list[str]:
-        """Those with windows enough."""
-        turns = [TURN] if len(self.windows[TURN]) >= LEAST_WINDOWS else []
-        return [DRIVE, *turns, *([] if self.motion.wheel_angles is None else [WAY, HEADING])]
+        """Kinds of equations with enough windows."""
+        yawing = [YAW] if len(self.windows[YAW]) >= LEAST_WINDOWS else []
+        return [DRIVE, *yawing, *([] if self.motion.wheel_angles is None else [WAY, HEADING])]
 
     @property
     def equations(self) -> dict[str, list[Equations]]:
-        """By kind."""
+        """Equations of each window, by kind."""
         found = {DRIVE: drive_equations(self.motion, self.climber, self.site, self.windows[DRIVE])}
-        if TURN in self.kinds:
-            found[TURN] = turn_equations(self.motion, self.windows[TURN])
+        if YAW in self.kinds:
+            found[YAW] = yaw_equations(self.motion, self.windows[YAW])
         if WAY in self.kinds:
             found[WAY], found[HEADING] = wheel_equations(self.motion, self.windows[WAY])
         return found
 
     @property
     def extent(self) -> Extent:
-        """How far it was driven."""
+        """What drove the climber, and how it moved."""
         load = friction_load(self.motion, self.climber, self.site)
-        time, drive, _, way, _ = self._gone(DRIVE)
-        turn_time, _, turn, _, turned = self._gone(TURN)
-        speed, yaw_rate = way / time, turned / turn_time
-        each = drive / time, turn / turn_time, load, speed, yaw_rate
+        time, impulse, _, distance, _ = self._changes(DRIVE)
+        yaw_time, _, angular_impulse, _, angle = self._changes(YAW)
+        speed, yaw_rate = distance / time, angle / yaw_time
+        each = impulse / time, angular_impulse / yaw_time, load, speed, yaw_rate
         rms = [float(np.sqrt(np.mean(values**2))) if len(values) else 0.0 for values in each]
         spreads = [float(np.std(np.abs(rate))) if len(rate) else 0.0 for rate in (speed, yaw_rate)]
         return Extent(*rms, *spreads)
 
     def noise(self, kind: str) -> Array:
-        """To begin with, of what is measured (q,)."""
+        """Standard deviations (q,) that are assumed at first of what is measured."""
         return np.array(NOISE[kind][-1:] if self.motion.rates is None else NOISE[kind])
 
     def acting(self, delay: float, lag: float) -> "Task":
-        """The same, if torques act later."""
+        """The same, if torques act `delay` [s] later and with a `lag` of first order [s]."""
         return replace(self, motion=self.motion.acting(delay, lag))
 
     def fitted(self, columns: Columns) -> tuple["Task", dict[str, WindowFit]]:
-        """Fits of some kinds, and what is left of the windows: see `Misfit.strange`."""
+        """The task with the windows that were kept (see `Misfit.strange`), and fits by kind."""
         equations, windows, fits = self.equations, dict(self.windows), {}
         for kind, own in columns.items():
             fits[kind], kept = _fitted(equations[kind], own, self.noise(kind))
             windows[kind] = [self.windows[kind][number] for number in kept]
         return replace(self, windows=windows), fits
 
-    def _gone(self, kind: str) -> Array:
-        """Time, impulses of drive and turn, way and turn (5, n) in each window."""
+    def _changes(self, kind: str) -> Array:
+        """Time [s], impulse [N s], angular impulse [N m s], way [m], angle [rad] (5, n windows)."""
         motion = self.motion
         impulses: Any = self.climber.force_and_moment(motion.impulse)
-        gone = np.stack([motion.time, *impulses, motion.way, motion.pose[:, 2]])
+        all_of_it = np.stack([motion.time, *impulses, motion.way, motion.pose[:, 2]])
         ends = np.array([window[[0, -1]] for window in self.windows[kind]], np.intp).reshape(-1, 2)
-        passed: Array = gone[:, ends[:, 1]] - gone[:, ends[:, 0]]
-        return passed
+        changes: Array = all_of_it[:, ends[:, 1]] - all_of_it[:, ends[:, 0]]
+        return changes
 
 
 def _windows(motion: RecordedMotion, cut: Cut) -> Windows:
-    """By kind; wherever torques are known, even if they act later than assumed."""
+    """Windows by kind, where torques are known even if they act later than assumed."""
     known = motion.time >= motion.time[0] + DELAYS[-1]
     inner = replace(motion, stretch=np.where(known, motion.stretch, -1))
-    driving, turning = cut.windows(inner), cut.turning(inner)
-    return {DRIVE: driving, TURN: turning, WAY: driving, HEADING: driving}
+    driving, yawing = cut.windows(inner), cut.yaw_windows(inner)
+    return {DRIVE: driving, YAW: yawing, WAY: driving, HEADING: driving}
 
 
 def _columns(extent: Extent) -> dict[str, tuple[int, ...]]:
-    """Those of the coefficients that are sought."""
-    # noise would look like a difference of speeds, and tell that it makes none in friction
+    """Columns of the coefficients that are fitted, by kind of equation."""
+    # else noise would pass for a difference of speeds, which makes none in friction
     spreads = {
         DRIVE: extent.speed_spread >= SPREAD * extent.speed,
-        TURN: extent.yaw_rate_spread >= SPREAD * extent.yaw_rate,
+        YAW: extent.yaw_rate_spread >= SPREAD * extent.yaw_rate,
     }
     both = {kind: (0, 1, VISCOUS) if differs else (0, 1) for kind, differs in spreads.items()}
     return {**both, WAY: (0,), HEADING: (0,)}
@@ -174,7 +175,7 @@ def _columns(extent: Extent) -> dict[str, tuple[int, ...]]:
 def _fitted(
     equations: list[Equations], columns: tuple[int, ...], noise: Array
 ) -> tuple[WindowFit, list[int]]:
-    """Fit to the windows, and numbers of those that were kept."""
+    """Fit to the windows, without those that fit much worse, and indices of those kept."""
     kept, fit = list(range(len(equations))), WindowFit.of(equations, columns, noise)
     least = max(LEAST_WINDOWS, int((1 - FEW) * len(equations)))
     for _ in range(REJECTIONS):

@@ -1,4 +1,4 @@
-"""Filters of what was sampled at (nearly) even times, with gaps: rates, and lags of first order."""
+"""Filters of samples at nearly even times, with gaps: derivatives, and lags of first order."""
 
 from collections.abc import Callable
 
@@ -13,14 +13,14 @@ LEAST_LAG = 1e-5  # [s]
 
 
 def gaps(time: Array) -> NDArray[np.bool_]:
-    """Whether too much is missing between a time (n - 1,) and the next."""
+    """Whether there is a gap between each time and the next (n - 1,)."""
     steps = np.diff(time)
     missing: NDArray[np.bool_] = steps > max(GAP, MISSING * float(np.median(steps)))
     return missing
 
 
 def rate(time: Array, gone: Array, smoothing: float) -> Array:
-    """Rate (n,) of what has `gone` (n,), by cubics over `smoothing` [s] to either side."""
+    """Derivative (n,) of `gone` (n,), by cubics over `smoothing` [s] to either side."""
 
     def slope(values: Array, step: float) -> Array:
         half = min(max(2, round(smoothing / step)), (len(values) - 1) // 2)
@@ -33,7 +33,7 @@ def rate(time: Array, gone: Array, smoothing: float) -> Array:
 
 
 def lagging(time: Array, values: Array, lag: float) -> Array:
-    """What follows `values` (n,) with a lag of first order [s]; exact if they are lines between."""
+    """`values` (n,) after a lag of first order [s]; exact if they are piecewise linear."""
     if lag < LEAST_LAG:
         return values
 
@@ -47,7 +47,7 @@ def lagging(time: Array, values: Array, lag: float) -> Array:
 
 
 def _evenly(time: Array, values: Array, function: Callable[[Array, float], Array]) -> Array:
-    """What a function of values and step [s] makes of `values` (n,), between gaps in time."""
+    """Apply a function of even values and their step [s] to `values` (n,), from gap to gap."""
     made = np.zeros_like(values)
     for part in np.split(np.arange(len(values)), np.flatnonzero(gaps(time)) + 1):
         own = time[part]

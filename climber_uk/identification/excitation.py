@@ -1,4 +1,4 @@
-"""A trajectory that shows a climber's mass, inertia and friction as well as limits allow.
+"""A trajectory that excites a climber's mass, inertia and friction as well as limits allow.
 
 Of each candidate the torques follow from the model, and from the `integral_equations` the widths of
 the intervals that odometry with 1 mm, 1 mrad and 10 mm/s of noise would leave; the best is the one
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from climber_uk.identification.estimation import CUT, LEAST_WINDOWS, SITE, predicted
-from climber_uk.identification.identified import DRIVE, NAMES, TURN, Identified
+from climber_uk.identification.identified import DRIVE, NAMES, YAW, Identified
 from climber_uk.identification.integral_equations import Site
 from climber_uk.identification.recorded_motion import RecordedMotion
 from climber_uk.mechanics import Array, unpack
@@ -25,44 +25,53 @@ from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.parameters.declaration import parameter, parameters
 
 PERIOD = 0.02  # [s]
-AMPLE = 1.6  # times as many windows as there must be
+AMPLE = 1.6  # times the least number of windows
 RAMPS = (0.5, 1.0, 2.0, 4.0)  # [s]
-SHOWN = ~np.isin(NAMES, ("wheel_radius", "half_track"))  # need wheel angles, and no plan
+SHOWN = ~np.isin(NAMES, ("wheel_radius", "half_track"))  # which any motion shows, by wheel angles
 SOUGHT = np.isin(NAMES, ("mass", "seal_friction_coefficient", "yaw_inertia"))
 
 
 @parameters
 class ExcitationLimits:
-    """What the trajectory may take."""
+    """Limits of the trajectory."""
 
-    size: float = parameter(2.0, "m", "side of the square that it stays in", above=0)
-    speed: float = parameter(0.3, "m/s", "highest speed", above=0)
-    torque: float = parameter(4.0, "N m", "highest torque of a wheel", above=0)
-    duration: float = parameter(60.0, "s", "longest time", above=0, at_most=3600)
+    size: float = parameter(
+        2.0, "m", "side of the square that it stays in: too large, and the wall may end", above=0
+    )
+    speed: float = parameter(
+        0.3, "m/s", "highest speed: too low, and friction shows less, too high, slip more", above=0
+    )
+    torque: float = parameter(
+        4.0, "N m", "highest torque of a wheel: motors that give less do not follow", above=0
+    )
+    duration: float = parameter(
+        60.0, "s", "longest time: too short, and intervals are wide", above=0, at_most=3600
+    )
 
 
 @dataclass(frozen=True)
 class ExcitationPlan:
-    """A trajectory, and what it would tell."""
+    """A trajectory, and what would be identified from it."""
 
     name: str  # of the shape
     trajectory: Trajectory
-    tells: Identified
+    expected: Identified
 
     @property
     def is_short(self) -> bool:
-        """Whether it has hardly windows enough, should a few be lost to noise."""
-        return min(len(self.tells.windows[kind]) for kind in (DRIVE, TURN)) < AMPLE * LEAST_WINDOWS
+        """Whether it has too few windows, should some be lost to noise."""
+        counts = [len(self.expected.windows[kind]) for kind in (DRIVE, YAW)]
+        return min(counts) < AMPLE * LEAST_WINDOWS
 
     @property
     def worst(self) -> float:
-        """Of the uncertainties; without end if it does not show all there may be."""
-        shown = np.where(self.tells.sought, self.tells.uncertainty, np.inf)
+        """Largest uncertainty; infinite if a parameter is not shown at all."""
+        shown = np.where(self.expected.sought, self.expected.uncertainty, np.inf)
         return float(shown[SHOWN].max())
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Those of `trajectory_publisher`."""
+        """Parameters of `trajectory_publisher`, by name."""
         shape, law = asdict(self.trajectory.shape), asdict(self.trajectory.law)  # type: ignore[call-overload]
         values = {f"{self.name}.{name}": value for name, value in shape.items()}
         values |= {f"rest_to_rest.{name}": value for name, value in law.items()}
@@ -122,8 +131,8 @@ def driven(trajectory: Trajectory, climber: Climber) -> tuple[RecordedMotion, Ar
     reference = trajectory.at(time)
     heading, speed = np.unwrap(reference.heading), reference.speed
     resisted = climber.seal_friction * sign(speed) + climber.weight_along_wall * sin(heading)
-    turn = climber.yaw_inertia * unpack(reference.acceleration)[2]
-    torques = climber.wheel_torques(climber.mass * reference.forward_acceleration + resisted, turn)
+    force = climber.mass * reference.forward_acceleration + resisted
+    torques = climber.wheel_torques(force, climber.yaw_inertia * unpack(reference.acceleration)[2])
     motion = RecordedMotion(
         time=time,
         pose=np.column_stack([reference.pose[:, :2], heading]),

@@ -1,35 +1,32 @@
-"""What was identified, in a picture: what drove each window, what models ask for, what is left."""
+"""Figure of an identification: force and moment in each window, those of models, residuals."""
 
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
 import numpy as np
-from matplotlib import pyplot as plt
 
-from climber_uk.identification.identified import DRIVE, NAMES, TURN, Identified
+from climber_uk.identification.identified import DRIVE, NAMES, YAW, Identified
 from climber_uk.identification.integral_equations import Site, friction_load, gravity_ahead
 from climber_uk.identification.recorded_motion import Indices, RecordedMotion
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
+from climber_uk.report.plotting import plt, saved
 
 
-def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Path) -> Path:
+def draw(motion: RecordedMotion, assumed: Climber, found: Identified, path: Path) -> Path:
     """Write the figure as PNG; return its path."""
     figure, axes = plt.subplots(2, 2, figsize=(10, 6), sharex=True, layout="constrained")
     time = motion.time - motion.time[0]
-    now = np.array([getattr(believed, name, 0.0) for name in NAMES])
+    now = np.array([getattr(assumed, name, 0.0) for name in NAMES])
     values = np.where(np.isfinite(found.values), found.values, now)
-    columns = (DRIVE, "drive [N]", "way [mm]"), (TURN, "moment [N m]", "heading [mrad]")
+    columns = (DRIVE, "drive [N]", "way [mm]"), (YAW, "moment [N m]", "heading [mrad]")
     for column, (kind, driven, measured) in enumerate(columns):
         windows, (above, below) = found.windows[kind], axes[:, column]
         middles = [time[window].mean() for window in windows]
-        for wanted, style, label in ((now, "0.6", "nodes now"), (values, "tab:blue", "identified")):
-            asked = [asked_of(motion, believed, found.site, wanted, window) for window in windows]
-            above.plot(middles, [each[column] for each in asked], color=style, label=label)
-        gave = [given_in(motion, values, window) for window in windows]
-        above.plot(middles, [each[column] for each in gave], "k.", label="motors")
+        for model, style, label in ((now, "0.6", "nodes now"), (values, "tab:blue", "identified")):
+            wrenches = [model_wrench(motion, assumed, found.site, model, w) for w in windows]
+            above.plot(middles, [wrench[column] for wrench in wrenches], color=style, label=label)
+        wrenches = [motors_wrench(motion, values, w) for w in windows]
+        above.plot(middles, [wrench[column] for wrench in wrenches], "k.", label="motors")
         above.set(ylabel=driven)
         if kind in found.fits:
             fit = found.fits[kind]
@@ -41,32 +38,29 @@ def draw(motion: RecordedMotion, believed: Climber, found: Identified, path: Pat
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     for axis in axes.flat:
         axis.grid(alpha=0.3)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120, format="png")
-    plt.close(figure)
-    return path
+    return saved(figure, path, 120)
 
 
-def given_in(motion: RecordedMotion, values: Array, window: Indices) -> Array:
-    """Drive [N] and moment [N m] (2,) of the motors in a window."""
+def motors_wrench(motion: RecordedMotion, values: Array, window: Indices) -> Array:
+    """Force [N] and moment [N m] (2,) of the motors, weighted means over a window."""
     radius, half_track = values[-2:]
     torques = weak_mean(motion.time[window], motion.impulse[window], order=1) / radius
     return np.array([torques.sum(), half_track * (torques[0] - torques[1])])
 
 
-def asked_of(
+def model_wrench(
     motion: RecordedMotion, climber: Climber, site: Site, values: Array, window: Indices
 ) -> Array:
-    """Drive [N] and moment [N m] (2,) that parameters (8,) ask for in a window."""
-    mass, coefficient, viscous, inertia, turning, resistance, _, _ = values
+    """Force [N] and moment [N m] (2,) that the motion in a window takes with parameters (8,)."""
+    mass, coefficient, viscous, inertia, coulomb, resistance, _, _ = values
     time, heading = motion.time[window], motion.pose[window, 2]
     gone = np.column_stack([motion.way[window], heading])
     gone = gone - gone.mean(axis=0)
-    (speed, yaw_rate), (faster, turning_faster) = (weak_mean(time, gone, order) for order in (1, 2))
+    (speed, yaw_rate), (speed_1, yaw_rate_1) = (weak_mean(time, gone, order) for order in (1, 2))
     pulled = weak_mean(time, gravity_ahead(motion, climber, site)[window], 0)
     load = weak_mean(time, friction_load(motion, climber, site)[window], 0)
-    drive = mass * (faster - pulled) + coefficient * load * np.sign(speed) + viscous * speed
-    moment = inertia * turning_faster + turning * np.sign(yaw_rate) + resistance * yaw_rate
+    drive = mass * (speed_1 - pulled) + coefficient * load * np.sign(speed) + viscous * speed
+    moment = inertia * yaw_rate_1 + coulomb * np.sign(yaw_rate) + resistance * yaw_rate
     return np.array([drive, moment])
 
 

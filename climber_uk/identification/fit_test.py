@@ -1,7 +1,7 @@
-"""The test of fit: what the equations lack, how much of it there is, and what it goes with.
+"""The test of fit: what the equations do not explain, how much it is, and what it goes with.
 
-`Misfit` is the test. What is beyond noise is compared, window by window, with what may explain it;
-of that, what the equations could have explained themselves is left out.
+`Misfit` is the test. What is beyond noise is correlated, window by window, with quantities that may
+explain it, after what the equations can explain themselves has been projected out of both.
 """
 
 from collections.abc import Iterator
@@ -12,9 +12,9 @@ from climber_uk.identification.identified import (
     DRIVE,
     HEADING,
     NOTHING,
-    TURN,
     WAY,
     WEIGHT,
+    YAW,
     Identified,
     Lack,
 )
@@ -23,15 +23,15 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
 ROUNDING = 1e-9
-LEAST_SHARE = 0.3  # of the misfits' squares, for something to explain it
+LEAST_SHARE = 0.3  # of the misfits' squares, below which a quantity does not explain them
 
 
 def lacks(found: Identified, motion: RecordedMotion, climber: Climber) -> Iterator[Lack]:
-    """Test of each kind of equations."""
+    """Test each kind of equations; masses that were not found are those of `climber`."""
     extent = found.extent
     scales = {
-        DRIVE: (_or(found["mass"], climber.mass), extent.drive),
-        TURN: (_or(found["yaw_inertia"], climber.yaw_inertia), extent.turn),
+        DRIVE: (_positive(found["mass"], climber.mass), extent.force),
+        YAW: (_positive(found["yaw_inertia"], climber.yaw_inertia), extent.moment),
         WAY: (1.0, extent.speed),
         HEADING: (1.0, extent.yaw_rate),
     }
@@ -43,12 +43,12 @@ def lacks(found: Identified, motion: RecordedMotion, climber: Climber) -> Iterat
         yield Lack(kind, fit.misfit.ratio, size, share, goes_with)
 
 
-def _or(value: float, otherwise: float) -> float:
+def _positive(value: float, otherwise: float) -> float:
     return value if np.isfinite(value) and value > 0 else otherwise
 
 
 def _explained(found: Identified, kind: str, motion: RecordedMotion) -> str:
-    """What explains most of the misfits, '' if nothing does."""
+    """Name of the quantity that explains most of the misfits; '' if none does."""
     windows = found.windows[kind]
     x, y, heading = motion.pose.T
     speed, yaw_rate = motion.smooth_rates.T
@@ -72,7 +72,7 @@ def _explained(found: Identified, kind: str, motion: RecordedMotion) -> str:
 
 
 def _explained_share(values: Array, other: Array, known: Array) -> float:
-    """Of the squares of values (n,), that others (n,) explain beyond what is known (n, k)."""
+    """Share of the squares of `values` (n,) that `other` (n,) explains beyond `known` (n, k)."""
     both = np.column_stack([values, other])
     values, left = (both - known @ np.linalg.lstsq(known, both, rcond=None)[0]).T
     if left @ left <= ROUNDING * (other @ other):

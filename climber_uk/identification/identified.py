@@ -1,4 +1,4 @@
-"""What an identification found: parameters with intervals, and of what is not told, why."""
+"""Result of an identification: parameters with intervals, and why others are not determined."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,15 +25,15 @@ UNITS = {
 }
 NAMES = tuple(UNITS)
 OF_TURNING = ("yaw_inertia", "turning_friction", "turning_resistance")
-DRIVE, TURN, WAY, HEADING = "drive", "turn", "way", "heading"  # kinds of equations
+DRIVE, YAW, WAY, HEADING = "drive", "yaw", "way", "heading"  # kinds of equations
 IN_TIME = (0.0, 0.0)
 NOTHING = 1e-100
-WORTH_A_WORD = 0.01  # of all that drives: least that is said not to fit
-SLIGHT = 5e-4  # the same of a weight that is not as assumed: it shows less than it is wrong
-WEIGHT = ("the weight's part across the heading", "the height")  # what pulls is not as assumed
+WORTH_A_WORD = 0.01  # share of all drive: a model error below it is not reported
+SLIGHT = 5e-4  # likewise, of a weight that is not as assumed: it shows less than it is wrong
+WEIGHT = ("the weight's part across the heading", "the height")  # explain a weight not as assumed
 WORDS = {
     DRIVE: ("the drive", "N"),
-    TURN: ("the moment", "N m"),
+    YAW: ("the moment", "N m"),
     WAY: ("the wheels' way", "m/s"),
     HEADING: ("the wheels' turn", "rad/s"),
 }
@@ -48,10 +48,10 @@ HINTS = {
 
 
 class Extent(NamedTuple):
-    """What drove a climber and how it moved, root mean squares of the windows' means."""
+    """What drove a climber and how it moved: root mean squares of the windows' means."""
 
-    drive: float  # [N]
-    turn: float  # [N m]
+    force: float  # [N] of the motors along the climber
+    moment: float  # [N m] of the motors about the vertical
     load: float  # [N] of the seal; 1 N without one
     speed: float  # [m/s]
     yaw_rate: float  # [rad/s]
@@ -60,7 +60,7 @@ class Extent(NamedTuple):
 
 
 class Widths(NamedTuple):
-    """How far each parameter (8,) may be off, by cause; half widths of intervals of 95 %."""
+    """By how much each parameter (8,) may be wrong, by cause: half widths of 95 % intervals."""
 
     spread: Array  # what differs from window to window
     white: Array  # noise alone
@@ -68,38 +68,37 @@ class Widths(NamedTuple):
 
     @property
     def whole(self) -> Array:
-        """All of it (8,)."""
+        """Half widths of the whole intervals (8,)."""
         return np.maximum(self.spread, self.white) + self.bias
 
 
 class Reason(NamedTuple):
-    """Why a parameter is not told."""
+    """Why a parameter is not determined."""
 
-    cause: str  # not excited, collinear, noise, misfit, torques; or absent: nothing to be done
+    cause: str  # not excited, collinear, noise, misfit, torques; or absent: not an error
     words: str
 
 
 class Lack(NamedTuple):
-    """What the equations of one kind lack, root mean squares of all windows."""
+    """What the equations of one kind do not explain: root mean squares of all windows."""
 
     kind: str
     ratio: float  # χ² by the number of windows: about 1 for a model that fits
     size: float  # beyond noise [N], [N m], [m/s] or [rad/s]; 0 where the test does not fail
-    share: float  # of all that drives, or moves
-    goes_with: str  # '' where nothing explains it
+    share: float  # of the drive (force, moment, speed or yaw rate) as a whole
+    goes_with: str  # what it is correlated with; '' for nothing
 
     @property
     def fits(self) -> bool:
-        """Whether it is nothing, or not worth a word."""
+        """Whether it is too little to be reported."""
         return self.share <= (SLIGHT if self.goes_with in WEIGHT else WORTH_A_WORD)
 
     @property
     def words(self) -> str:
-        """In a sentence; `fits` or not."""
+        """A sentence on it, whether it `fits` or not."""
         what, unit = WORDS[self.kind]
         lacking = f"{self.size:.2g} {unit} of {what}, {self.share:.2g} of it, are not explained"
-        hint = HINTS.get(self.goes_with, "")
-        hint = hint and f" ({hint})"
+        hint = f" ({HINTS[self.goes_with]})" if self.goes_with in HINTS else ""
         return lacking + (f", and go with {self.goes_with}{hint}" if self.goes_with else "")
 
 
@@ -107,10 +106,10 @@ class Lack(NamedTuple):
 class Identified:
     """Parameters in the order of `NAMES`, and what they were found from."""
 
-    values: Array  # (8,) those that were not sought are the climber's, or zero; nan: nothing tells
+    values: Array  # (8,) if not sought: the climber's, or zero; nan: undetermined
     widths: Widths
-    sought: Choice  # (8,)
-    fits: Mapping[str, WindowFit]  # by kind of equation, of those with windows enough
+    sought: Choice  # (8,) which were fitted
+    fits: Mapping[str, WindowFit]  # by kind of equation, of those with enough windows
     extent: Extent
     windows: Mapping[str, list[Indices]]  # the times in each, by kind
     site: Site
@@ -118,34 +117,34 @@ class Identified:
     late: tuple[float, float] = IN_TIME  # [s] delay and lag of the torques beyond what is assumed
     has_effective_track: bool = False  # of wheels that scrub, or may
     lacks: Sequence[Lack] = ()  # the test of fit, by kind of equation
-    reasons: Mapping[str, Reason] = field(default_factory=dict)  # by name, of what is not told
+    reasons: Mapping[str, Reason] = field(default_factory=dict)  # by name, of undetermined ones
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[NAMES.index(name)])
 
     @property
     def half_widths(self) -> Array:
-        """Of the intervals (8,)."""
+        """Half widths of the 95 % intervals (8,)."""
         return self.widths.whole
 
     @property
     def known(self) -> Choice:
-        """Which are told (8,)."""
+        """Which parameters are determined (8,)."""
         return np.array([name not in self.reasons for name in NAMES])
 
     @property
     def friction(self) -> float:
-        """Coulomb's and viscous, at the motion's speed [N]."""
+        """Coulomb and viscous friction together, at the motion's speed [N]."""
         coulomb = self["seal_friction_coefficient"] * self.extent.load
         return coulomb + self["viscous_friction"] * self.extent.speed
 
     @property
     def turning_moment(self) -> float:
-        """The same of what resists turning, at the motion's yaw rate [N m]."""
+        """Moment that resists turning, Coulomb and viscous, at the motion's yaw rate [N m]."""
         return self["turning_friction"] + self["turning_resistance"] * self.extent.yaw_rate
 
     def half_width(self, name: str) -> float:
-        """Of a parameter's interval."""
+        """Half width of a parameter's 95 % interval."""
         return float(self.half_widths[NAMES.index(name)])
 
     def is_clear(self, name: str) -> bool:
@@ -154,8 +153,8 @@ class Identified:
 
     @property
     def uncertainty(self) -> Array:
-        """Half widths as shares of the value, or of all drive or turn if that is more (8,)."""
-        drive, turn, load, speed, yaw_rate, *_ = np.maximum(self.extent, NOTHING)
-        whole = np.array([0, drive / load, drive / speed, 0, turn, turn / yaw_rate, 0, 0])
+        """Half widths (8,) relative to the value; for frictions, to the drive if that is more."""
+        force, moment, load, speed, yaw_rate, *_ = np.maximum(self.extent, NOTHING)
+        whole = np.array([0, force / load, force / speed, 0, moment, moment / yaw_rate, 0, 0])
         values = np.nan_to_num(np.abs(self.values))
         return self.half_widths / np.maximum(values, np.maximum(whole, NOTHING))

@@ -1,7 +1,7 @@
 """`identify BAG`: mass, inertia, friction and geometry of the climber that a bag was recorded of.
 
 `identify --plan FILE` writes a parameter file with a trajectory that shows them well. The status is
-1 if something cannot be told, or went wrong.
+1 if a parameter is not determined, or something went wrong.
 """
 
 import argparse
@@ -19,19 +19,8 @@ from climber_uk.identification.estimation import identify
 from climber_uk.identification.identified import NAMES
 from climber_uk.identification.integral_equations import Cut
 from climber_uk.identification.recorded_motion import TOPICS, read_motion
-from climber_uk.identification.recorded_site import (
-    assumed_away,
-    differences,
-    site_of,
-)
-from climber_uk.identification.report import (
-    changes,
-    label_of,
-    missing,
-    remarks,
-    rows,
-    table,
-)
+from climber_uk.identification.recorded_site import assumed_away, differences, site_of
+from climber_uk.identification.report import changes, label_of, missing, remarks, rows, table
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
@@ -42,37 +31,37 @@ from climber_uk.system.command_line import Parser, between
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
-def tell(options: argparse.Namespace) -> None:
-    """Print and write what a bag tells; raises `ValueError` of what it does not."""
+def identify_bag(options: argparse.Namespace) -> None:
+    """Print and write the parameters; raises `ValueError` if one is not determined."""
     cut = Values(vars(options)).read(Cut)
     file, plant = parameters_of(CONTROLLER, options), plant_of(options)
     names = Topics({ODOMETRY: options.odometry})
     reader, climber = RunReader.read(options.bag, names, options.namespace.strip("/"), TOPICS)
     recorded = climber.first_parameters
     parameters = {**recorded, **file}
-    believed, site = Values(parameters).read(Climber), site_of(parameters, plant)
+    assumed, site = Values(parameters).read(Climber), site_of(parameters, plant)
     reader.check_one_run(climber)
-    told = {**file, **recorded}
-    delay = told.get("transport_delay", 0.0) if options.delay is None else options.delay
-    motion, unfit = read_motion(reader, climber, told, believed.suction_pressure, delay)
+    then = {**file, **recorded}
+    delay = then.get("transport_delay", 0.0) if options.delay is None else options.delay
+    motion, unfit = read_motion(reader, climber, then, assumed.suction_pressure, delay)
     for loss in reader.bag.losses:
         print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
-    found = identify(motion, believed, cut, site)
-    print(table(found, believed), end="")
+    found = identify(motion, assumed, cut, site)
+    print(table(found, assumed), end="")
     print(*remarks(found), sep="\n")
     for warning in (*differences(file, recorded, site), *assumed_away(parameters, plant)):
         print(warning)
     if unfit:
         print(f"{unfit} unfit messages were left out")
     if options.json:
-        text = json.dumps(list(rows(found, believed)), indent=2)
+        text = json.dumps(list(rows(found, assumed)), indent=2)
         options.json.write_text(text + "\n", encoding="utf-8")
     if options.figure:
-        identification_figure.draw(motion, believed, found, options.figure)
+        identification_figure.draw(motion, assumed, found, options.figure)
     if options.output:
-        write_changed(options.params, changes(found, believed), options.output)
-    if said := list(missing(found)):
-        raise ValueError("\n".join(said))
+        write_changed(options.params, changes(found, assumed), options.output)
+    if sentences := list(missing(found)):
+        raise ValueError("\n".join(sentences))
 
 
 def plan(options: argparse.Namespace) -> None:
@@ -80,11 +69,11 @@ def plan(options: argparse.Namespace) -> None:
     parameters = parameters_of(PLANNER, options)
     origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
     controller = parameters_of(CONTROLLER, options)
-    site, believed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
+    site, assumed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
     if not site.has_seal:
-        believed = replace(believed, seal_friction_coefficient=0.0)
+        assumed = replace(assumed, seal_friction_coefficient=0.0)
     limits = Values(vars(options)).read(excitation.ExcitationLimits)
-    best = excitation.plan(believed, limits, origin, site)
+    best = excitation.plan(assumed, limits, origin, site)
     x, y, heading = best.trajectory.at(0.0).pose.tolist()
     changed = {
         PLANNER: best.parameters,
@@ -95,19 +84,21 @@ def plan(options: argparse.Namespace) -> None:
     print(
         f"{best.name}, {best.trajectory.duration:.1f} s, from ({x:.3f}, {y:.3f}) {heading:.3f} rad"
     )
-    for name, share, sought in zip(NAMES, best.tells.uncertainty, excitation.SOUGHT, strict=True):
+    for name, share, sought in zip(
+        NAMES, best.expected.uncertainty, excitation.SOUGHT, strict=True
+    ):
         if sought:
             print(f"{label_of(name, site)[0]} ± {share:.2%}")
 
 
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
-    """Those of a node in the parameter file; none without one."""
+    """Parameters of a node in the parameter file, by name; empty without a file."""
     name = Topics().full(node, options.namespace.strip("/"))
     return read_file(options.params, name) if options.params else {}
 
 
 def plant_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Parameters of the simulator in the parameter file; none if that has none for it."""
+    """Parameters of the simulator in the parameter file, by name; empty if it has none."""
     try:
         return parameters_of(PLANT, options)
     except ValueError:
@@ -115,14 +106,14 @@ def plant_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Tell, or plan."""
+    """Identify, or plan."""
     parser = Parser("identify", __doc__)
     parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
     parser.add_argument("--namespace", default="", help="of the climber (default: none)")
     parser.add_argument("--odometry", default=ODOMETRY, help=f"topic (default: {ODOMETRY})")
     parser.add_argument(
-        "--delay", type=between(0.0, 10.0), help="[s] of torques, unless joint_states tells them"
+        "--delay", type=between(0.0, 10.0), help="[s] of torques, unless joint_states has them"
     )
     parser.add_argument("--output", "-o", type=Path, help="write a parameter file for the nodes")
     parser.add_argument("--json", type=Path, help="write the table as JSON")
@@ -133,8 +124,8 @@ def main() -> None:
     for kind, of in (Cut, "of a bag"), (excitation.ExcitationLimits, "of a plan"):
         for field in fields(kind):
             rule, name = field.metadata, "--" + field.name.replace("_", "-")
-            said = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
-            parser.add_argument(name, type=float, default=field.default, help=said)
+            meaning = f"{of}: {rule['description']} [{rule['unit']}] (default: {field.default:g})"
+            parser.add_argument(name, type=float, default=field.default, help=meaning)
     options = parser.arguments()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
@@ -145,6 +136,6 @@ def main() -> None:
         if options.plan:
             plan(options)
         else:
-            tell(options)
+            identify_bag(options)
     except (ValueError, OSError) as error:
         sys.exit(f"identify: {error}")

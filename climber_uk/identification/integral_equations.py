@@ -4,7 +4,7 @@
     ω                    = ω₀ + b₁ ∫ (τR - τL) dt - b₂ ∫ sgn ω dt - b₃ ∫ ω dt             (15)
 
 and integrated once more, for the way and the heading; where wheel angles are known, way and heading
-as these tell them. g·e is gravity along the heading, u a side slip (0 of wheels that hold), and σ
+by these. g·e is gravity along the heading, u a side slip (0 of wheels that hold), and σ
 the direction in which the seal slides. Nothing is differentiated, and what is integrated are
 torques, which are known: only the noise of heading and way gets into the regressors, where it
 hardly counts. v₀, ω₀ and the like are different in each window, and projected out.
@@ -26,10 +26,10 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 
 class Equations(NamedTuple):
-    """Of one window: target = start · unknowns + design · coefficients + noise.
+    """Equations of one window: target = start · unknowns + design · coefficients + noise.
 
-    Rows are the times of what is measured first, then those of what is measured second. `lacking`
-    is what an acceleration (a speed, of wheels) that the equations lack would add: a constant one
+    Rows are the times of the first measured quantity, then those of the second. `lacking` is what
+    an acceleration that is missing in the equations would add (of wheels: a speed): a constant one
     of 1, and one that goes from -√3 to √3 in the window.
     """
 
@@ -37,7 +37,7 @@ class Equations(NamedTuple):
     design: Array  # (rows, coefficients)
     target: Array  # (rows,)
     lacking: Array  # (rows, 2)
-    measured: int  # how many quantities
+    measured: int  # number of measured quantities
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,21 @@ class Site:
 class Cut:
     """How a motion is cut into windows, in which its direction does not change."""
 
-    window: float = parameter(1.0, "s", "length of a window", above=0)
-    least_speed: float = parameter(0.02, "m/s", "below which it may as well rest", above=0)
+    window: float = parameter(
+        1.0, "s", "length of a window: longer ones are less noisy, but fewer", above=0
+    )
+    least_speed: float = parameter(
+        0.02, "m/s", "speed that counts as motion: too low, and rest spoils the friction", above=0
+    )
     least_yaw_rate: float = parameter(
-        0.05, "rad/s", "below which it may as well not turn: friction there is any", above=0
+        0.05, "rad/s", "yaw rate that counts as turning: likewise", above=0
     )
 
     def windows(self, motion: RecordedMotion) -> list[Indices]:
         """Indices of the times in each window in which it drives one way."""
         return self._cut(motion, motion.speed, self.least_speed)
 
-    def turning(self, motion: RecordedMotion) -> list[Indices]:
+    def yaw_windows(self, motion: RecordedMotion) -> list[Indices]:
         """Indices of the times in each window in which it turns one way."""
         return self._cut(motion, motion.smooth_rates[:, 1], self.least_yaw_rate)
 
@@ -73,11 +77,11 @@ class Cut:
         windows: list[Indices] = []
         for run in np.split(np.arange(len(motion.time)), np.flatnonzero(breaks) + 1):
             time = motion.time[run]
-            # it may rest, and not rub, as long before and after as rates are smoothed
-            sure = run[(time >= time[0] + SMOOTHING) & (time <= time[-1] - SMOOTHING)]
-            duration = np.ptp(motion.time[sure]) if len(sure) else 0.0
+            # smoothed rates do not show rest, without friction, so close to a change of direction
+            inner = run[(time >= time[0] + SMOOTHING) & (time <= time[-1] - SMOOTHING)]
+            duration = np.ptp(motion.time[inner]) if len(inner) else 0.0
             count = int(duration / self.window + 1e-6) * int(moving[run[0]])
-            windows += np.array_split(sure, count) if count else []
+            windows += np.array_split(inner, count) if count else []
         return windows
 
 
@@ -89,38 +93,19 @@ def drive_equations(
     speed, yaw_rate = motion.smooth_rates.T
     sliding = np.hypot(speed, motion.side_slip)
     share = speed / np.maximum(sliding, 1e-9)  # of the seal's friction that is along the heading
+    resisted = np.column_stack([load * share, speed])
     known = gravity + motion.side_slip * yaw_rate
-    found = []
-    for window in windows:
-        time = motion.time[window]
-        pushed = motion.impulse[window].sum(axis=1)
-        late = motion.torques[window].sum(axis=1)
-        integrals = np.column_stack([load * share, speed])[window]
-        impulses = np.column_stack(
-            [pushed - pushed[0], -_integral(integrals, time), late[0] - late]
-        )
-        rate = None if motion.rates is None else motion.rates[window, 0]
-        free = _integral(known[window], time)
-        found.append(_twice_integrated(time, rate, motion.way[window], impulses, free))
-    return found
+    return [_driven(motion, w, 0, motion.way, resisted[w], known[w]) for w in windows]
 
 
-def turn_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
+def yaw_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
     """(15) in each window: b₁, b₂, b₃, and b₁ times how much later torques act than assumed."""
     found, yaw_rate = [], motion.smooth_rates[:, 1]
     for window in windows:
-        time = motion.time[window]
-        pushed, late = (
-            -np.diff(motion.impulse[window])[:, 0],
-            -np.diff(motion.torques[window])[:, 0],
-        )
         sign = np.sign(yaw_rate[window[len(window) // 2]])
-        integrals = np.column_stack([np.full(len(window), sign), yaw_rate[window]])
-        impulses = np.column_stack(
-            [pushed - pushed[0], -_integral(integrals, time), late[0] - late]
-        )
-        rate = None if motion.rates is None else motion.rates[window, 1]
-        found.append(_twice_integrated(time, rate, motion.pose[window, 2], impulses, 0 * time))
+        resisted = np.column_stack([np.full(len(window), sign), yaw_rate[window]])
+        known = np.zeros(len(window))
+        found.append(_driven(motion, window, 1, motion.pose[:, 2], resisted, known))
     return found
 
 
@@ -131,14 +116,14 @@ def wheel_equations(
     assert motion.wheel_angles is not None
     right, left = motion.wheel_angles.T
     both = (motion.way, (right + left) / 2), (motion.pose[:, 2], (right - left) / 2)
-    found = []
-    for gone, angle in both:
-        found.append([_of_wheels(motion.time[w], gone[w], angle[w]) for w in windows])
-    return found[0], found[1]
+    way, heading = (
+        [_of_wheels(motion.time[w], gone[w], angle[w]) for w in windows] for gone, angle in both
+    )
+    return way, heading
 
 
 def friction_load(motion: RecordedMotion, climber: Climber, site: Site) -> Array:
-    """(1 - k) P S (n,) [N], of which the seal rubs with μ times as much; 1 N without a seal."""
+    """Normal force on the seal (1 - k) P S (n,) [N], μ of which is friction; 1 N without a seal."""
     if not site.has_seal:
         return np.ones(len(motion.time))
     return (1 - climber.wheel_load_share) * climber.suction_area * motion.pressure
@@ -152,10 +137,29 @@ def gravity_ahead(motion: RecordedMotion, climber: Climber, site: Site) -> Array
     return along
 
 
+def _driven(
+    motion: RecordedMotion, window: Indices, column: int, gone: Array, resisted: Array, known: Array
+) -> Equations:
+    """Of the speed (column 0), which τR + τL changes, or the yaw rate (1), which τR - τL does.
+
+    `gone` (n,) is how far the climber has gone, or turned, by each of the motion's times. In the
+    window, `resisted` (m, 2) is what friction's coefficients are multiplied with, and `known` (m,)
+    the acceleration that has no coefficient.
+    """
+    time, pair = motion.time[window], np.array([1.0, (1.0, -1.0)[column]])
+    pushed, late = motion.impulse[window] @ pair, motion.torques[window] @ pair
+    impulses = np.column_stack([pushed - pushed[0], -_integral(resisted, time), late[0] - late])
+    rate = None if motion.rates is None else motion.rates[window, column]
+    return _twice_integrated(time, rate, gone[window], impulses, _integral(known, time))
+
+
 def _twice_integrated(
     time: Array, rate: Array | None, gone: Array, impulses: Array, known: Array
 ) -> Equations:
-    """Of a rate, if it is measured, and of how far it has `gone`; `known` is what it adds to it."""
+    """Equations of a rate, if it is measured (else None), and of its integral `gone` (m,).
+
+    `impulses` (m, c) multiply the coefficients, `known` (m,) is what adds to the rate without one.
+    """
     one, since = np.ones_like(time), time - time[0]
     lacking = _integral(_shapes(time), time)
     start, target = np.column_stack([since, one]), gone - gone[0] - _integral(known, time)
@@ -163,7 +167,7 @@ def _twice_integrated(
     if rate is None:
         return Equations(start, design, target, moved, 1)
     return Equations(
-        # of its own, for sensors of rates have a bias
+        # an unknown of its own, as sensors of rates have a bias
         np.concatenate([np.column_stack([one, 0 * start]), np.column_stack([0 * one, start])]),
         np.concatenate([impulses, design]),
         np.concatenate([rate - known, target]),

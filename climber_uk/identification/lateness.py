@@ -1,4 +1,4 @@
-"""By how much torques act later than assumed: a delay and a lag of first order, by search.
+"""Delay and lag of first order by which torques act later than assumed, by search.
 
 A delay of δ adds -a₁ δ τ to the speed, and -b₁ δ τ to the yaw rate. Where that coefficient shows,
 the delay and lag with the least cost are taken, and the coefficient is fitted all the same: what is
@@ -16,7 +16,7 @@ from climber_uk.identification.window_fit import WindowFit
 
 # [s] tried first; the last ones are the most that is found
 DELAYS, LAGS = (0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2), (0.0, 0.02, 0.04, 0.08)
-SURE = 4.0  # standard deviations of a delay that is believed
+SURE = 4.0  # standard deviations, above which a delay is significant
 EVALUATIONS = 60
 
 EquationsAt = Callable[[float, float], Mapping[str, Sequence[Equations]]]  # of delay and lag

@@ -1,4 +1,4 @@
-"""How a climber moved and what drove it, as arrays, from the messages of a bag."""
+"""Motion of a climber and the torques that drove it, as arrays, from a bag."""
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -8,43 +8,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.bags.collecting import Collected
-from climber_uk.bags.joints import torques_and_angles, wheel_names
-from climber_uk.bags.recorded import TimeSeries
+from climber_uk.bags.joints import torques_and_angles
 from climber_uk.bags.restarts import are_strays
-from climber_uk.bags.run_reader import RunReader, Told
+from climber_uk.bags.run_reader import Parameters, RunReader
+from climber_uk.bags.time_series import TimeSeries
 from climber_uk.identification.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.quantities import across, along
 from climber_uk.messages.topics import JOINTS, ODOMETRY, PARAMETERS, PRESSURE, TORQUES
 
 Indices = NDArray[np.intp]
-Torques = tuple[Array, Array]  # when they begin (m,) [s], and they (m, 2) [N m]
+Torques = tuple[Array, Array]  # times (m,) [s] at which they begin, and torques (m, 2) [N m]
 TOPICS = ODOMETRY, TORQUES, JOINTS, PRESSURE, PARAMETERS  # that are read
 HALF_SECOND = 0.5  # [s]
-PATIENCE = 5.0  # typical times from one torque to the next, after which some are missing
-SMOOTHING = 0.2  # [s] to either side, over which rates are taken
+TORQUE_GAP = 5.0  # typical times from one torque to the next, above which some are missing
+SMOOTHING = 0.2  # [s] to either side, over which rates are smoothed
 SLIP_SMOOTHING = 0.5  # [s] the same for side slip, which is small
 CLEAR = 3.0  # standard deviations of noise
 
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """What n odometry messages and the torques between them tell."""
+    """n odometry messages, and the torques between them; poses are in the wall's frame."""
 
     time: Array  # (n,) [s]
     pose: Array  # (n, 3) x [m], y [m], θ [rad] without jumps by 2π
-    rates: Array | None  # (n, 2) forward speed [m/s], yaw rate [rad/s]; None: odometry without
+    rates: Array | None  # (n, 2) forward speed [m/s], yaw rate [rad/s]; None: no twist
     impulse: Array  # (n, 2) ∫ τ dt of the right and left wheel [N m s]
     pressure: Array  # (n,) of the suction [Pa]
     stretch: Indices  # (n,) a number that changes where torques are missing
     wheel_angles: Array | None = None  # (n, 2) right, left [rad]
-    torque_ratio: float = 1.0  # of the torques at the wheels to those commanded, if both are told
+    torque_ratio: float = 1.0  # of torques at the wheels to those commanded, if both are known
 
     @cached_property
     def way(self) -> Array:
         """Way along the heading since the start, backwards negative (n,) [m]."""
-        x, y, heading = np.diff(self.pose, axis=0).T
-        middle = self.pose[:-1, 2] + heading / 2
-        return np.concatenate([[0.0], np.cumsum(x * np.cos(middle) + y * np.sin(middle))])
+        return np.concatenate([[0.0], np.cumsum(self._steps[0])])
 
     @cached_property
     def smooth_rates(self) -> Array:
@@ -59,28 +58,33 @@ class RecordedMotion:
 
     @cached_property
     def side_slip(self) -> Array:
-        """Speed to the left (n,) [m/s], smoothed; 0 where it cannot be told from noise."""
-        x, y, turned = np.diff(self.pose, axis=0).T
-        middle = self.pose[:-1, 2] + turned / 2
-        steps = y * np.cos(middle) - x * np.sin(middle)
+        """Speed to the left (n,) [m/s], smoothed; 0 where noise hides it."""
+        steps = self._steps[1]
         aside = np.concatenate([[0.0], np.cumsum(steps)])
         slip = rate(self.time, aside, SLIP_SMOOTHING)
         noise = np.std(np.diff(steps)) / np.sqrt(6) / SLIP_SMOOTHING  # less, with cubics
         return slip if np.sqrt(np.mean(slip**2)) > CLEAR * noise else 0 * slip
 
     @cached_property
-    def torques(self) -> Array:
-        """Of the right and left wheel (n, 2) [N m], just before each time.
+    def _steps(self) -> tuple[Array, Array]:
+        """Ahead and to the left (n - 1,) [m] from each pose to the next, by the heading midway."""
+        step = np.diff(self.pose, axis=0)
+        middle = self.pose[:-1, 2] + step[:, 2] / 2
+        return along(middle, step), across(middle, step)
 
-        Those after it answer the odometry of that time, and its noise.
+    @cached_property
+    def torques(self) -> Array:
+        """Torques of the right and left wheel (n, 2) [N m] just before each time.
+
+        Those just after it answer the odometry of that time, and so depend on its noise.
         """
         torques = np.diff(self.impulse, axis=0) / np.diff(self.time)[:, None]
         return np.concatenate([torques[:1], torques])
 
     def acting(self, delay: float, lag: float) -> "RecordedMotion":
         """The same, if torques act `delay` [s] later, and with a lag of first order [s]."""
-        told = [np.interp(self.time - delay, self.time, wheel) for wheel in self.impulse.T]
-        acting = np.stack([lagging(self.time, wheel, lag) for wheel in told], axis=1)
+        delayed = [np.interp(self.time - delay, self.time, wheel) for wheel in self.impulse.T]
+        acting = np.stack([lagging(self.time, wheel, lag) for wheel in delayed], axis=1)
         return replace(self, impulse=acting)
 
 
@@ -92,28 +96,32 @@ def impulse(time: Array, begins: Array, torques: Array) -> Array:
 
 
 def stretches(time: Array, begins: Array) -> Indices:
-    """Numbers (n,) that differ before, in and after each gap between torques."""
-    gaps = np.flatnonzero(np.diff(begins) > PATIENCE * np.median(np.diff(begins)))
+    """Number (n,) of the stretch each time is in: before, in or after each gap between torques."""
+    gaps = np.flatnonzero(np.diff(begins) > TORQUE_GAP * np.median(np.diff(begins)))
     return np.searchsorted(begins[np.stack([gaps, gaps + 1], axis=1).ravel()], time)
 
 
 def read_motion(
-    reader: RunReader, found: Collected, parameters: Told, pressure: float = 0.0, delay: float = 0.0
+    reader: RunReader,
+    found: Collected,
+    parameters: Parameters,
+    pressure: float = 0.0,
+    delay: float = 0.0,
 ) -> tuple[RecordedMotion, int]:
     """Motion of a climber, and how many messages are unfit and left out.
 
-    What holds where they are not told: a `pressure` [Pa], and a `delay` [s] of a command after its
-    odometry. `parameters` are the controller's. Raises `ValueError` naming the bag and what it
-    lacks.
+    `pressure` [Pa] is assumed if none was recorded, `delay` [s] from an odometry to its command if
+    joint_states has no torques. `parameters` are the controller's. Raises `ValueError` naming the
+    bag and what it lacks.
     """
-    odometry, pressures = (reader.recorded(found, name) for name in (ODOMETRY, PRESSURE))
+    odometry, pressures = (reader.series(found, name) for name in (ODOMETRY, PRESSURE))
     others = pressures, reader.commands(found, parameters), _wheels(found, parameters)
-    unfit = sum(sum(told.unfit.values()) for told in (odometry, *others))
+    unfit = sum(sum(series.unfit.values()) for series in (odometry, *others))
     # far off the others' stamps; `collect` has marked odometry's
-    strays = [are_strays(told.stamps) for told in others]
+    strays = [are_strays(series.stamps) for series in others]
     unfit += sum(int(np.sum(are_off)) for are_off in strays)
     pressures, commands, wheels = (
-        told.where(~are_off) for told, are_off in zip(others, strays, strict=True)
+        series.where(~are_off) for series, are_off in zip(others, strays, strict=True)
     )
     fit = np.isfinite(odometry.values).all(axis=1)  # the twist too
     commanded = _seconds(commands) + delay, commands.values[:, :2]
@@ -146,39 +154,37 @@ def read_motion(
     return motion, unfit + int(np.sum(~fit))
 
 
-def _seconds(told: TimeSeries) -> Array:
+def _seconds(series: TimeSeries) -> Array:
     """Stamps (n,) [s]."""
-    return np.array([stamp / SECOND for stamp in told.stamps.tolist()])
+    return np.array([stamp / SECOND for stamp in series.stamps.tolist()])
 
 
-def _wheels(found: Collected, parameters: Told) -> TimeSeries:
-    """Torques and angles of both wheels (n, 4), as joint_states tell them."""
-    parts = found.joints[JOINTS]
+def _wheels(found: Collected, parameters: Parameters) -> TimeSeries:
+    """Torques and angles of both wheels (n, 4), of joint_states; empty if it has none."""
     with suppress(ValueError):
-        names = wheel_names({name for part in parts for name in part.names}, parameters)
-        return torques_and_angles(parts, names)
+        return torques_and_angles(found.joints[JOINTS], parameters)
     return TimeSeries.of([])
 
 
 def _at_wheels(wheels: TimeSeries) -> Torques | None:
-    """When torques at the wheels begin (m,) [s], and they (m, 2); None if these are not told."""
+    """Torques at the wheels, of joint_states; None if it has none."""
     efforts = wheels.values[:, :2]
     if len(efforts) < 2 or not np.isfinite(efforts).all() or not efforts.any():
         return None
-    # each tells of the time before it
+    # each message is of the time before it
     return _seconds(wheels), np.concatenate([efforts[1:], efforts[-1:]])
 
 
 def _ratio(at_wheels: Torques, commanded: Torques) -> float:
-    """Of the torques at the wheels to those commanded, by least squares over half seconds."""
+    """Ratio of torques at the wheels to those commanded: least squares over half seconds."""
     if not len(commanded[0]):
         return 1.0
     first = max(at_wheels[0][0], commanded[0][0])
     times = np.arange(first, min(at_wheels[0][-1], commanded[0][-1]), HALF_SECOND)
     if len(times) < 2:
         return 1.0
-    are, were = (np.diff(impulse(times, *told), axis=0).ravel() for told in (at_wheels, commanded))
-    return float(are @ were / (were @ were)) if were.any() else 1.0
+    at, by = (np.diff(impulse(times, *each), axis=0).ravel() for each in (at_wheels, commanded))
+    return float(at @ by / (by @ by)) if by.any() else 1.0
 
 
 def _angles(time: Array, wheels: TimeSeries) -> Array | None:

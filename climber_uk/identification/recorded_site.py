@@ -1,47 +1,39 @@
-"""What a climber was driven on and by which settings, and what of that identification assumes away.
+"""The wall and the settings of a recorded run, and which of them identification neglects.
 
-Parameters of the controller are in a bag (`~/parameters`); those of the plant
-only in parameter files.
+Parameters of the controller are in a bag (`~/parameters`); those of the plant only in parameter
+files.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import fields
 from typing import Any
 
+from climber_uk.bags.run_reader import Parameters
 from climber_uk.identification.integral_equations import Site
 from climber_uk.mechanics.adhesion import ADHESION
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.wall import WALLS
 from climber_uk.parameters.parameter_file import Values
 
-Parameters = Mapping[str, Any]
-# Settings that identification assumes away: whether one does, and what follows.
+# Settings that identification neglects: the values that matter, and what follows.
 ASSUMED_AWAY: dict[str, tuple[Callable[[Any], bool], str]] = {
     "seal_radius": (
         lambda radius: radius > 0,
         "a ring rubs less along the heading the more it turns, and resists turning: it is fitted "
         "as if it did not",
     ),
-    "friction": (
-        lambda law: law != "coulomb",
-        "it is fitted as Coulomb's and a viscous one",
-    ),
+    "friction": (lambda law: law != "coulomb", "it is fitted as Coulomb's and a viscous one"),
     "odometry_source": (
         lambda source: source == "wheels",
         "radius and track are what the odometry was made with, and slip is taken for motion",
     ),
     "heading_bias": (lambda bias: bias != 0, "the weight is taken to pull another way"),
 }
-OF_SUCTION = (
-    "seal_friction_coefficient",
-    "wheel_load_share",
-    "suction_pressure",
-    "suction_area",
-)
+OF_SUCTION = ("seal_friction_coefficient", "wheel_load_share", "suction_pressure", "suction_area")
 
 
 def site_of(controller: Parameters, plant: Parameters) -> Site:
-    """Wall of the plant, and whether there is a seal; raises `ValueError`."""
+    """Wall of the plant, and whether there is a seal; raises `ValueError` for unknown names."""
     wall = plant.get("wall", "plane")
     if wall not in WALLS:
         raise ValueError(f"wall={wall!r} must be one of {', '.join(WALLS)}")
@@ -52,17 +44,17 @@ def site_of(controller: Parameters, plant: Parameters) -> Site:
 
 
 def differences(file: Parameters, recorded: Parameters, site: Site) -> Iterator[str]:
-    """Sentences on what a parameter file and a bag say differently of the climber."""
+    """Sentences on the climber's parameters that differ between a parameter file and a bag."""
     for field in fields(Climber):
         if field.name in OF_SUCTION and not site.has_seal:
             continue
-        told, other = recorded.get(field.name), file.get(field.name, field.default)
-        if told is not None and file and told != other:
-            yield f"{field.name} was {told:g} when this was recorded; {other:g} of the file is used"
+        then, now = recorded.get(field.name), file.get(field.name, field.default)
+        if then is not None and file and then != now:
+            yield f"{field.name} was {then:g} when this was recorded; {now:g} of the file is used"
 
 
 def assumed_away(controller: Parameters, plant: Parameters) -> Iterator[str]:
-    """Sentences on settings that the model does not know."""
+    """Sentences on settings that the model does not have."""
     for name, (violates, follows) in ASSUMED_AWAY.items():
         value = plant.get(name, controller.get(name))
         if value is not None and violates(value):

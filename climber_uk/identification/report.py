@@ -1,4 +1,4 @@
-"""What was identified, in words, numbers and parameters of the nodes."""
+"""The result of an identification as a table, as remarks and as parameters of the nodes."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -21,12 +21,12 @@ DIGITS = 6  # of a parameter that is written
 
 
 def label_of(name: str, site: Site) -> tuple[str, str]:
-    """What a parameter is called where it was found, and its unit."""
+    """Name and unit of a parameter on this site: without a seal, that of rolling friction."""
     return (name, UNITS[name]) if site.has_seal else WITHOUT_SEAL.get(name, (name, UNITS[name]))
 
 
-def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
-    """What is told of each parameter; of what is not, why, and no number."""
+def rows(found: Identified, assumed: Climber) -> Iterator[dict[str, Any]]:
+    """Row of each parameter, as in the JSON file; a reason in place of an undetermined value."""
     for name, value, half_width in zip(NAMES, found.values, found.half_widths, strict=True):
         label, unit = label_of(name, found.site)
         reason = found.reasons.get(name)
@@ -35,7 +35,7 @@ def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
             "estimate": None if reason else float(value),
             "half_width": None if reason else float(half_width),
             "unit": unit,
-            "nodes_now": float(getattr(believed, label, 0.0)),
+            "nodes_now": float(getattr(assumed, label, 0.0)),
             "known": reason is None,
             "cause": reason and reason.cause,
             "reason": reason and reason.words,
@@ -43,10 +43,10 @@ def rows(found: Identified, believed: Climber) -> Iterator[dict[str, Any]]:
         }
 
 
-def table(found: Identified, believed: Climber) -> str:
-    """The same, as text."""
+def table(found: Identified, assumed: Climber) -> str:
+    """The rows as a Markdown table."""
     cells = []
-    for row in rows(found, believed):
+    for row in rows(found, assumed):
         digits = {"estimate": 5, "half_width": 2, "nodes_now": 5}
         numbers = [("" if row[key] is None else f"{row[key]:.{n}g}") for key, n in digits.items()]
         why = f"cannot be told: {row['reason']}" if row["reason"] else ""
@@ -55,7 +55,7 @@ def table(found: Identified, believed: Climber) -> str:
 
 
 def remarks(found: Identified) -> Iterator[str]:
-    """Sentences on what the table does not say."""
+    """Sentences on the fit: windows, test of fit, delay, and what the parameters mean."""
     windows, extent = len(found.windows["drive"]), found.extent
     rubs = "the seal rubs" if found.site.has_seal else "rolling is resisted"
     rubs += f" with {found.friction:.4g} N at {extent.speed:.3g} m/s"
@@ -87,7 +87,7 @@ def remarks(found: Identified) -> Iterator[str]:
 
 
 def missing(found: Identified) -> Iterator[str]:
-    """Sentences on what cannot be told though it was sought, and how to drive so that it can."""
+    """Sentences on parameters that are not determined, and how to drive so that they are."""
     for group, advice in ADVICE.items():
         reasons = {name: found.reasons[name] for name in group if name in found.reasons}
         causes = {
@@ -97,17 +97,17 @@ def missing(found: Identified) -> Iterator[str]:
             continue
         labels = [label_of(name, found.site)[0].replace("_", " ") for name in causes]
         apart = " apart" if len(labels) > 1 and "collinear" in causes.values() else ""
-        said = f"{' and '.join(labels)} cannot be told{apart} from this bag: "
+        begin = f"{' and '.join(labels)} cannot be told{apart} from this bag: "
         if set(causes.values()) <= {"misfit", "torques"}:
-            yield said + next(reasons[name].words for name in causes)
+            yield begin + next(reasons[name].words for name in causes)
         else:
-            yield f"{said}{advice} (see --plan)"
+            yield f"{begin}{advice} (see --plan)"
 
 
-def changes(found: Identified, believed: Climber) -> dict[str, dict[str, Any]]:
-    """Parameters by node; what is not told stays as it is."""
-    told = {row["parameter"]: row["estimate"] for row in rows(found, believed) if row["known"]}
-    climber = {name: value for name, value in told.items() if hasattr(believed, name)}
+def changes(found: Identified, assumed: Climber) -> dict[str, dict[str, Any]]:
+    """Parameters to change, by node: those that are determined."""
+    known = {row["parameter"]: row["estimate"] for row in rows(found, assumed) if row["known"]}
+    climber = {name: value for name, value in known.items() if hasattr(assumed, name)}
     controller, plant = dict(climber), dict(climber)
     if found.site.has_seal and _friction_is_known(found):
         controller[COULOMB] = max(0.0, found.friction / found.extent.load)
@@ -116,13 +116,13 @@ def changes(found: Identified, believed: Climber) -> dict[str, dict[str, Any]]:
 
 
 def _friction_is_known(found: Identified) -> bool:
-    """Whether it is, Coulomb's and viscous together."""
+    """Whether the sum of Coulomb and viscous friction is determined."""
     reasons = [found.reasons.get(name) for name in (COULOMB, "viscous_friction")]
     return all(reason is None or reason.cause == "absent" for reason in reasons)
 
 
 def _law(found: Identified, whole: float) -> dict[str, Any]:
-    """Friction of the plant; `whole` is the coefficient that the controller gets."""
+    """Parameters of the plant's friction law; `whole` is the controller's coefficient."""
     viscous, load = found["viscous_friction"], found.extent.load
     coulomb = found[COULOMB] * load
     apart = not {COULOMB, "viscous_friction"} & set(found.reasons)

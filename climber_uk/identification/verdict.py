@@ -1,8 +1,8 @@
-"""Which parameters a motion does not determine, and why: nothing that was told is told again.
+"""Which parameters a motion does not determine, and why.
 
-A parameter is told where its interval is narrow, and physics allows it. Where it is not, the widest
-part of the interval says why: what the model lacks, another parameter that it goes with, noise, or
-a motion that hardly shows it.
+A parameter is determined if its interval is narrow and its value physically possible. If not, the
+widest part of its interval says why: a model error, another parameter that it is collinear with,
+noise, or too little excitation.
 """
 
 from collections.abc import Iterator
@@ -15,10 +15,10 @@ from climber_uk.identification.identified import (
     HEADING,
     NAMES,
     OF_TURNING,
-    TURN,
     UNITS,
     WAY,
     WEIGHT,
+    YAW,
     Identified,
     Reason,
 )
@@ -26,41 +26,35 @@ from climber_uk.identification.integral_equations import Cut
 from climber_uk.identification.recorded_motion import RecordedMotion
 from climber_uk.mechanics.climber import Climber
 
-TOGETHER = 0.95  # correlation of two that cannot be told apart
-SURE = 2.0  # half widths of an interval, of what is not left to chance
-NOISY = 3.0  # times the noise that is usual: 10 mm/s, 1 mm, 10 mrad/s, 1 mrad
+TOGETHER = 0.95  # correlation above which two parameters are collinear
+SURE = 2.0  # half widths of its interval below zero, above which a value is surely negative
+NOISY = 3.0  # times the usual noise: 10 mm/s, 1 mm, 10 mrad/s, 1 mrad
 USUAL = 1e-2  # [m/s], [rad/s]
 SAME = 1e-5  # [m], [rad] and of a value: odometry that agrees so well is made of the wheel angles
-MUCH = 0.05  # of all that drives, unexplained: nothing is told of it
-OFF = 0.2  # of the commanded torques: most by which those at the wheels may differ as a whole
+MUCH = 0.05  # share of the drive that is unexplained, above which no parameter is determined
+OFF = 0.2  # difference of the torques at the wheels from those commanded, above which none is
 OF_DRIVING = ("mass", "seal_friction_coefficient", "viscous_friction")
 OF_WHEELS = ("wheel_radius", "half_track")
 OF_TORQUES = (*OF_DRIVING, *OF_TURNING)
-OF_KIND = {
-    DRIVE: OF_DRIVING,
-    TURN: OF_TURNING,
-    WAY: ("wheel_radius",),
-    HEADING: ("half_track",),
-}
+OF_KIND = {DRIVE: OF_DRIVING, YAW: OF_TURNING, WAY: ("wheel_radius",), HEADING: ("half_track",)}
 
 
 def reasons(
     found: Identified, motion: RecordedMotion, climber: Climber, cut: Cut
 ) -> dict[str, Reason]:
-    """Why each parameter that is not told is not, by name."""
-    said = dict(_lacking(found)) | dict(_wide(found))
-    said |= dict(_absent(found, cut))
-    said |= dict(_lumped(found))
+    """Why each parameter is not determined, by name, of those that are not."""
+    why = dict(_lacking(found)) | dict(_wide(found)) | dict(_absent(found, cut))
+    why |= dict(_lumped(found))
     if motion.wheel_angles is not None:
-        said |= dict(_made_of_wheels(found, climber))
+        why |= dict(_made_of_wheels(found, climber))
     if abs(motion.torque_ratio - 1) > OFF:
         words = f"torques in joint_states are {motion.torque_ratio:.2g} times those commanded"
-        said |= {name: Reason("torques", words) for name in OF_TORQUES}
-    return said
+        why |= {name: Reason("torques", words) for name in OF_TORQUES}
+    return why
 
 
 def _lacking(found: Identified) -> Iterator[tuple[str, Reason]]:
-    """What equations tell that lack much, and the mass where the weight is not as assumed."""
+    """Parameters of equations that do not fit, and the mass if the weight is not as assumed."""
     for lack in found.lacks:
         if lack.share > MUCH:
             words = f"the model does not fit: {lack.words}"
@@ -70,7 +64,7 @@ def _lacking(found: Identified) -> Iterator[tuple[str, Reason]]:
 
 
 def _wide(found: Identified) -> Iterator[tuple[str, Reason]]:
-    """What has too wide an interval, or a value that cannot be."""
+    """Parameters with too wide an interval, or with a value that is not possible."""
     columns = zip(NAMES, found.values, found.uncertainty, found.sought, strict=True)
     for name, value, share, sought in columns:
         if sought and not share <= KNOWN:
@@ -81,7 +75,7 @@ def _wide(found: Identified) -> Iterator[tuple[str, Reason]]:
 
 
 def _why(found: Identified, name: str) -> Reason:
-    """What makes an interval wide."""
+    """What makes a parameter's interval wide."""
     number, widths = NAMES.index(name), found.widths
     shown = f"{found[name]:.3g} ± {found.half_width(name):.2g} is all that shows"
     if widths.bias[number] > np.maximum(widths.spread, widths.white)[number]:
@@ -95,16 +89,17 @@ def _why(found: Identified, name: str) -> Reason:
     if goes_with[other] > TOGETHER:
         names = (*NAMES[FIRST[kind] :][:3], "the delay of torques")
         sought = [n for n in names if n not in NAMES or found.sought[NAMES.index(n)]]
-        return Reason("collinear", f"not apart from {_plain(sought[other])}: {shown}")
+        partner = sought[other].replace("_", " ")
+        return Reason("collinear", f"not apart from {partner}: {shown}")
     if fit.noise[0] > NOISY * USUAL * (1.0 if len(fit.noise) > 1 else 0.1):
         return Reason("noise", f"odometry is noisy: {shown}")
     return Reason("not excited", f"the motion hardly shows it: {shown}")
 
 
 def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
-    """What was not sought."""
-    if TURN not in found.fits:
-        windows = f"{len(found.windows[TURN])} windows of {cut.window:g} s"
+    """Parameters that were not fitted, or not apart from another one."""
+    if YAW not in found.fits:
+        windows = f"{len(found.windows[YAW])} windows of {cut.window:g} s"
         words = f"it turns one way at more than {cut.least_yaw_rate:g} rad/s in only {windows}"
         yield from ((name, Reason("not excited", words)) for name in OF_TURNING)
     elif not found.sought[NAMES.index("turning_resistance")]:
@@ -128,10 +123,10 @@ def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
 
 
 def _lumped(found: Identified) -> Iterator[tuple[str, Reason]]:
-    """Frictions that are not as the model has them, but together are what they are."""
+    """Frictions of which only the sum is determined, as they are not Coulomb's and viscous."""
     groups = (
         (DRIVE, OF_DRIVING[1:], "speed", f"{found.friction:.3g} N"),
-        (TURN, OF_TURNING[1:], "yaw rate", f"{found.turning_moment:.3g} N m"),
+        (YAW, OF_TURNING[1:], "yaw rate", f"{found.turning_moment:.3g} N m"),
     )
     lacking = {lack.kind for lack in found.lacks if lack.size > 0}
     for kind, (coulomb, viscous), rate, together in groups:
@@ -156,7 +151,3 @@ def _made_of_wheels(found: Identified, climber: Climber) -> Iterator[tuple[str, 
 
 def _is_surely_negative(found: Identified, name: str) -> bool:
     return -found[name] > SURE * found.half_width(name)
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")

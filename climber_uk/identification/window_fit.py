@@ -1,13 +1,14 @@
-"""A robust fit of linear equations in windows, its test, and how far its coefficients may be off.
+"""A robust fit of linear equations in windows, its test, and the errors of its coefficients.
 
-Least squares of the residuals' soft L1 norm, by reweighting. Three things may move a coefficient:
+The soft L1 norm of the residuals is minimised, by reweighted least squares. Three errors of a
+coefficient are estimated:
 
-- what differs from window to window, whatever its distribution: a jackknife over the windows;
-- white noise, which tells what is not excited at all: never less than that;
-- what the equations lack, and may go with what tells the coefficient: see `Misfit`.
+- by what differs from window to window, whatever its distribution: a jackknife over the windows;
+- by white noise, which shows what is not excited at all: an error is never less than that;
+- by model errors that are collinear with the coefficient: see `Misfit`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,18 +25,18 @@ ITERATIONS, REFINEMENTS = 10, 3
 CLEAR = 3.0  # standard deviations beyond which a residual counts less and less
 ROUNDING = 1e-13
 MEDIAN = 1.4826  # standard deviation of what is normal, by the median of its absolute value
-STRANGE, FEW = 6.0, 0.1  # times the usual, of a window; most of the windows that may be
-SLIGHT = 1e-4  # [m/s²] or the like, of a misfit that is none
-CHANCE = 1e-3  # of noise alone to fail the test of fit
+STRANGE, FEW = 6.0, 0.1  # times the usual misfit of a window; largest share of such windows
+SLIGHT = 1e-4  # [m/s²] or the like: a misfit below it is none
+CHANCE = 1e-3  # probability that noise alone fails the test of fit
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """The accelerations that the equations lack in each window, and what noise makes of them.
+    """Accelerations that are missing in the equations of each window, and their noise.
 
-    Noise is taken for white, and from one time to the next: what is slower is no noise of a sensor,
-    or one that looks like an acceleration. `excess` is what remains beyond it, 0 where the test
-    (χ² of all windows) does not fail.
+    Noise is taken to be white, by differences from one time to the next: what is slower is no noise
+    of a sensor, or cannot be distinguished from an acceleration. `excess` is what remains beyond
+    it, 0 where the test (χ² of all windows) does not fail.
     """
 
     found: Array  # (n, 2) constant in the window, and changing in it
@@ -44,7 +45,7 @@ class Misfit:
 
     @classmethod
     def of(cls, found: Array, noise: Array, coefficients: int) -> "Misfit":
-        """Test of what was `found` by a fit of some coefficients."""
+        """Test the accelerations `found` (n, 2) by a fit of this number of coefficients."""
         count = len(found)
         freedom = max(1, count - coefficients)
         ratio = ((found / noise) ** 2).sum(axis=0)
@@ -54,7 +55,7 @@ class Misfit:
 
     @property
     def strange(self) -> NDArray[np.bool_]:
-        """Windows (n,) that fit much worse than most, a few at most: a push, a bump, a stop."""
+        """Which windows (n,) fit much worse than most, as of a push, a bump or a stop; only few."""
         usual = np.maximum(MEDIAN * np.median(np.abs(self.found), axis=0), self.noise + SLIGHT)
         worst = np.max(np.abs(self.found) / usual, axis=1)
         limit = np.quantile(worst, 1 - FEW)
@@ -82,9 +83,9 @@ class WindowFit:
     def of(
         cls, windows: Sequence[Equations], columns: Sequence[int], noise: Array, least: float = 0.1
     ) -> "WindowFit":
-        """Fit of the coefficients in `columns`, with the `noise` (q,) as it turns out to be.
+        """Fit of the coefficients in `columns`; standard deviations of noise are estimated, too.
 
-        No sensor is believed to be better than `least` times the noise to begin with; 0: any is.
+        They begin with `noise` (q,), and do not fall below `least` times that.
         """
         whole = cls.standardised(windows, columns, noise)
         for _ in range(REFINEMENTS):
@@ -113,7 +114,7 @@ class WindowFit:
 
     @cached_property
     def coefficients(self) -> Array:
-        """(c,)."""
+        """Coefficients (c,)."""
         weights: Array = np.ones(len(self.target))
         for _ in range(ITERATIONS):
             weighted = weights[:, None] * self.design
@@ -124,7 +125,7 @@ class WindowFit:
 
     @cached_property
     def residuals(self) -> Array:
-        """(rows,), in standard deviations."""
+        """Residuals (rows,), in standard deviations."""
         return self.target - self.design @ self.coefficients
 
     @property
@@ -135,34 +136,32 @@ class WindowFit:
 
     @cached_property
     def information(self) -> Array:
-        """N of each window (n, c, c)."""
-        rows = zip(self._split(self.design), self._split(self._weights), strict=True)
-        return np.stack([J.T @ (w[:, None] * J) for J, w in rows])
+        """Jᵀ W J of each window (n, c, c), by design J and weights W: the normal equations."""
+        return self._by_window(lambda J, w: J.T @ (w[:, None] * J), self.design, self._weights)
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the coefficients, if noise is white (c, c)."""
+        """Covariance of the coefficients (c, c), if noise is white."""
         return _inverse(self.information.sum(axis=0))
 
     @cached_property
     def changes(self) -> Array:
-        """Of the coefficients without one window after the other (n, c)."""
-        parts = self._split(self.design), self._split(self._weights), self._split(self.residuals)
-        g = np.stack([J.T @ (w * r) for J, w, r in zip(*parts, strict=True)])
+        """Changes of the coefficients (n, c) without each of the windows."""
+        rows = self.design, self._weights, self.residuals
+        g = self._by_window(lambda J, w, r: J.T @ (w * r), *rows)
         rest = self.information.sum(axis=0) - self.information
         changes: Array = (_inverse(rest) @ g[..., None])[..., 0]
         return changes
 
     @cached_property
     def pulls(self) -> Array:
-        """What an acceleration of 1 that is lacking in a window would add (n, 2, c)."""
-        parts = self._split(self.design), self._split(self._weights), self._split(self.lacking)
-        g = np.stack([F.T @ (w[:, None] * J) for J, w, F in zip(*parts, strict=True)])
-        return g @ self.covariance
+        """Changes of the coefficients (n, 2, c) by an acceleration of 1 missing in a window."""
+        rows = self.design, self._weights, self.lacking
+        return self._by_window(lambda J, w, F: F.T @ (w[:, None] * J), *rows) @ self.covariance
 
     @cached_property
     def misfit(self) -> Misfit:
-        """What the equations lack."""
+        """Accelerations that are missing in the equations, and the test."""
         parts = (self._split(part) for part in (self.lacking, self.residuals, self.quantity))
         white = self._white()
         found, noise = [], []
@@ -174,9 +173,9 @@ class WindowFit:
         return Misfit.of(np.array(found), np.array(noise), self.design.shape[1])
 
     def bias(self, slopes: Array) -> Array:
-        """Most (p,) by which what the equations lack may have moved p parameters.
+        """Largest error (p,) of p parameters by what is missing in the equations.
 
-        By `slopes` (p, c) these depend on the coefficients.
+        `slopes` (p, c) are their derivatives by the coefficients.
         """
         moved: Array = (np.abs(self.pulls @ slopes.T) * self.misfit.excess[:, None]).sum(
             axis=(0, 1)
@@ -185,20 +184,20 @@ class WindowFit:
 
     def _white(self) -> Array:
         """Standard deviation (q,) of the white part of residuals, from their differences."""
+        windows = [*zip(self._split(self.residuals), self._split(self.quantity), strict=True)]
         white = []
         for number in range(len(self.noise)):
-            steps = [
-                np.diff(r[quantity == number])
-                for r, quantity in zip(
-                    self._split(self.residuals), self._split(self.quantity), strict=True
-                )
-            ]
-            white.append(MEDIAN * np.median(np.abs(np.concatenate(steps))) / np.sqrt(2))
+            steps = np.concatenate([np.diff(r[quantity == number]) for r, quantity in windows])
+            white.append(MEDIAN * np.median(np.abs(steps)) / np.sqrt(2))
         return np.maximum(white, ROUNDING)
 
     @cached_property
     def _weights(self) -> Array:
         return _weights(self.residuals)
+
+    def _by_window(self, function: Callable[..., Array], *rows: NDArray[Any]) -> Array:
+        """Function of each window's part of some arrays of rows (n, ...)."""
+        return np.stack([function(*w) for w in zip(*map(self._split, rows), strict=True)])
 
     def _split(self, rows: NDArray[Any]) -> list[NDArray[Any]]:
         return np.split(rows, self.ends[:-1])

@@ -5,7 +5,7 @@ Each is an integrator of the printed system, with one reading of it.
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from climber_uk.paper.consistent import PAPER_PATH
 from climber_uk.paper.motion import (
     COARSE_TOLERANCE,
     DEFAULT_TOLERANCE,
+    DURATION,
     START,
     Derivative,
     dormand_prince,
@@ -24,50 +25,15 @@ from climber_uk.paper.printed import GAINS, PrintedSystem
 
 COLUMNS = ("attempt", "(26) x [m]", "(26) y [m]", "(30) x [m]", "(30) y [m]")
 # ode45 gives four points a step by default, three of them interpolated.
-INTERPOLATED = np.linspace(0, 20, 2001)
+INTERPOLATED = np.linspace(0, DURATION, 2001)
 MAX_EVALUATIONS = 10_000  # a multiple of what any attempt needs that ends
 
-Integrator = Callable[[Derivative], tuple[Array, Array]]
-
-
-def _coarse(derivative: Derivative) -> tuple[Array, Array]:
-    return dormand_prince(derivative, COARSE_TOLERANCE)
-
-
-def _default(derivative: Derivative) -> tuple[Array, Array]:
-    return dormand_prince(derivative, DEFAULT_TOLERANCE)
-
-
-def _interpolated(derivative: Derivative) -> tuple[Array, Array]:
-    return dormand_prince(derivative, DEFAULT_TOLERANCE, times=INTERPOLATED)
-
-
-@dataclass(frozen=True)
-class FixedStep:
-    """Integrator with a fixed step."""
-
-    method: Callable[[Derivative, float], tuple[Array, Array]]
-    step: float  # [s]
-
-    def __call__(self, derivative: Derivative) -> tuple[Array, Array]:
-        """Times (n,) and y (n, 6) of a derivative."""
-        return self.method(derivative, self.step)
-
-
-@dataclass(frozen=True)
-class FromYawRate:
-    """The default integrator from another yaw rate than the printed -6/10."""
-
-    yaw_rate: float  # [rad/s]
-
-    def __call__(self, derivative: Derivative) -> tuple[Array, Array]:
-        """Times (n,) and y (n, 6) of a derivative."""
-        return dormand_prince(derivative, DEFAULT_TOLERANCE, np.array([*START[:5], self.yaw_rate]))
+Integrator = Callable[[Derivative], tuple[Array, Array]]  # times (n,) [s] and y (n, 6)
 
 
 def explicit_euler(derivative: Derivative, step: float) -> tuple[Array, Array]:
     """Times (n,) and y (n, 6) by Euler's method with a fixed step [s]."""
-    times = np.arange(round(20 / step) + 1) * step
+    times = np.arange(round(DURATION / step) + 1) * step
     y = [START]
     for time in times[:-1]:
         y.append(y[-1] + step * derivative(time, y[-1]))
@@ -86,18 +52,24 @@ def _limited(derivative: Derivative) -> Derivative:
     return limited
 
 
+def _from_yaw_rate(yaw_rate: float) -> Integrator:
+    """The default integrator, from another yaw rate [rad/s] than the printed -6/10."""
+    return partial(DEFAULT, start=np.array([*START[:5], yaw_rate]))
+
+
+DEFAULT = partial(dormand_prince, tolerance=DEFAULT_TOLERANCE)
 # By name: the reading of (8), and the integrator.
 ATTEMPTS: dict[str, tuple[str, Integrator]] = {
-    "tolerance 1e-3": ("real part", _coarse),
-    "tolerance 1e-3, absolute 1e-6": ("real part", _default),
-    "the same, interpolated": ("real part", _interpolated),
-    "yaw rate +6/10 at the start": ("real part", FromYawRate(0.6)),
-    "yaw rate 0 at the start": ("real part", FromYawRate(0.0)),
-    **{f"gain {name}": (name, _default) for name in GAINS if name != "real part"},
-    "explicit Euler, 10 ms": ("real part", FixedStep(explicit_euler, 0.01)),
-    "semi-implicit Euler, 10 ms": ("real part", FixedStep(semi_implicit_euler, 0.01)),
-    "semi-implicit Euler, 5 ms": ("real part", FixedStep(semi_implicit_euler, 0.005)),
-    "Runge-Kutta, 10 ms": ("real part", FixedStep(runge_kutta, 0.01)),
+    "tolerance 1e-3": ("real part", partial(dormand_prince, tolerance=COARSE_TOLERANCE)),
+    "tolerance 1e-3, absolute 1e-6": ("real part", DEFAULT),
+    "the same, interpolated": ("real part", partial(DEFAULT, times=INTERPOLATED)),
+    "yaw rate +6/10 at the start": ("real part", _from_yaw_rate(0.6)),
+    "yaw rate 0 at the start": ("real part", _from_yaw_rate(0.0)),
+    **{f"gain {name}": (name, DEFAULT) for name in GAINS if name != "real part"},
+    "explicit Euler, 10 ms": ("real part", partial(explicit_euler, step=0.01)),
+    "semi-implicit Euler, 10 ms": ("real part", partial(semi_implicit_euler, step=0.01)),
+    "semi-implicit Euler, 5 ms": ("real part", partial(semi_implicit_euler, step=0.005)),
+    "Runge-Kutta, 10 ms": ("real part", partial(runge_kutta, step=0.01)),
 }
 
 

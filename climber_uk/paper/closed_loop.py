@@ -29,11 +29,7 @@ def record() -> RecordedRun | str:
         command = [str(run_demo), "--config", str(config), "--output", str(output)]
         try:
             subprocess.run(
-                command,
-                check=True,
-                capture_output=True,
-                timeout=TIMEOUT,
-                preexec_fn=dies_with_me(),
+                command, check=True, capture_output=True, timeout=TIMEOUT, preexec_fn=dies_with_me()
             )
             return read_run(output / "bag")
         except subprocess.CalledProcessError as error:

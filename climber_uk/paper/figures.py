@@ -3,20 +3,17 @@
 In the paper's order and with its legends: -num integrated by (26), -num-M by (30), -the of (21).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 from climber_uk.paper.consistent import PAPER_PATH
 from climber_uk.paper.drift import Drift
 from climber_uk.paper.motion import PaperMotion
+from climber_uk.report.plotting import plt, saved
 
 AXES = ("x", "y")
 
@@ -45,72 +42,62 @@ def draw(name: str, plain: PaperMotion, corrected: PaperMotion, directory: Path)
         panel = sheet[row * height : (row + 1) * height, column * width : (column + 1) * width]
         paths.append(directory / f"figure_{number:02}_{name}.png")
         plt.imsave(paths[-1], panel)
-    return [*paths, _save(figure, directory / f"figures_{name}.png", SHEET_DPI)]
+    return [*paths, saved(figure, directory / f"figures_{name}.png", SHEET_DPI)]
 
 
-def _coordinate(index: int, modified: bool) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
-    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
-        motion = corrected if modified else plain
-        name, ending = AXES[index], "-num-M" if modified else "-num"
-        desired = PAPER_PATH.at(motion.time).pose[:, index]
-        axes.plot(motion.time, motion.pose[:, index], label=name + ending)
-        axes.plot(motion.time, desired, "--", label=f"{name}-the")
-        _label(axes, "t [s]", f"{name} [m]")
-
-    return draw_on
-
-
-def _error(index: int, compared: bool) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
-    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
-        name = AXES[index]
-        axes.plot(plain.time, plain.error[:, index], label=f"{name}-error")
-        if compared:
-            axes.plot(corrected.time, corrected.error[:, index], label=f"{name}-error-M")
-        _label(axes, "t [s]", f"{name} error [m]")
-
-    return draw_on
+def _coordinate(
+    index: int, modified: bool, axes: Axes, plain: PaperMotion, corrected: PaperMotion
+) -> None:
+    motion = corrected if modified else plain
+    name, ending = AXES[index], "-num-M" if modified else "-num"
+    desired = PAPER_PATH.at(motion.time).pose[:, index]
+    axes.plot(motion.time, motion.pose[:, index], label=name + ending)
+    axes.plot(motion.time, desired, "--", label=f"{name}-the")
+    _label(axes, "t [s]", f"{name} [m]")
 
 
-def _trajectory(modified: bool) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
-    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
-        if modified:
-            axes.plot(*corrected.pose[:, :2].T, label="modified numerical")
-            axes.plot(*plain.pose[:, :2].T, "--", label="numerical")
-        else:
-            axes.plot(*plain.pose[:, :2].T, label="numerical")
-            desired = PAPER_PATH.at(plain.time).pose
-            axes.plot(*desired[:, :2].T, "--", label="theoretical")
-        axes.set_aspect("equal", adjustable="datalim")
-        _label(axes, "x [m]", "y [m]")
-
-    return draw_on
+def _error(
+    index: int, compared: bool, axes: Axes, plain: PaperMotion, corrected: PaperMotion
+) -> None:
+    name = AXES[index]
+    axes.plot(plain.time, plain.error[:, index], label=f"{name}-error")
+    if compared:
+        axes.plot(corrected.time, corrected.error[:, index], label=f"{name}-error-M")
+    _label(axes, "t [s]", f"{name} error [m]")
 
 
-def _torques(
-    labels: tuple[str, str], of_wheels: bool
-) -> Callable[[Axes, PaperMotion, PaperMotion], None]:
-    def draw_on(axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
-        values = corrected.torques if of_wheels else corrected.drive_torques
-        for torque, label in zip(values.T, labels, strict=True):
-            axes.plot(corrected.time, torque, label=label, linewidth=1)
-        _label(axes, "t [s]", "torque [N m]")
+def _trajectory(modified: bool, axes: Axes, plain: PaperMotion, corrected: PaperMotion) -> None:
+    if modified:
+        axes.plot(*corrected.pose[:, :2].T, label="modified numerical")
+        axes.plot(*plain.pose[:, :2].T, "--", label="numerical")
+    else:
+        axes.plot(*plain.pose[:, :2].T, label="numerical")
+        desired = PAPER_PATH.at(plain.time).pose
+        axes.plot(*desired[:, :2].T, "--", label="theoretical")
+    axes.set_aspect("equal", adjustable="datalim")
+    _label(axes, "x [m]", "y [m]")
 
-    return draw_on
+
+def _torques(of_wheels: bool, axes: Axes, _: PaperMotion, corrected: PaperMotion) -> None:
+    values = corrected.torques if of_wheels else corrected.drive_torques
+    for torque, label in zip(values.T, ("TR", "TL") if of_wheels else ("Qc1", "Qc2"), strict=True):
+        axes.plot(corrected.time, torque, label=label, linewidth=1)
+    _label(axes, "t [s]", "torque [N m]")
 
 
 FIGURES = {
-    2: _coordinate(0, modified=False),
-    3: _coordinate(1, modified=False),
-    4: _error(0, compared=False),
-    5: _error(1, compared=False),
-    6: _trajectory(modified=False),
-    7: _coordinate(0, modified=True),
-    8: _coordinate(1, modified=True),
-    9: _error(0, compared=True),
-    10: _error(1, compared=True),
-    11: _trajectory(modified=True),
-    12: _torques(("Qc1", "Qc2"), of_wheels=False),
-    13: _torques(("TR", "TL"), of_wheels=True),
+    2: partial(_coordinate, 0, False),
+    3: partial(_coordinate, 1, False),
+    4: partial(_error, 0, False),
+    5: partial(_error, 1, False),
+    6: partial(_trajectory, False),
+    7: partial(_coordinate, 0, True),
+    8: partial(_coordinate, 1, True),
+    9: partial(_error, 0, True),
+    10: partial(_error, 1, True),
+    11: partial(_trajectory, True),
+    12: partial(_torques, False),
+    13: partial(_torques, True),
 }
 
 
@@ -132,7 +119,7 @@ def draw_drift(
     _label(axes[0], "Runge-Kutta, step [s]", "largest position error [m]")
     _label(axes[1], "Dormand-Prince, tolerance", "largest position error [m]")
     _label(axes[2], "t [s]", f"position error [m], step {1e3 * shown_step:g} ms")
-    return _save(figure, directory / "drift.png", 80)
+    return saved(figure, directory / "drift.png", 80)
 
 
 def draw_starts(runs: Mapping[str, Drift], directory: Path) -> Path:
@@ -142,16 +129,10 @@ def draw_starts(runs: Mapping[str, Drift], directory: Path) -> Path:
         axes.semilogy(run.time, run.error, label=method)
     axes.set_title("Start 0.1 m and 0.05 rad off the constraint", pad=44)
     _label(axes, "t [s]", "position error [m]")
-    return _save(figure, directory / "off_constraint.png", 80)
+    return saved(figure, directory / "off_constraint.png", 80)
 
 
 def _label(axes: Axes, x: str, y: str) -> None:
     axes.set(xlabel=x, ylabel=y)
     axes.grid(alpha=0.3)
     axes.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
-
-
-def _save(figure: Any, path: Path, dpi: int) -> Path:
-    figure.savefig(path, dpi=dpi)
-    plt.close(figure)
-    return path

@@ -20,7 +20,6 @@ START = np.array([0.0, 6.0, 0.0, 10.0, 0.0, -0.6])  # (q, v) as printed
 
 # Relative and absolute tolerance
 PRINTED_TOLERANCE = (1e-12, 1e-12)
-FINE_TOLERANCE = (1e-8, 1e-11)
 COARSE_TOLERANCE = (1e-3, 1e-3)
 DEFAULT_TOLERANCE = (1e-3, 1e-6)  # of SciPy's RK45, as of MATLAB's ode45
 

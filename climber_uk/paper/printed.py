@@ -28,34 +28,16 @@ def _through_root(M: Array) -> Array:
     return root @ _pseudo_inverse(B)
 
 
-def _real_part(M: Array) -> Array:
-    return np.real(_through_root(M))
-
-
-def _kept_complex(M: Array) -> Array:
-    return _through_root(M).astype(complex)
-
-
-def _modulus(M: Array) -> Array:
-    return np.abs(_through_root(M))
-
-
-def _without_root(M: Array) -> Array:
-    return np.linalg.pinv(transpose(np.linalg.solve(transpose(M), A.T)))
-
-
-def _least_force(M: Array) -> Array:
-    return A.T @ np.linalg.pinv(A @ np.linalg.solve(M, A.T))
-
-
 # What Qc = gain · (b - A a) may mean when M is not symmetric. For a mass, all but (A M⁻¹)⁺, the
 # least Qc in its plain norm, are the same.
 GAINS: dict[str, Callable[[Array], Array]] = {
-    "real part": _real_part,  # A q̈ = b still holds, A and b being real
-    "kept complex": _kept_complex,  # as solvers that take complex states would go on
-    "modulus": _modulus,
-    "(A M⁻¹)⁺": _without_root,
-    "Aᵀ (A M⁻¹ Aᵀ)⁺": _least_force,
+    # A q̈ = b still holds, A and b being real
+    "real part": lambda M: np.real(_through_root(M)),
+    # as solvers that take complex states would go on
+    "kept complex": lambda M: _through_root(M).astype(complex),
+    "modulus": lambda M: np.abs(_through_root(M)),
+    "(A M⁻¹)⁺": lambda M: np.linalg.pinv(transpose(np.linalg.solve(transpose(M), A.T))),
+    "Aᵀ (A M⁻¹ Aᵀ)⁺": lambda M: A.T @ np.linalg.pinv(A @ np.linalg.solve(M, A.T)),
 }
 
 
@@ -79,11 +61,11 @@ class PrintedSystem:
         """M (..., 3, 3) of (19)."""
         heading = unpack(q)[2]
         r, m = self.climber.wheel_radius, self.climber.mass
-        turning = self.climber.yaw_inertia * r / self.climber.half_track
+        inertia = self.climber.yaw_inertia * r / self.climber.half_track
         cosine, sine, zero = np.cos(heading), np.sin(heading), 0 * heading
         M = [
             [m * r * cosine, m * r * sine, zero],
-            [zero, zero, zero + turning],
+            [zero, zero, zero + inertia],
             [sine, -cosine, zero],
         ]
         return np.moveaxis(np.array(M), (0, 1), (-2, -1))

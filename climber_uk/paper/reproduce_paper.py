@@ -54,7 +54,7 @@ def comparison(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
         table.row("consistent τ(t), plant open-loop, RK4 5 ms", results["open loop",]),
         table.row("closed loop through the nodes", results.get(("nodes",), "left out by --quick")),
     ]
-    return [table.PRINTED_UNCORRECTED, table.PRINTED_CORRECTED, *(row.cells for row in rows)]
+    return [table.PRINTED_UNCORRECTED, table.PRINTED_CORRECTED, *rows]
 
 
 def drift_cells(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
@@ -81,10 +81,7 @@ def drift_cells(results: Results, extent: StudyExtent) -> list[tuple[str, ...]]:
 
 
 def write(
-    pool: ProcessPoolExecutor,
-    results: Results,
-    extent: StudyExtent,
-    directory: Path,
+    pool: ProcessPoolExecutor, results: Results, extent: StudyExtent, directory: Path
 ) -> list[Path]:
     """Write all tables and figures, and print the tables."""
     sets = {"as_printed": "as printed", "as_printed_euler": "euler", "consistent": "consistent"}

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -58,8 +59,12 @@ QUICK = StudyExtent(
 
 def printed(corrected: bool, tolerance: tuple[float, float]) -> motion.PaperMotion:
     """Motion of the printed system, by Dormand and Prince."""
+    return _printed(corrected, partial(motion.dormand_prince, tolerance=tolerance))
+
+
+def _printed(corrected: bool, integrate: attempts.Integrator) -> motion.PaperMotion:
     derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
-    return motion.printed_motion(PRINTED, corrected, *motion.dormand_prince(derivative, tolerance))
+    return motion.printed_motion(PRINTED, corrected, *integrate(derivative))
 
 
 def coarse(corrected: bool) -> motion.PaperMotion | str:
@@ -72,10 +77,7 @@ def coarse(corrected: bool) -> motion.PaperMotion | str:
 
 def euler(corrected: bool) -> motion.PaperMotion:
     """Motion of the printed system, by semi-implicit Euler steps of 10 ms."""
-    derivative = PRINTED.corrected if corrected else PRINTED.uncorrected
-    return motion.printed_motion(
-        PRINTED, corrected, *motion.semi_implicit_euler(derivative, step=0.01)
-    )
+    return _printed(corrected, partial(motion.semi_implicit_euler, step=0.01))
 
 
 def consistent(corrected: bool, tolerance: tuple[float, float]) -> motion.PaperMotion:

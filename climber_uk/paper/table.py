@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -33,32 +33,18 @@ PRINTED_CORRECTED = (
 )
 
 
-@dataclass(frozen=True)
-class ComparisonRow:
-    """Numbers of a motion, in the order of `COLUMNS`; None where it has none."""
-
-    name: str
-    numbers: tuple[float | None, ...]
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Numbers as text, in the order of `COLUMNS`."""
-        return self.name, *("" if n is None else f"{n:.3g}" for n in self.numbers)
-
-
-def row(name: str, motion: PaperMotion | RecordedRun | str) -> ComparisonRow:
-    """Row of a motion, or of a message why there is none."""
+def row(name: str, motion: PaperMotion | RecordedRun | str) -> tuple[str, ...]:
+    """Cells of a motion, or of a message why there is none, in the order of `COLUMNS`."""
     if isinstance(motion, str):
-        return ComparisonRow(f"{name}: {motion}", (None,) * (len(COLUMNS) - 1))
+        return f"{name}: {motion}", *[""] * (len(COLUMNS) - 1)
     if isinstance(motion, RecordedRun):  # a bag holds no accelerations, and so no third component
         error: Array = (motion.pose - motion.reference)[:, :2]
         third = None
     else:
         error, third = motion.error, _largest(motion.third)
-    errors = (n for axis in error.T for n in _error_numbers(motion.time, axis))
-    return ComparisonRow(
-        name, (*errors, _largest(motion.side_slip), third, _largest(motion.torques))
-    )
+    ends = ((_largest(e), float(np.abs(e[-1])), growth(motion.time, e)) for e in error.T)
+    numbers = *chain(*ends), _largest(motion.side_slip), third, _largest(motion.torques)
+    return name, *("" if n is None else f"{n:.3g}" for n in numbers)
 
 
 def growth(time: Array, error: Array) -> float:
@@ -75,10 +61,6 @@ def write(
     with paths[1].open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([columns, *rows])
     return paths
-
-
-def _error_numbers(time: Array, error: Array) -> tuple[float, float, float]:
-    return _largest(error), float(np.abs(error[-1])), growth(time, error)
 
 
 def _largest(values: Array) -> float:

@@ -1,4 +1,4 @@
-"""The parameter files among a process's arguments, for one of its nodes."""
+"""The parameter files among a process's arguments, and what they have for one of its nodes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise

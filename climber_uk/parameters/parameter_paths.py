@@ -1,8 +1,9 @@
 """Paths in parameter files: relative to the parameter file, not to the working directory."""
 
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
+
+from climber_uk.parameters.parameter_files import paths
 
 
 def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
@@ -17,7 +18,7 @@ def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
     from climber_uk.parameters.parameter_file import read_file  # with yaml, which is slow to import
 
     found = path
-    for file in _parameter_files(arguments):
+    for file in paths(arguments):
         try:
             values = read_file(file, node)
         except (OSError, ValueError):  # not a file for this node
@@ -25,8 +26,3 @@ def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
         if values.get(name) in (path, str(file.parent / path)):
             found = str(file.parent / path)
     return found
-
-
-def _parameter_files(arguments: Sequence[str]) -> list[Path]:
-    pairs = itertools.pairwise(arguments)
-    return [Path(file) for option, file in pairs if option == "--params-file"]

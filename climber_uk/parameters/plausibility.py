@@ -1,4 +1,4 @@
-"""Doubt about implausible values: most are in another unit than the parameter's."""
+"""Warnings about implausible values: most are in another unit than the parameter's."""
 
 import dataclasses
 import math

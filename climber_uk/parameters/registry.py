@@ -71,7 +71,7 @@ def _others(group: str) -> Collection[Any]:
 
 @cache
 def _are_there_any() -> bool:
-    """Whether an installed package has entry points for this one; told in 2 ms."""
+    """Whether an installed package has entry points for this one; takes 2 ms."""
     for place in sys.path:
         with suppress(OSError), os.scandir(place or ".") as items:
             for item in items:

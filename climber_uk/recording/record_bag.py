@@ -177,7 +177,7 @@ class BagRecorder(Node):
             self.subscribe(name, recorded.type_name, request)
 
     def introduce(self, name: str) -> None:
-        """Add a topic to the bag, with its publishers' offers, unless it is in it."""
+        """Add a topic to the bag, with its publishers' offers, unless the bag has it."""
         if name not in self.bag:
             type_name = self.recorded[name].type_name
             offers = [to_metadata(qos) for qos in self.offers(name, type_name)]

@@ -1,7 +1,7 @@
-"""The controller over a bag: what it would have answered to what it was told.
+"""The controller over a bag: what it would have answered to the recorded inputs.
 
-After each answer it is made to believe that the recorded torques were sent, for it is these that
-moved the climber: every answer is one to the run as it was, whatever the parameters are.
+After each answer its history of torques gets the recorded torques in place of its own, as it was
+these that moved the climber: every answer is one to the run as it was, whatever the parameters are.
 """
 
 from collections import deque
@@ -11,7 +11,7 @@ from typing import Any
 
 from climber_uk.bags.bag import Bag
 from climber_uk.bags.publishing_order import read_published
-from climber_uk.bags.topics import types_of
+from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
@@ -33,9 +33,9 @@ Choose = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
 
 class Replay:
-    """A `Controller` that is told what the node was told; times are integers in nanoseconds.
+    """A `Controller` with the inputs that the node had; times are integers in nanoseconds.
 
-    `choose` makes the parameters of those that were in force.
+    `choose` returns the parameters to use, given those that were in force.
     """
 
     def __init__(self, recorded: RecordedController, namespace: str, choose: Choose) -> None:
@@ -54,51 +54,52 @@ class Replay:
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
-        """Parameters that are others than in the bag: there, and here."""
-        told = self.recorded.parameters or {}
-        here = self.choose(told)
+        """Parameters that differ from those in the bag: the value there, and here."""
+        there = self.recorded.parameters or {}
+        here = self.choose(there)
         pairs = {
-            name: (told.get(name), here.get(name, default)) for name, default in DEFAULTS.items()
+            name: (there.get(name), here.get(name, default)) for name, default in DEFAULTS.items()
         }
         return {name: (was, now) for name, (was, now) in pairs.items() if was != now}
 
-    def run(self, bag: Bag, namespace: str, is_published: bool) -> None:
-        """Answer all of a bag; raises as `RecordedController` does.
+    def run(self, bag: Bag, namespace: str, by_publishing: bool) -> None:
+        """Answer all odometry of a bag; raises as `RecordedController` does.
 
-        Messages, not arrays: one by one they go through the reading that the node has.
+        Messages, not arrays, are read: the functions that read them are those of the node.
         """
-        odometry, reference = f"{namespace}/{ODOMETRY}", f"{namespace}/{REFERENCE}"
-        missing = {odometry, reference}
-        takers = {
+        callbacks = {
             CLOCK: self.on_clock,
-            odometry: self.on_odometry,
-            reference: self.on_reference,
-            f"{namespace}/{PRESSURE}": self.on_pressure,
-            f"{namespace}/{TORQUES}": self.on_torques,
+            ODOMETRY: self.on_odometry,
+            REFERENCE: self.on_reference,
+            PRESSURE: self.on_pressure,
+            TORQUES: self.on_torques,
         }
-        for topic, at, message in read_published(bag, types_of(takers), is_published):
+        names = {Topics().full(name, namespace): name for name in callbacks}
+        missing = {topic for topic, name in names.items() if name in (ODOMETRY, REFERENCE)}
+        types = {topic: TYPES[name] for topic, name in names.items()}
+        for topic, at, message in read_published(bag, types, by_publishing):
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
-            takers[topic](at, message)
+            callbacks[names[topic]](at, message)
         if missing:
             raise ValueError(f"{bag.path} has no message on {' and '.join(sorted(missing))}")
 
     def pass_time(self, now: int) -> None:
-        """Let the clock be a time of the wall clock, unless time is simulated; never go back."""
+        """Set the node's clock to a time of the wall clock, unless time is simulated or later."""
         if not self.recorded.simulated:
             self.clock = max(self.clock, now)
 
     def look_until(self, at: int) -> None:
-        """Look, at the node's intervals of the wall clock, whether inputs have stopped."""
+        """Check whether inputs have stopped, as the node's timer does by the wall clock."""
         self.looked = max(self.looked or at, at - MOST_LOOKS * self.look_period)
         while self.looked + self.look_period <= at:
             self.looked += self.look_period
             self.pass_time(self.looked)
-            self.keep(self.controller.look(self.clock))
+            self.record(self.controller.look(self.clock))
 
     def on_clock(self, _: int, message: Any) -> None:
-        """Keep the simulated time."""
+        """Set the clock to the simulated time."""
         self.clock = reading.nanoseconds(message.clock)
 
     def on_odometry(self, _: int, message: Any) -> None:
@@ -106,26 +107,26 @@ class Replay:
         stamp = reading.nanoseconds(message.header.stamp)
         answered = self.recorded.published.get(stamp)
         if answered is not None:
-            self.set(answered)
-            self.pass_time(answered)  # it looked at its clock right before
+            self.apply_settings(answered)
+            self.pass_time(answered)  # the node reads its clock right before it publishes
         try:
             state = reading.state(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
-            self.keep(self.controller.on_bad_odometry(self.clock, str(error)))
+            self.record(self.controller.on_bad_odometry(self.clock, str(error)))
             return
-        self.keep(self.controller.on_odometry(self.clock, stamp, state))
+        self.record(self.controller.on_odometry(self.clock, stamp, state))
 
     def on_reference(self, _: int, message: Any) -> None:
-        """Keep a reference, unless it is one that the node refuses."""
+        """Pass on a reference, unless the node refuses such a one."""
         try:
             preview = references.preview(message, self.names.odom_frame)
             preview.check_heading()
         except ValueError:
             return
-        self.keep(self.controller.on_reference(self.clock, preview))
+        self.record(self.controller.on_reference(self.clock, preview))
 
     def on_pressure(self, _: int, message: Any) -> None:
-        """Take the measured pressure into the model, unless it is one that the node refuses."""
+        """Put the measured pressure into the model, unless the node refuses such a one."""
         try:
             pressure = reading.pressure(message)
         except ValueError:
@@ -135,13 +136,13 @@ class Replay:
             self.retune()
 
     def on_torques(self, at: int, message: Any) -> None:
-        """Look when the node did, and answered an odometry once more."""
+        """Check inputs when the node's timer did: torques that answer an odometry once more."""
         if at != self.recorded.published.get(reading.nanoseconds(message.header.stamp)):
-            self.set(at)
-            self.keep(self.controller.look(self.clock))
+            self.apply_settings(at)
+            self.record(self.controller.look(self.clock))
 
-    def set(self, at: int) -> None:
-        """Set what others had set before the torques of some time were published."""
+    def apply_settings(self, at: int) -> None:
+        """Apply the settings that were in force for the torques published at a time."""
         while self.settings and self.settings[0][0] <= at:
             _, setting = self.settings.popleft()
             self.controller.enable(setting.enabled)
@@ -149,11 +150,11 @@ class Replay:
             self.retune()
 
     def retune(self) -> None:
-        """Follow as the parameters, and the measured pressure, say now."""
+        """Give the controller the present parameters, and the measured pressure."""
         self.controller.retune(settings(self.parameters, self.pressure))
 
-    def keep(self, answer: Answer | None) -> None:
-        """Keep the mode and the first answer to an odometry; go on from what was sent."""
+    def record(self, answer: Answer | None) -> None:
+        """Record the mode, and the first answer to an odometry, which the sent torques replace."""
         mode = self.controller.mode.value
         if not self.modes or mode != self.modes[-1][1]:
             self.modes.append((self.clock, mode))

@@ -1,6 +1,6 @@
 """`replay_controller BAG`: what the controller would answer to a recorded run, beside what it did.
 
-With other parameters it tells what these would change; with the same ones, nothing.
+With other parameters this is what they would change; with the same ones there is no difference.
 """
 
 import argparse
@@ -10,20 +10,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
-
 from climber_uk.bags.bag import open_bag
-from climber_uk.bags.publishing_order import are_known
+from climber_uk.bags.joints import WHEELS
+from climber_uk.bags.publishing_order import has_publishing_times
 from climber_uk.bags.topics import Topics
 from climber_uk.messages.topics import CLOCK, CONTROLLER, PARAMETERS
 from climber_uk.parameters.parameter_file import read_argument, read_file
 from climber_uk.replay.recorded_controller import TOPICS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
 from climber_uk.replay.torque_comparison import (
-    WHEELS,
     Comparison,
     compare,
     summary,
@@ -31,6 +26,7 @@ from climber_uk.replay.torque_comparison import (
     write_csv,
 )
 from climber_uk.report.outputs import output, printable
+from climber_uk.report.plotting import plt, saved
 from climber_uk.system.command_line import Parser, between
 
 
@@ -43,27 +39,27 @@ def replayed(options: argparse.Namespace) -> Comparison:
         if name not in DEFAULTS:
             raise ValueError(f"{name} is not a parameter of the control law")
 
-    def choose(told: Mapping[str, Any]) -> dict[str, Any]:
-        return {**(told if file is None else file), **given}
+    def choose(recorded: Mapping[str, Any]) -> dict[str, Any]:
+        return {**(recorded if file is None else file), **given}
 
     topics = [Topics().full(name, namespace) for name in (*TOPICS, CLOCK)]
     with open_bag(options.bag) as bag:
-        is_published = are_known(bag, topics)
-        recorded = RecordedController(bag, namespace, is_published, file)
+        by_publishing = has_publishing_times(bag, topics)
+        recorded = RecordedController(bag, namespace, by_publishing, file)
         if recorded.parameters is None and file is None:
             raise ValueError(
                 f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
             )
         for loss in bag.losses:
             print(printable(f"replay_controller: {options.bag}: {loss}"), file=sys.stderr)
-        if not is_published:
+        if not by_publishing:
             print(
                 f"replay_controller: {options.bag} does not tell when messages were published: "
                 "they are taken in the order of their arrival at the recorder",
                 file=sys.stderr,
             )
         replay = Replay(recorded, namespace, choose)
-        replay.run(bag, namespace, is_published)
+        replay.run(bag, namespace, by_publishing)
     return compare(recorded, replay)
 
 
@@ -80,8 +76,7 @@ def draw(found: Comparison, path: Path) -> None:
     for axis in axes:
         axis.grid(alpha=0.3)
         axis.legend(loc="upper right")
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    saved(figure, path, 120)
 
 
 def main() -> None:

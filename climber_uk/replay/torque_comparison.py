@@ -1,4 +1,4 @@
-"""Torques that were recorded beside those of a replay, in numbers."""
+"""Recorded torques compared with those of a replay, in numbers."""
 
 import csv
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from climber_uk.bags.connection import one_line
+from climber_uk.bags.joints import WHEELS
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.replay.recorded_controller import Modes, RecordedController
 from climber_uk.replay.replay import Replay
 
-WHEELS = "right", "left"
 ROUNDING = 1e-9  # [N m] within which a torque is at its limit
 
 
@@ -63,7 +63,7 @@ def compare(recorded: RecordedController, replay: Replay) -> Comparison:
 
 
 def summary(found: Comparison) -> dict[str, Any]:
-    """All numbers, those of the wheels right and left; times are since the first odometry."""
+    """All numbers, as for JSON: [right, left] of the wheels, times since the first stamp."""
 
     def rms(torques: Array) -> list[float]:
         return np.sqrt(np.mean(torques**2, axis=0)).tolist()

@@ -22,21 +22,21 @@ Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
 
 
 def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[str]]:
-    """Poses of each run by the names of their files, and what is to be said of the bag.
+    """Poses of each run by the names of their files, and the bag's losses.
 
     Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
     """
     reader, found = RunReader.read(bag, Topics(), namespace)
     topic = reader.topic(ODOMETRY)
-    if not found.parts[ODOMETRY]:
+    if not found.samples[ODOMETRY]:
         raise ValueError("; ".join([f"{bag} has no message on {topic}", *reader.bag.losses]))
     runs = []
-    for part in reader.parts(found):
+    for part in reader.split(found):
         try:
             reader.check_agreement(part)
         except NoRunError as error:
             raise ValueError(f"{bag}: {error}") from None
-        odometry, truth = (reader.recorded(part, name) for name in (ODOMETRY, TRUTH))
+        odometry, truth = (reader.series(part, name) for name in (ODOMETRY, TRUTH))
         reference = reader.reference(part, odometry.stamps)
         known = np.isfinite(reference[:, 0])
         poses = {
@@ -51,7 +51,7 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
 
 
 def lines(poses: Poses) -> str:
-    """Poses as lines of a TUM trajectory, to the last bit."""
+    """Poses as lines of a TUM trajectory; numbers are written so that they read back exactly."""
     return "".join(
         f"{stamp // SECOND}.{stamp % SECOND:09} {x!r} {y!r} 0 "
         f"0 0 {math.sin(heading / 2)!r} {math.cos(heading / 2)!r}\n"

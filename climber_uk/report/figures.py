@@ -1,15 +1,10 @@
-"""Runs in pictures, one over the other."""
+"""Figures of runs, their curves over each other."""
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from io import BytesIO
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -17,9 +12,11 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from climber_uk.bags.connection import one_line
 from climber_uk.bags.events import ERROR, OK
 from climber_uk.bags.run import RecordedRun
+from climber_uk.bags.time_series import TimeSeries
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 from climber_uk.messages import topics
+from climber_uk.report.plotting import plt
 
 Curves = tuple[Array, Array]  # times (n,) [s] and values (n, k)
 WIDTH = 9.0  # [in]
@@ -41,7 +38,7 @@ Runs = Sequence[tuple[str, RecordedRun]]
 
 
 def draw(runs: Runs) -> dict[str, bytes]:
-    """Figures of some named runs as PNG, by name; without those for which nothing is known."""
+    """Figures of named runs as PNG, by name, without those that would be empty."""
     with plt.rc_context(STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", category=UserWarning)  # letters without a glyph, no room
         shown = [(one_line(name), run) for name, run in runs]
@@ -120,8 +117,8 @@ def _modes(runs: Runs) -> Figure:
             waits = mode.level == OK and mode.text != Mode.FOLLOWING.value
             colour = "0.75" if waits else COLOURS[mode.level]
             axes.broken_barh([(begin, end - begin)], (row - 0.3, 0.6), color=colour)
-        told = [time for time, event in run.events if event.kind != "mode" and event.level]
-        axes.plot(told, [row] * len(told), "v", color="black", markersize=5)
+        warned = [time for time, event in run.events if event.kind != "mode" and event.level]
+        axes.plot(warned, [row] * len(warned), "v", color="black", markersize=5)
     axes.set_yticks(range(len(runs)), [label for label, _ in runs])
     axes.set_ylim(len(runs) - 0.5, -0.5)
     axes.set(xlabel="time [s]")
@@ -145,20 +142,8 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
     return np.repeat(time[begins], 2), np.stack([low, high], axis=1).ravel()
 
 
-def _torques(run: RecordedRun) -> Curves:
-    return run.seconds(run.commands), run.torques
-
-
-def _latency(run: RecordedRun) -> Curves:
-    return run.seconds(run.commands), 1e3 * run.latency[:, None]
-
-
-def _recorded(name: str, run: RecordedRun) -> Curves:
-    return run.seconds(run.recorded[name]), run.recorded[name].values
-
-
-def _margins(run: RecordedRun) -> Curves:
-    return run.seconds(run.hold), run.margins
+def _all_of(run: RecordedRun, series: TimeSeries) -> Curves:
+    return run.seconds(series), series.values
 
 
 CURVES: dict[str, tuple[str, Sequence[str], Callable[[RecordedRun], Curves]]] = {
@@ -167,12 +152,24 @@ CURVES: dict[str, tuple[str, Sequence[str], Callable[[RecordedRun], Curves]]] = 
         ("along-track [mm]", "cross-track [mm]", "heading [mrad]"),
         lambda run: (run.time, 1e3 * run.error),
     ),
-    "torques": ("Wheel torques", ("right [N m]", "left [N m]"), _torques),
+    "torques": (
+        "Wheel torques",
+        ("right [N m]", "left [N m]"),
+        lambda run: _all_of(run, run.commands),
+    ),
     "constraint_force": (
         "Udwadia-Kalaba constraint force, in the climber's frame",
         ("drive [N]", "lateral [N]", "about z [N m]"),
-        partial(_recorded, topics.FORCE),
+        lambda run: _all_of(run, run.recorded[topics.FORCE]),
     ),
-    "margins": ("Margins: below 1 it slips, it tips", ("slip margin", "tip margin"), _margins),
-    "latency": ("From an odometry's arrival to that of its torque", ("latency [ms]",), _latency),
+    "margins": (
+        "Margins: below 1 it slips, it tips",
+        ("slip margin", "tip margin"),
+        lambda run: (run.seconds(run.margins), run.margins.values[:, :2]),
+    ),
+    "latency": (
+        "From an odometry's arrival to that of its torque",
+        ("latency [ms]",),
+        lambda run: (run.seconds(run.commands), 1e3 * run.latency[:, None]),
+    ),
 }

@@ -1,4 +1,4 @@
-"""Where the tools that read a bag write, and how they print what others have written.
+"""Where the tools that read a bag write, and how they print the text of files safely.
 
 One rule for all: into the directory that `--output` names; else into a new one in the bag, or
 beside it if it is a single file. Nothing that was there before is overwritten then.
@@ -15,10 +15,10 @@ from climber_uk.bags.connection import one_line
 
 @contextmanager
 def output(bag: Path, name: str, given: Path | None) -> Iterator[Path]:
-    """Make the directory before the work begins; take it away if nothing comes into it.
+    """Make an output directory for a bag; remove it afterwards if it is empty.
 
-    It is `given`, or the first of `name`, `name_2`, … that is not there. Raises `OSError` of one
-    line if there is no bag, or if nobody can write there.
+    It is `given`, or the first of `name`, `name_2`, … that does not exist. Raises `OSError`, with a
+    message of one line, if there is no bag, or if it cannot be written into.
     """
     if not bag.exists():
         raise FileNotFoundError(f"there is no bag {one_line(str(bag))}")
@@ -34,7 +34,7 @@ def output(bag: Path, name: str, given: Path | None) -> Iterator[Path]:
 
 
 def new_directory(bag: Path, name: str) -> Path:
-    """Directory in a bag, or beside it, that is not there yet."""
+    """Directory in a bag, or beside a bag of one file, that does not exist yet."""
     first = bag / name if bag.is_dir() else bag.with_name(f"{bag.stem}_{name}")
     others = (first.with_name(f"{first.name}_{number}") for number in count(2))
     return first if not first.exists() else next(path for path in others if not path.exists())
@@ -53,5 +53,5 @@ def check_writable(directory: Path) -> None:
 
 
 def printable(text: str) -> str:
-    """Text in which nothing commands a terminal: what is not to be read is written out."""
+    """Text that is safe to print: control characters, other than new lines, are escaped."""
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)

@@ -1,4 +1,4 @@
-"""Runs as one page of HTML that needs nothing but itself: no network, no other file."""
+"""Runs as one page of HTML that is complete in itself: no network, no other file."""
 
 import math
 import re
@@ -21,14 +21,14 @@ TIME_LINE = "modes"
 
 
 def page(title: str, columns: Sequence[Column], figures: Mapping[str, bytes]) -> str:
-    """The page of some runs and their figures, PNG by name."""
+    """HTML of some runs, each a column, and of their figures, PNG by name."""
     return PAGE.substitute(
         title=escape(title),
         summaries="".join(map(_summary, columns)),
         losses="".join(map(_losses, columns)),
         modes="".join(_figure(name, figures[name]) for name in figures if name == TIME_LINE),
         figures="".join(_figure(name, figures[name]) for name in figures if name != TIME_LINE),
-        events="".join(map(_events, columns)) or "<p>Nothing was told.</p>",
+        events="".join(map(_events, columns)) or "<p>Nothing was reported.</p>",
         table=_table(columns),
         unknown=escape(", ".join(unknown(columns)) or "none"),
     )
@@ -54,7 +54,7 @@ def _summary(column: Column) -> str:
 
 
 def _tiles(column: Column) -> Iterable[tuple[str, str, str, str, int]]:
-    """Name, metric that has to be known, what matters most, what else does, and how bad it is."""
+    """Title, metric without which there is no tile, number, text below it, and level."""
     values, shown = column.values, column.shown
     is_settled = math.isfinite(values["settling_time"])
     settled = f"settled after {shown('settling_time')}" if is_settled else "not settled"
@@ -63,10 +63,7 @@ def _tiles(column: Column) -> Iterable[tuple[str, str, str, str, int]]:
     if math.isfinite(values["truth_rms_distance"]):
         main = f"{shown('truth_rms_distance')} RMS, truly"
         note = f"at most {shown('truth_max_distance')}; by the odometry {', '.join(by_odometry)}"
-    yield (
-        *("Tracking", "rms_distance", main, f"{note}; {settled}"),
-        OK if is_settled else WARNING,
-    )
+    yield (*("Tracking", "rms_distance", main, f"{note}; {settled}"), OK if is_settled else WARNING)
     yield (
         "Motors",
         "peak_torque",
@@ -116,17 +113,17 @@ def _figure(name: str, image: bytes) -> str:
 
 
 def _events(column: Column) -> str:
-    told = column.case.run.events
+    reported = column.case.run.events
     rows = "".join(
         f'<tr class="{LEVELS[event.level]}"><td class="number">{time:.3f} s</td>'
         f"<td>{escape(event.node)}</td><td>{event.kind}</td><td>{escape(event.text)}</td></tr>"
-        for time, event in told[:MOST_EVENTS]
+        for time, event in reported[:MOST_EVENTS]
     )
-    more = f"<p>{len(told) - MOST_EVENTS} more are in the JSON file.</p>"
+    more = f"<p>{len(reported) - MOST_EVENTS} more are in the JSON file.</p>"
     return (
         f"<h3>{escape(column.label)}</h3><table>{rows}</table>"
-        f"{more if len(told) > MOST_EVENTS else ''}"
-        if told
+        f"{more if len(reported) > MOST_EVENTS else ''}"
+        if reported
         else ""
     )
 

@@ -1,4 +1,4 @@
-"""The page of a report, without what it tells."""
+"""Template of a report's page."""
 
 from string import Template
 

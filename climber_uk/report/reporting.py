@@ -52,7 +52,7 @@ def parser(name: str, description: str | None) -> Parser:
         help="other name of a topic, as in odom:=/robot/odom; may be repeated",
     )
     made.add_argument(
-        "--params", type=Path, help="parameter file of the nodes (default: as the bag tells them)"
+        "--params", type=Path, help="parameter file of the nodes (default: those in the bag)"
     )
     made.add_argument(
         "--settled",
@@ -72,15 +72,15 @@ def parser(name: str, description: str | None) -> Parser:
     return made
 
 
-def _condition(said: str) -> Condition:
+def _condition(text: str) -> Condition:
     try:
-        return Condition.parse(said)
+        return Condition.parse(text)
     except ValueError as error:
         raise ArgumentTypeError(str(error)) from None
 
 
 def report(command: str, title: str, bags: Sequence[Path], options: Namespace) -> int:
-    """Print and write all that is to be told of some bags; return the exit status."""
+    """Print and write the metrics of some bags; return the exit status."""
     try:
         with output(bags[0], OUTPUTS[command], options.output) as directory:
             if options.figures:
@@ -103,7 +103,7 @@ def report(command: str, title: str, bags: Sequence[Path], options: Namespace) -
 def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
     names = Topics.parse(options.remap)
     columns: list[Column] = []
-    for bag, said in zip(bags, _short(bags), strict=True):
+    for bag, label in zip(bags, _labels(bags), strict=True):
         runs, losses = read_runs(
             bag,
             names,
@@ -112,7 +112,7 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
             all_of_them=bool(options.fail_if),
         )
         for run in runs:
-            parts = [part for part in (said, run.name, run.part) if part] or ["climber"]
+            parts = [part for part in (label, run.name, run.part) if part] or ["climber"]
             case = Case(run, settled=options.settled)
             base = columns[0] if columns and len(bags) > 1 else None
             columns.append(Column("/".join(parts), str(bag), case, losses, base))
@@ -125,8 +125,8 @@ def _parameters(file: Path, namespace: str) -> dict[str, Any]:
     return found
 
 
-def _short(bags: Sequence[Path]) -> list[str]:
-    """The last parts of paths, as many as it takes to tell them from each other; of one none."""
+def _labels(bags: Sequence[Path]) -> list[str]:
+    """Labels of bags: the last parts of their paths, as many as it takes; '' for a single bag."""
     if len(bags) == 1:
         return [""]
     paths = [bag.absolute().parts for bag in bags]

@@ -17,13 +17,13 @@ FORMULA = tuple("=+-@\t\r\n")  # with which a cell begins that spreadsheets woul
 
 @dataclass(frozen=True)
 class Column:
-    """A run, under a name that no other one of the table has."""
+    """A run in the table, under a label of its own."""
 
     label: str
     bag: str
     case: Case
-    losses: Sequence[str] = ()  # what of the bag could not be read
-    base: "Column | None" = None  # to which ratios are told
+    losses: Sequence[str] = ()  # a line on each thing in the bag that could not be read
+    base: "Column | None" = None  # whose values the ratios are to
 
     @cached_property
     def values(self) -> dict[str, float]:
@@ -31,7 +31,7 @@ class Column:
         return evaluate(self.case)
 
     def shown(self, name: str) -> str:
-        """A metric as it reads well."""
+        """A metric as text, with a unit prefix that suits its size."""
         factor, unit = prefix([self.values[name]], METRICS[name].unit)
         value = factor * self.values[name]
         return f"{number(value, 3 if abs(value) < 1000 else 6)} {unit}".rstrip()
@@ -39,7 +39,7 @@ class Column:
 
 @dataclass(frozen=True)
 class TableRow:
-    """A metric of all columns, in a unit in which it reads well."""
+    """A metric of all columns, as text in one unit with a prefix that suits them."""
 
     metric: Metric
     unit: str
@@ -48,12 +48,12 @@ class TableRow:
 
 
 def number(value: float, digits: int = 6) -> str:
-    """A number to be read."""
+    """A number as text; – for what is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else UNKNOWN
 
 
 def groups(columns: Sequence[Column]) -> Iterator[tuple[str, list[TableRow]]]:
-    """Titles and rows, without metrics that no run has."""
+    """Titles and rows of the groups of metrics, without those that are unknown of all runs."""
     for title, metrics in GROUPS.items():
         rows = [_row(metric, columns) for metric in metrics]
         if known := [row for row in rows if set(row.cells) != {UNKNOWN}]:
@@ -77,7 +77,7 @@ def _row(metric: Metric, columns: Sequence[Column]) -> TableRow:
 
 
 def ratio_heads(columns: Sequence[Column]) -> list[str]:
-    """What stands above the ratios."""
+    """Headings of the columns of ratios."""
     return [f"{column.label} / {column.base.label}" for column in columns if column.base]
 
 
@@ -101,7 +101,7 @@ def _aligned(line: Sequence[str], widths: Sequence[int], left: Sequence[int]) ->
 
 
 def unknown(columns: Sequence[Column]) -> list[str]:
-    """Names of the metrics that no run has, though some climber has what they are of."""
+    """Names of the metrics that are unknown of all runs, though they apply to a climber."""
     return [
         name
         for name, metric in METRICS.items()
@@ -120,9 +120,9 @@ def to_csv(columns: Sequence[Column]) -> str:
     return stream.getvalue()
 
 
-def plain(said: str) -> str:
+def plain(text: str) -> str:
     """Text that no spreadsheet takes for a formula."""
-    return f"'{said}" if said.startswith(FORMULA) else said
+    return f"'{text}" if text.startswith(FORMULA) else text
 
 
 def to_json(columns: Sequence[Column]) -> str:
@@ -144,12 +144,12 @@ def to_json(columns: Sequence[Column]) -> str:
 
 
 def _event(time: float, event: Any) -> dict[str, Any]:
-    told = {name: getattr(event, name) for name in ("node", "kind", "level", "text")}
-    return {"time": round(time, 6), **told}
+    values = {name: getattr(event, name) for name in ("node", "kind", "level", "text")}
+    return {"time": round(time, 6), **values}
 
 
 def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table, which reads well as text too."""
+    """Return a Markdown table with aligned columns."""
     widths = [max(map(len, column)) for column in zip(columns, *rows, strict=True)]
     lines = [columns, ["-" * width for width in widths], *rows]
     padded = (

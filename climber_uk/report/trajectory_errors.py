@@ -1,4 +1,4 @@
-"""Errors of a planar trajectory as the field defines them (Sturm et al. 2012).
+"""Absolute and relative pose errors of a planar trajectory (Sturm et al. 2012).
 
     absolute: Qᵢ⁻¹ Pᵢ        relative: (Qᵢ⁻¹ Qⱼ)⁻¹ (Pᵢ⁻¹ Pⱼ)
 
@@ -23,31 +23,12 @@ def absolute_errors(reference: Array, pose: Array) -> Array:
 def relative_errors(reference: Array, pose: Array, progress: Array, delta: float) -> Array:
     """Drifts [m] and [rad] (k, 2) over k stretches of `delta`, each from where the last one ended.
 
-    `progress` (n,) is the time [s] or the `way` [m], and `delta` in its unit.
+    `progress` (n,) rises: the time [s], or the way gone [m]; `delta` is in its unit.
     """
     ends = [0]
     while (end := np.searchsorted(progress, progress[ends[-1]] + delta - ROUNDING)) < len(pose):
         ends.append(int(end))
     return _sizes(_moves(pose[ends]) - _moves(reference[ends]))
-
-
-def way(pose: Array) -> Array:
-    """Length (n,) of the way to each of the poses (n, 3) [m]."""
-    steps = np.hypot(*np.diff(pose[:, :2], axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def aligned(reference: Array, pose: Array) -> Array:
-    """Poses (n, 3), moved as one so that their distances from the reference are least squares.
-
-    Umeyama (1991, doi 10.1109/34.88573), in the plane and without a scale.
-    """
-    middle, wanted = pose.mean(axis=0), reference.mean(axis=0)
-    (x, y, _), (x_d, y_d, _) = (pose - middle).T, (reference - wanted).T
-    turn = np.arctan2(np.sum(x * y_d - y * x_d), np.sum(x * x_d + y * y_d))
-    offset = pose - middle
-    ahead, beside = along(-turn, offset), across(-turn, offset)
-    return pack(wanted[0] + ahead, wanted[1] + beside, pose[:, 2] + turn)
 
 
 def _moves(pose: Array) -> Array:
@@ -57,5 +38,5 @@ def _moves(pose: Array) -> Array:
 
 
 def _sizes(error: Array) -> Array:
-    x, y, turn = unpack(error)
-    return pack(np.hypot(x, y), np.abs(wrapped(turn)))
+    x, y, angle = unpack(error)
+    return pack(np.hypot(x, y), np.abs(wrapped(angle)))

@@ -26,7 +26,7 @@ class Parser(argparse.ArgumentParser):
         )
 
     def arguments(self, given: Sequence[str] | None = None) -> argparse.Namespace:
-        """Options; from now on a reader of the output, as `head`, may end before this program."""
+        """Parsed options, with `~` in paths expanded; a closed output (of `head`) is no error."""
         out = sys.stdout
         if out is sys.__stdout__ and out is not None:
             binary = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
@@ -53,7 +53,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def between(least: float, most: float) -> Callable[[str], float]:
-    """For `type`: a number within bounds."""
+    """Return a function for `type` of `add_argument`: a number within bounds."""
 
     def read(text: str) -> float:
         try:
@@ -78,9 +78,9 @@ class _Version(argparse.Action):
 
 
 class _Output(io.FileIO):
-    """Drops what is written after its reader has gone, or the disk is full, which it says.
+    """Standard output that drops what cannot be written: its reader has gone, or the disk is full.
 
-    Files and exit status stay the same.
+    The latter is reported. Other files and the exit status are not affected.
     """
 
     def write(self, data: Any) -> int:

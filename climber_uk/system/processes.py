@@ -16,7 +16,7 @@ PR_SET_PDEATHSIG = 1
 
 
 def dies_with_me() -> Callable[[], None]:
-    """For `Popen`'s `preexec_fn`: has the child get SIGTERM when this process ends."""
+    """Return a `preexec_fn` for `Popen`, by which the child gets SIGTERM when this process ends."""
     return partial(_begin_child, os.getpid())
 
 

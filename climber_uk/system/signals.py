@@ -8,7 +8,7 @@ END = signal.SIGINT, signal.SIGTERM, signal.SIGHUP  # Ctrl-C, kill, and a termin
 
 
 class Interrupted(Exception):  # noqa: N818 - it is what happened, not a mistake
-    """A signal came."""
+    """A signal asked this process to end."""
 
 
 def on_end(handler: Callable[..., Any]) -> None:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bag_contents import read_messages
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.bags.bag_writer import BagWriter
 
 STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from bag_contents import read_messages
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import (
@@ -21,7 +22,6 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.bags.bag_writer import BagWriter
 
 ROOT = Path(__file__).parents[2]

@@ -31,7 +31,7 @@ def test_a_type_as_a_bag_defines_it_is_that_of_jazzy(name):
         ("string[4000000000] x", "an array of 4000000000"),
         ("string[20000] x", f"more than {MOST_FIELDS} fields"),
         ("float64[4000000000] x", "an array of 4000000000"),
-        ("B b", "it does not tell a/msg/B"),
+        ("B b", "it does not define a/msg/B"),
         ("{ no definition", "it cannot be parsed"),
         ("int8 x\nint8 x", "it cannot be parsed"),
         ("int8 x\n" + LINE + "\nMSG: a/class\nint8 import", "."),

@@ -22,7 +22,7 @@ RUN = 100
 def contents(bag):
     """Log time, topic and data of all that is read, and what was said."""
     with open_bag(bag) as opened:
-        read = [(at, c.topic, data) for c, at, data in opened.raw_messages(opened.types)]
+        read = [(at, c.topic, data) for c, at, _, data in opened.recorded(opened.types)]
         return read, "; ".join(loss for loss in opened.losses if loss != NO_METADATA)
 
 

@@ -1,6 +1,7 @@
 """Wheels among other joints: found by their names, or refused in words."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,7 +123,7 @@ def test_what_does_not_tell_of_the_wheels_is_refused_in_words(tmp_path, states, 
     (line,) = said
     assert line.startswith("/joint_states: ")
     assert why in line
-    got = evaluate(Case(run, Climber()))
+    got = evaluate(Case(replace(run, parameters=vars(Climber()))))
     assert got["mean_power_right"] == pytest.approx((RADIUS * RATE + 0.3 * RATE) / 0.027)
     assert math.isnan(evaluate(Case(run))["mean_power_right"])  # the radius is not known
 

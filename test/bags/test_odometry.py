@@ -1,6 +1,7 @@
 """Odometry that is odd: what of it is used, and what is left out, with its reason."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ from hypothesis import strategies as st
 from made_bag import ODOMETRY, RADIUS, RATE, SECOND, STORE, Made, a_run, turn
 
 from climber_uk.bags.batches import decode
+from climber_uk.bags.extraction import FAULTS, heading
 from climber_uk.bags.recorded_run import read_runs
-from climber_uk.bags.taking import FAULTS, heading
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.reading import heading_of
@@ -193,7 +194,7 @@ def test_without_a_twist_speeds_are_those_of_the_poses(tmp_path, value):
     made = pose_only(value=value)
     made.add_torques()
     (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
-    got = evaluate(Case(run, Climber()))
+    got = evaluate(Case(replace(run, parameters=vars(Climber()))))
     assert said == []
     np.testing.assert_allclose(run.rates, np.tile([1.0, 0.0, RATE], (400, 1)), atol=1e-3)
     assert got["travelled"] == pytest.approx(RADIUS * RATE * 399 * 0.005, rel=1e-4)

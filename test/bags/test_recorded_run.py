@@ -8,7 +8,7 @@ from made_bag import ODOMETRY, SECOND, START, STORE, Made, a_run, on_circle, wri
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from climber_uk.bags.recorded_run import read_run, read_runs
-from climber_uk.bags.reference import Points, poses_at
+from climber_uk.bags.reference import Previews, poses_at
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview, joined
@@ -136,7 +136,7 @@ def test_the_reference_is_that_of_the_joined_previews():
     stamps = random.integers(times[0, 0], times[-1, -1], 200)
     expected = [whole.at(int(stamp)).pose for stamp in stamps]
     shuffled = random.permutation(8)
-    points = Points(shuffled, times[shuffled], motion[shuffled])
+    points = Previews(shuffled, times[shuffled], motion[shuffled])
     np.testing.assert_allclose(poses_at([points], stamps), expected, atol=1e-11)
     outside = poses_at([points], np.array([times[0, 0] - 1, times[-1, -1] + 1]))
     assert np.isnan(outside).all()

@@ -7,7 +7,7 @@ import pytest
 from driven import CLIMBER, START, arrived, evidence, odometry, tried
 
 from climber_uk.driver_check import checks, reacting, report
-from climber_uk.driver_check.evidence import Command, PulseTimes, TrialRecord
+from climber_uk.driver_check.evidence import PulseTimes, TorqueCommand, TrialRecord
 from climber_uk.driver_check.report import Verdict
 from climber_uk.driver_check.response import WIRINGS, expected_gain, response_of
 from climber_uk.driver_check.trial import Bounds
@@ -121,7 +121,7 @@ def silence(acceleration, until):
         arrived(odometry((0.0, 0.0, h), (0.0, 0.0, r), s))
         for h, r, s in zip(heading, rate, stamps, strict=True)
     ]
-    commands = [Command(stamps[0], np.array([0.01, -0.01]))]
+    commands = [TorqueCommand(stamps[0], np.array([0.01, -0.01]))]
     pulses = [PulseTimes(True, stamps[0], stamps[30])]
     return evidence(heard, TrialRecord(pulses, commands, 2.0, (stamps[31], stamps[-1])))
 

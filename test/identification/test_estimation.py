@@ -104,8 +104,9 @@ def test_what_is_not_there_is_found_to_be_about_zero():
     covered = 0
     for seed in range(6):
         found = identify(moved(noise=1.0, seed=seed), replace(BELIEVED, wheel_radius=0.03))
-        assert abs(found["viscous_friction"]) * found.extent.speed < 0.005 * found.extent.drive
-        assert abs(found["turning_resistance"]) * found.extent.yaw_rate < 0.005 * found.extent.turn
+        extent = found.extent
+        assert abs(found["viscous_friction"]) * extent.speed < 0.005 * extent.force
+        assert abs(found["turning_resistance"]) * extent.yaw_rate < 0.005 * extent.moment
         covered += sum(not found.is_clear(n) for n in ("viscous_friction", "turning_resistance"))
     assert covered >= 10
 
@@ -301,10 +302,10 @@ LACKING = {
 def test_what_the_equations_lack_is_said_and_makes_no_number_wrong(name, scrub):
     motion = moved(lacking=LACKING[name], scrub=scrub, noise=1.0, wheels=True)
     found = identify(motion, BELIEVED)
-    what = "drive" if np.any(LACKING[name][0]) else "turn"
+    what = "drive" if np.any(LACKING[name][0]) else "yaw"
     of_turning = {"turning_friction": None, "turning_resistance": None}
     of_driving = {"seal_friction_coefficient": None, "viscous_friction": None}
-    truth = of_turning if what == "turn" else {"turning_friction": scrub}
+    truth = of_turning if what == "yaw" else {"turning_friction": scrub}
     if "friction" in name:  # what is lacking is one itself
         truth |= of_driving
     assert not wrong(found, **truth)

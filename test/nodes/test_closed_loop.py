@@ -6,16 +6,16 @@ import time
 
 import numpy as np
 import pytest
+from bag_contents import read_messages
 from evo.core import metrics
 from evo.tools import file_interface
 from world import CONFIG, World, executable, inhabitants
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.bags.recorded_run import read_run
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 from climber_uk.report import export_tum
-from climber_uk.report.trajectory_errors import absolute_errors, relative_errors, way
+from climber_uk.report.trajectory_errors import absolute_errors, relative_errors
 
 pytestmark = pytest.mark.nodes
 
@@ -104,7 +104,9 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
 
 def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     run = read_run(climber_bag)
-    assert run.margins.min() > 2.8  # as its parameter file says of its wheels, at worst
+    assert (
+        run.margins.values[:, :2].min() > 2.8
+    )  # as its parameter file says of its wheels, at worst
     assert np.abs(run.error[:, 1]).max() < 2e-3
     assert run.time[-1] > 56
     assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
@@ -157,6 +159,7 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
     run = read_run(paper_bags[0])
     assert odometry.num_poses == len(run.time)
     both = run.reference, run.pose
+    way = np.insert(np.cumsum(np.hypot(*np.diff(run.pose[:, :2], axis=0).T)), 0, 0.0)
     for column, relation in enumerate(
         (metrics.PoseRelation.translation_part, metrics.PoseRelation.rotation_angle_rad)
     ):
@@ -165,7 +168,7 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
             (metrics.RPE(relation, 200), relative_errors(*both, run.time, 1.0)),
             (
                 metrics.RPE(relation, 1.0, metrics.Unit.meters),
-                relative_errors(*both, way(run.pose), 1.0),
+                relative_errors(*both, way, 1.0),
             ),
         ):
             measure.process_data((reference, odometry))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import yaml
+from bag_contents import read_messages
 from extension import block, install
 from world import CONFIG, executable
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.bags.recorded_run import read_run
 
 pytestmark = pytest.mark.nodes

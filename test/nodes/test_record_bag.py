@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import rclpy
 import yaml
+from bag_contents import read_messages
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, Transform, Twist, Vector3
 from nav_msgs.msg import Goals, Odometry
@@ -28,7 +29,6 @@ from std_msgs.msg import Float64MultiArray, Header, Int64, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 from world import new_domain
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.recording.offered_qos import is_compatible, request_for
 
 # the wheels' generator of message types, which rclpy imports, uses deprecated modules

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bag_contents import read_messages
 from mcap.reader import make_reader
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -12,7 +13,6 @@ from std_srvs.srv import SetBool
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from world import World
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.bags.bag_writer import BagWriter
 from climber_uk.bags.storage import TYPESTORE
 from climber_uk.mechanics import SECOND

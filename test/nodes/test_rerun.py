@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bag_contents import read_messages
 from world import CONFIG, executable
 
-from climber_uk.bags.bag import read_messages
 from climber_uk.campaign.campaign import read
 from climber_uk.campaign.parts import computed
 from climber_uk.mechanics import SECOND

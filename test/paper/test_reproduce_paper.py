@@ -124,7 +124,7 @@ def test_torques_of_25_lead_the_climber_metres_off_the_path():
     driven = motion.driven_by(CONSISTENT, printed, 0.01)
     assert np.abs(driven.error).max() > 10
     assert np.abs(driven.side_slip).max() < 1e-9
-    cells = table.row("driven", driven).cells
+    cells = table.row("driven", driven)
     assert float(cells[1]) > 10 or float(cells[4]) > 10
 
 
@@ -233,7 +233,7 @@ def test_steps_that_went_astray_are_a_row_that_says_so(monkeypatch):
         raise RuntimeError("stuck at 11.464 s: required step size is less than spacing")
 
     monkeypatch.setattr(motion, "dormand_prince", stuck)
-    cells = table.row("as printed", study.coarse(corrected=False)).cells
+    cells = table.row("as printed", study.coarse(corrected=False))
     assert cells == ("as printed: stuck at 11.464 s", *[""] * (len(table.COLUMNS) - 1))
 
 

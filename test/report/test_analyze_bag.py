@@ -126,7 +126,7 @@ def test_a_condition_that_holds_sets_the_exit_status(bags, run):
     [
         (["--fail-if", "speed>1"], "speed is none of duration, "),
         (["--fail-if", "rms_distance"], "must be a metric, one of"),
-        (["--fail-if", "rms_distance>much"], "much must be a number"),
+        (["--fail-if", "rms_distance>much"], "much must be a finite number"),
         (["--remap", "x:=y"], "remapping 'x:=y': x is none of"),
         (["--params", "nowhere.yaml"], "nowhere.yaml"),
         (["--namespace", "robot"], "no odometry on /robot/odom"),

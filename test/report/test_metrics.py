@@ -21,8 +21,9 @@ UNITS = {"", "%", "m", "rad", "s", "m/s", "1/s", "N", "N m", "W", "J", "J/m", "P
 
 
 def metrics_of(made, path, climber=None, settled=0.01):
-    (run,) = read_runs(made.write(path / "bag"), Topics())[0]
-    return evaluate(Case(run, climber, settled))
+    parameters = (lambda _: vars(climber)) if climber else None
+    (run,) = read_runs(made.write(path / "bag"), Topics(), parameters=parameters)[0]
+    return evaluate(Case(run, settled))
 
 
 def same(got, **expected):

@@ -198,12 +198,12 @@ def test_a_climber_without_a_run_cannot_pass_unseen(tmp_path, run):
     assert not run(analyze_bag, bag, "--fail-if", "max_distance>0.1", "--namespace", "")[0]
 
 
-@pytest.mark.parametrize("bound", ["nan", "-nan", "NaN"])
+@pytest.mark.parametrize("bound", ["nan", "-nan", "NaN", "inf", "-inf"])
 def test_a_bound_that_nothing_exceeds_is_refused(tmp_path, run, bound):
     bag = a_bag(tmp_path / "run")
     failed, _, err = run(analyze_bag, bag, "--fail-if", f"max_distance>{bound}")
     assert failed
-    assert f"{bound} must be a number" in err
+    assert f"{bound} must be a finite number" in err
 
 
 @pytest.mark.parametrize(

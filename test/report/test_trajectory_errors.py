@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from evo.core import metrics, trajectory
 
-from climber_uk.report.trajectory_errors import absolute_errors, aligned, relative_errors, way
+from climber_uk.report.trajectory_errors import absolute_errors, relative_errors
 
 PERIOD = 0.005  # [s]
 TIME = np.arange(4000) * PERIOD
@@ -45,22 +45,14 @@ def test_absolute_errors_are_those_of_evo(poses):
     np.testing.assert_allclose(absolute_errors(*poses).T, expected, atol=1e-7)
 
 
-def test_so_are_those_after_alignment(poses):
-    reference, moved = (for_evo(pose) for pose in poses)
-    moved.align(reference)
-    expected = [evos(metrics.APE(relation), (reference, moved)) for relation in RELATIONS]
-    errors = absolute_errors(poses[0], aligned(*poses))
-    np.testing.assert_allclose(errors.T, expected, atol=1e-7)
-    assert np.mean(errors[:, 0] ** 2) < np.mean(absolute_errors(*poses)[:, 0] ** 2)
-
-
 @pytest.mark.parametrize("delta", [0.25, 1.0])
 def test_relative_errors_are_those_of_evo_in_time_and_along_the_way(poses, delta):
     pair = [for_evo(pose) for pose in poses]
     frames = round(delta / PERIOD)
+    steps = np.hypot(*np.diff(poses[1][:, :2], axis=0).T)
     for progress, size, unit in (
         (TIME, frames, metrics.Unit.frames),
-        (way(poses[1]), delta, metrics.Unit.meters),
+        (np.insert(np.cumsum(steps), 0, 0.0), delta, metrics.Unit.meters),
     ):
         expected = [evos(metrics.RPE(relation, size, unit), pair) for relation in RELATIONS]
         errors = relative_errors(*poses, progress, delta)
@@ -75,11 +67,9 @@ def test_by_hand_a_drift_is_seen_in_the_frame_of_the_reference():
     np.testing.assert_allclose(errors, [[0.1, 0.0]] * 3, atol=1e-12)
     absolute = [[np.hypot(1.1 * i, i), np.pi / 2] for i in range(4)]
     np.testing.assert_allclose(absolute_errors(reference, pose), absolute, atol=1e-12)
-    np.testing.assert_allclose(aligned(reference, pose)[:, 2], np.pi / 2 + 2 * np.pi)
 
 
 def test_a_run_that_is_too_short_has_no_relative_error():
     still = np.zeros((3, 3))
-    assert relative_errors(still, still, way(still), 1.0).shape == (0, 2)
+    assert relative_errors(still, still, np.zeros(3), 1.0).shape == (0, 2)
     assert relative_errors(still, still, np.arange(3.0), 5.0).shape == (0, 2)
-    assert aligned(still, still + 1.0)[:, :2] == pytest.approx(still[:, :2])

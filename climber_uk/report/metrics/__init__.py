@@ -1,4 +1,4 @@
-"""A run in numbers: `GROUPS` has all metrics, and says what they are."""
+"""A run in numbers: `GROUPS` has all metrics, with their definitions."""
 
 from climber_uk.report.metrics import effort, safety, timing, tracking, wall
 from climber_uk.report.metrics.metric import NAN, Case, Metric, prefix
@@ -8,7 +8,7 @@ RUN = (
     Metric(
         "travelled",
         "m",
-        "way of the centre, by the speed in the odometry, or by its poses if it tells no twist, "
+        "way of the centre, by the speed in the odometry, or by its poses if it has no twist, "
         "or one that contradicts them; straight over gaps in the recording",
         lambda case: case.run.travelled,
     ),
@@ -25,7 +25,7 @@ METRICS = {metric.name: metric for group in GROUPS.values() for metric in group}
 
 
 def evaluate(case: Case) -> dict[str, float]:
-    """All metrics of a run, by their names; nan for what cannot be told."""
+    """All metrics of a run, by their names, in SI units; nan for those that are unknown."""
     return {
         name: float(metric.of(case)) if metric.concerns(case) else NAN
         for name, metric in METRICS.items()

@@ -1,15 +1,13 @@
-"""What a metric is: a name for machines, a unit, a definition, and how it comes from a run."""
+"""What a metric is: a name for machines, a unit, a definition, and the function of a run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from climber_uk.bags.run import RecordedRun
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber
 
 NAN = float("nan")
 GAP = 1.5  # periods between two stamps from which on a message is missing
@@ -19,27 +17,21 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 @dataclass(frozen=True)
 class Case:
-    """A run, and what has to be known besides to judge it."""
+    """A run, and by what it is judged."""
 
     run: RecordedRun
-    climber: Climber | None = None  # its parameters (default: those that the bag tells)
-    settled: float = 0.01  # [m] of distance from the reference
-
-    @cached_property
-    def known_climber(self) -> Climber | None:
-        """Parameters as given, else as recorded."""
-        return self.climber or self.run.climber
+    settled: float = 0.01  # [m] distance from the reference below which it has settled
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A number of a run, in SI units; nan where the bag, or what is known, does not tell it."""
+    """A number of a run, in SI units; nan if the bag has not what it takes."""
 
     name: str
     unit: str
     definition: str
     of: Callable[[Case], float]
-    concerns: Callable[[Case], bool] = lambda _: True  # whether the climber has such a thing
+    concerns: Callable[[Case], bool] = lambda _: True  # whether it applies to the climber
 
 
 def rms(values: Array) -> float:

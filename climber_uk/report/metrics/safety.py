@@ -16,9 +16,9 @@ def following(case: Case) -> float:
 
 
 def stops(case: Case) -> float:
-    """How often a fault began, once it had followed or in the time of the run.
+    """Number of faults that began after the controller had followed, or while the run lasted.
 
-    Before that it is how nodes start up, and so is a simulated clock that is not there yet.
+    Faults before that belong to the start of the nodes, as does a missing simulated clock.
     """
     modes, count, followed = case.run.modes, 0, False
     for mode, begin, end in modes:
@@ -29,15 +29,18 @@ def stops(case: Case) -> float:
 
 
 def errors(case: Case) -> float:
-    """How often a node came to say ERROR, or said so when the run began; not as it starts up."""
+    """Number of changes of a node's state to ERROR, with those in force when the run began.
+
+    A missing simulated clock does not count before the controller follows: that is the start.
+    """
     if not case.run.is_diagnosed:
         return NAN
-    told = [(time, event) for time, event in case.run.events if event.kind == "state"]
-    at_begin = {event.node: event for time, event in told if time < 0}.values()
+    states = [(time, event) for time, event in case.run.events if event.kind == "state"]
+    at_begin = {event.node: event for time, event in states if time < 0}.values()
     follows = [t for t, e in case.run.events if e.kind == "mode" and e.text == Mode.FOLLOWING.value]
     within = [
         event
-        for time, event in told
+        for time, event in states
         if time >= 0 and not (_waits_for_clock(event) and time < min(follows, default=math.inf))
     ]
     begun = [event for event in at_begin if not _waits_for_clock(event)]

@@ -1,17 +1,9 @@
-"""How punctual odometry and torques were, and what of them was lost."""
+"""Latency, period and jitter of odometry and torques, and what of them was lost."""
 
 import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.report.metrics.metric import (
-    GAP,
-    NAN,
-    Case,
-    Metric,
-    deviation,
-    largest,
-    percentile,
-)
+from climber_uk.report.metrics.metric import GAP, NAN, Case, Metric, deviation, largest, percentile
 
 STAMPED = (
     0.5  # of the torques have stamps of odometry, at least, where these tell what was answered
@@ -24,7 +16,7 @@ def periods(case: Case) -> Array:
 
 
 def period(case: Case) -> float:
-    """The usual one [s]."""
+    """Median period of the odometry [s]."""
     return percentile(periods(case), 50)
 
 
@@ -61,11 +53,6 @@ def unanswered(case: Case) -> float:
     return float(np.sum(~np.isin(odometry, answers)))
 
 
-def arrivals_off(case: Case) -> Array:
-    """How much longer than by their stamps it took from one odometry to the next (n - 1,) [s]."""
-    return np.diff(case.run.odometry.arrivals) / SECOND - periods(case)
-
-
 METRICS = (
     Metric(
         "latency_p50",
@@ -92,7 +79,7 @@ METRICS = (
         "s",
         "standard deviation of the time from one arrival of odometry to the next, less the time "
         "by their stamps: of wall-clock runs only, a simulation has its own pace",
-        lambda case: deviation(arrivals_off(case)),
+        lambda case: deviation(np.diff(case.run.odometry.arrivals) / SECOND - periods(case)),
     ),
     Metric("odometry_count", "", "odometry messages", lambda case: float(len(case.run.time))),
     Metric(

@@ -23,16 +23,8 @@ STRETCH = 1.0  # [s] over which drift is measured
 
 QUANTITIES: dict[str, tuple[str, str, Callable[[Case], Array]]] = {
     "distance": ("m", "distance from the reference", lambda case: case.run.distance),
-    "along_track": (
-        "m",
-        "error along the reference's heading",
-        lambda case: case.run.error[:, 0],
-    ),
-    "cross_track": (
-        "m",
-        "error across the reference's heading",
-        lambda case: case.run.error[:, 1],
-    ),
+    "along_track": ("m", "error along the reference's heading", lambda case: case.run.error[:, 0]),
+    "cross_track": ("m", "error across the reference's heading", lambda case: case.run.error[:, 1]),
     "heading": ("rad", "heading error", lambda case: case.run.error[:, 2]),
 }
 STATISTICS: dict[str, tuple[str, Callable[[Array], float]]] = {
@@ -45,10 +37,10 @@ STATISTICS: dict[str, tuple[str, Callable[[Array], float]]] = {
 
 
 def _statistic(statistic: str, quantity: str) -> Metric:
-    said, evaluate = STATISTICS[statistic]
+    description, evaluate = STATISTICS[statistic]
     unit, meaning, values = QUANTITIES[quantity]
     name = f"{statistic}_{quantity}"
-    return Metric(name, unit, said.format(meaning), lambda case: evaluate(values(case)))
+    return Metric(name, unit, description.format(meaning), lambda case: evaluate(values(case)))
 
 
 def settling_time(case: Case) -> float:

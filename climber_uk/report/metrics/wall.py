@@ -1,4 +1,4 @@
-"""How well the climber held on to its wall, and how the wall held on to it.
+"""Margins of slipping and tipping, slip, and the friction of the wall.
 
 m Δv = ∫ (τR + τL)/r dt - m g_t ∫ sinθ dt - f ∫ σ dt        (11), integrated
 """
@@ -17,52 +17,49 @@ SUCTION = "suction"  # of the controller's `adhesion`
 
 def friction(case: Case) -> float:
     """Coulomb friction f [N]: least squares over windows in which it moves one way."""
-    run, climber = case.run, case.known_climber
+    run, climber = case.run, case.run.climber
     if climber is None or len(run.commands) < 2:
         return NAN
     time, speed = run.seconds(run.commands), run.rates[run.is_answered, 0]
     drive, _ = climber.force_and_moment(run.torques)
     push = drive - climber.weight_along_wall * np.sin(run.pose[run.is_answered, 2])
     pushed = np.concatenate([[0.0], np.cumsum(push[:-1] * np.diff(time))])
-    ways = np.concatenate([[0], np.cumsum(np.sign(speed) * (np.abs(speed) > MOVING))])
+    directions = np.sign(speed) * (np.abs(speed) > MOVING)
+    summed = np.concatenate([[0], np.cumsum(directions)])
 
     ends = np.flatnonzero(np.diff(time // WINDOW, prepend=-1))
     begin, end = ends[:-1], ends[1:]  # of windows, the last of which is not whole
-    lasted, way = time[end] - time[begin], (ways[end] - ways[begin]) / (end - begin)
-    chosen = (np.abs(way) == 1) & (lasted < 1.5 * WINDOW)
-    taken = pushed[end] - pushed[begin] - climber.mass * (speed[end] - speed[begin])
-    opposed = (way * lasted)[chosen]
-    return float(taken[chosen] @ opposed / (opposed @ opposed)) if chosen.any() else NAN
+    duration, direction = time[end] - time[begin], (summed[end] - summed[begin]) / (end - begin)
+    chosen = (np.abs(direction) == 1) & (duration < 1.5 * WINDOW)
+    lost = pushed[end] - pushed[begin] - climber.mass * (speed[end] - speed[begin])  # [N s]
+    opposed = (direction * duration)[chosen]
+    return float(lost[chosen] @ opposed / (opposed @ opposed)) if chosen.any() else NAN
 
 
 def _margin(case: Case, column: int) -> Array:
-    return case.run.hold.values[:, column]
+    return case.run.margins.values[:, column]
 
 
 def slip_share(case: Case) -> float:
-    """Share of time that it slips [%], by the margin or by the way it goes, whichever is more.
+    """Share of time in which it slips [%], by the margin or by its poses, whichever is more.
 
-    Odometry of wheels sees no slip: that it alone tells none is not known to be none.
+    nan if there is only odometry that shows none: that of wheels does not see their slip.
     """
     run = case.run
     aside = np.abs(run.path_rates[:, 1]) > np.maximum(ASIDE, ASKEW * np.abs(run.path_rates[:, 0]))
-    if not (len(run.hold) or len(run.recorded[topics.TRUTH]) or aside.any()):
+    if not (len(run.margins) or len(run.recorded[topics.TRUTH]) or aside.any()):
         return NAN
     return largest(np.array([share(_margin(case, 0) < 1), share(aside)]))
 
 
 def max_side_slip(case: Case) -> float:
-    """Largest speed to a side [m/s], by the twist and by the poses."""
+    """Largest speed to either side [m/s], by the twist or by the poses, whichever is more."""
     return largest(np.concatenate([case.run.side_slip, case.run.path_rates[:, 1]]))
 
 
 def has_suction(case: Case) -> bool:
-    """Whether suction holds the climber, as far as is known."""
+    """Whether the climber has suction; so it is taken, if its parameters are unknown."""
     return case.run.parameters.get("adhesion", SUCTION) == SUCTION
-
-
-def _pressure(case: Case) -> Array:
-    return case.run.recorded[topics.PRESSURE].values.ravel()
 
 
 METRICS = (
@@ -70,7 +67,7 @@ METRICS = (
         "lowest_slip_margin",
         "",
         "grip of the wheels over what is asked of it, at worst; below 1 they slip. As the "
-        "simulator tells it, else as the controller estimates it",
+        "simulator publishes it, else as the controller estimates it",
         lambda case: lowest(_margin(case, 0)),
     ),
     Metric(
@@ -88,16 +85,13 @@ METRICS = (
         lambda case: lowest(_margin(case, 1)),
     ),
     Metric(
-        "lowest_wheel_load",
-        "N",
-        "least load on the wheels",
-        lambda case: lowest(_margin(case, 2)),
+        "lowest_wheel_load", "N", "least load on the wheels", lambda case: lowest(_margin(case, 2))
     ),
     Metric(
         "lowest_pressure",
         "Pa",
         "least pressure difference of the suction",
-        lambda case: lowest(_pressure(case)),
+        lambda case: lowest(case.run.recorded[topics.PRESSURE].values),
         has_suction,
     ),
     Metric(

@@ -1,6 +1,7 @@
-"""The numbers that are taken from the messages of each topic, and what is wrong with them."""
+"""The numbers that are extracted from the messages of each topic, and what is wrong with them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import asin, degrees
 
 import numpy as np
@@ -18,7 +19,7 @@ FAULTS = (
     f"position not finite, or above {LARGEST:g} m",
     "orientation not finite",
     f"norm of the quaternion off 1 by more than {NORM_TOLERANCE:.0%}",
-    f"not a turn about z: tilted by more than {degrees(2 * asin(MOST_TILT)):.1f}°",
+    f"not a angle about z: tilted by more than {degrees(2 * asin(MOST_TILT)):.1f}°",
     "stamp far off those around it",
 )
 STRAY = len(FAULTS) - 1
@@ -28,9 +29,9 @@ def heading(batch: Batch, path: str) -> tuple[Array, Faults]:
     """Headings (n,) [rad] of orientations at `path`, and what is wrong with them."""
     x, y, z, w = batch.columns(*(f"{path}.{axis}" for axis in "xyzw")).T
     with np.errstate(over="ignore", invalid="ignore"):
-        turn, _, _, is_unit, is_planar = turn_about_z(x, y, z, w)
+        angle, _, _, is_unit, is_planar = turn_about_z(x, y, z, w)
         is_finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z) & np.isfinite(w)
-        return turn, np.select([~is_finite, ~is_unit, ~is_planar], [3, 4, 5])
+        return angle, np.select([~is_finite, ~is_unit, ~is_planar], [3, 4, 5])
 
 
 def are_sound(values: Array) -> NDArray[np.bool]:
@@ -41,15 +42,15 @@ def are_sound(values: Array) -> NDArray[np.bool]:
 def _odometry(batch: Batch) -> tuple[Array, Faults]:
     """Pose x, y, θ and twist forwards, to the left, about z, (n, 6).
 
-    A twist that is not finite is none, and what says nothing about a climber on its wall (z, the
-    other rates, covariances) may be anything.
+    A twist that is not finite becomes nan. What does not concern a climber on its wall (z, the
+    other rates, covariances) is not looked at.
     """
     position, twist = "pose.pose.position", "twist.twist"
     place = batch.columns(f"{position}.x", f"{position}.y")
-    turn, faults = heading(batch, "pose.pose.orientation")
+    angle, faults = heading(batch, "pose.pose.orientation")
     rates = batch.columns(f"{twist}.linear.x", f"{twist}.linear.y", f"{twist}.angular.z")
     faults = np.where(are_sound(place).all(axis=1), faults, 2)
-    return np.column_stack([place, turn, np.where(are_sound(rates), rates, np.nan)]), faults
+    return np.column_stack([place, angle, np.where(are_sound(rates), rates, np.nan)]), faults
 
 
 def _behind(batch: Batch) -> tuple[Array, Faults]:
@@ -58,20 +59,17 @@ def _behind(batch: Batch) -> tuple[Array, Faults]:
     return behind[:, None], np.where(are_sound(behind), 0, 1)
 
 
-def _columns(*paths: str) -> Callable[[Batch], tuple[Array, Faults]]:
-    def take(batch: Batch) -> tuple[Array, Faults]:
-        values = batch.columns(*paths)
-        return values, np.where(are_sound(values).all(axis=1), 0, 1)
-
-    return take
+def _columns(paths: Sequence[str], batch: Batch) -> tuple[Array, Faults]:
+    values = batch.columns(*paths)
+    return values, np.where(are_sound(values).all(axis=1), 0, 1)
 
 
 WIDEST = 6  # values of a message
-TAKEN: dict[str, Callable[[Batch], tuple[Array, Faults]]] = {
+EXTRACTORS: dict[str, Callable[[Batch], tuple[Array, Faults]]] = {
     ODOMETRY: _odometry,
     TRUTH: _odometry,
     REFERENCE_TIME: _behind,
-    PRESSURE: _columns("fluid_pressure"),
-    FORCE: _columns("wrench.force.x", "wrench.force.y", "wrench.torque.z"),
-    **dict.fromkeys(MARGINS, _columns("vector.x", "vector.y", "vector.z")),
+    PRESSURE: partial(_columns, ["fluid_pressure"]),
+    FORCE: partial(_columns, ["wrench.force.x", "wrench.force.y", "wrench.torque.z"]),
+    **dict.fromkeys(MARGINS, partial(_columns, ["vector.x", "vector.y", "vector.z"])),
 }
