@@ -255,7 +255,7 @@ class UkTorqueController(ManagedNode):
     def publish_causes(self, stamp: int, command: Command, state: State | None) -> None:
         """Publish constraint force, disturbance and tracking error behind an answer."""
         self.answers += 1
-        self.saturations += int(command.missing.any())
+        self.saturations += not command.fits
         controller = self.controller
         if self.force.is_heard:
             self.force.publish(stamp, *command.constraint_force)
