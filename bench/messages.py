@@ -1,6 +1,6 @@
 """What messages cost: the three nodes in lock-step beside processes that only exchange messages.
 
-    python bench/messages.py [--seconds 5] [--rounds 3] [--transport UDPv4]
+    [FASTDDS_BUILTIN_TRANSPORTS=DEFAULT] python bench/messages.py [--seconds 5] [--rounds 3]
 
 A ping-pong is two processes: an Odometry one way, a JointState the other, and nothing computed.
 `typed` makes message objects, as most nodes do, in rclpy's default executor; `bytes` are passed on
