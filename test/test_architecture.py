@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -34,12 +35,19 @@ def test_the_figure_of_the_layers_has_all_rooms_and_what_a_room_imports_is_below
     assert all(depth[below] > depth[room] for room, rooms in BELOW.items() for below in rooms)
 
 
-@pytest.mark.nodes
-def test_one_odometry_goes_the_way_that_is_drawn():
+@cache
+def traced():
+    """Depth, file and function of each call that answers an odometry."""
     pytest.importorskip("rclpy")
     command = [sys.executable, ROOT / "test" / "nodes" / "odometry_trace.py"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
-    calls = [tuple(line.split()[1:]) for line in done.stdout.splitlines()]
+    lines = [line.split() for line in done.stdout.splitlines()]
+    return [(int(depth), file, name) for depth, file, name in lines]
+
+
+@pytest.mark.nodes
+def test_one_odometry_goes_the_way_that_is_drawn():
+    calls = [(file, name) for _, file, name in traced()]
     files = {file for file, _ in calls}
     way = section("One odometry's way")
     drawn = re.findall(r"^ *(\w+/\w+\.py) +(\w+)\b", way, re.MULTILINE)
@@ -47,6 +55,17 @@ def test_one_odometry_goes_the_way_that_is_drawn():
     assert f"\n{len(files)} files, " in way
     left = iter(calls)
     assert not [call for call in drawn if call not in left], "not called, or not in this order"
+
+
+@pytest.mark.nodes
+def test_no_file_on_an_odometrys_way_calls_one_that_has_called_it():
+    callers, called = [], {}
+    for depth, file, _ in traced():
+        callers[depth:] = [file]
+        for caller in callers[:-1]:
+            if caller != file:
+                called.setdefault(caller, set()).add(file)
+    assert not [(a, b) for a in called for b in called[a] if a in called.get(b, ())]
 
 
 @pytest.mark.parametrize("room", sorted(BELOW))

@@ -23,7 +23,7 @@ SLOW = 0.01  # [m/s] of a reference that is at rest
 AS_FAST = 0.9  # of the reference's speed, from which a climber goes on in time
 STRAYED = 1.5  # times `max_distance`, beyond which a climber that follows is off its path
 LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
-LONGEST_GAP = 0.3  # [s] between two answers over which the reference goes on
+LONGEST_GAP = round(0.3 * SECOND)  # [ns] between two answers over which the reference goes on
 IN_TIME_AGAIN = 1e-3  # [1] of σ that is missing at the end of a restart
 
 
@@ -50,7 +50,7 @@ class Progress(NamedTuple):
         if self.time is None:
             return self._replace(time=time)
         passed = time - self.time
-        if not 0 <= passed <= LONGEST_GAP * SECOND:
+        if not 0 <= passed <= LONGEST_GAP:
             return self._replace(time=time, waited=self.waited + passed)
         if self.pace == IN_TIME:
             return Progress(time, self.waited, self.pace, self.is_restarting)

@@ -92,7 +92,8 @@ class Command(NamedTuple):
     @property
     def fits(self) -> Any:
         """Whether no limit took anything away: a bool, or an array (N,) of them."""
-        return (abs(self.lost.force) <= CUT) & (abs(self.lost.moment) <= CUT)
+        force, moment = self.lost
+        return (abs(force) <= CUT) & (abs(moment) <= CUT)
 
     @property
     def missing(self) -> Array:

@@ -27,7 +27,7 @@ class Observed(NamedTuple):
     after: Motion
     time: float  # [s] between them
     acted: list[tuple[Torques, float]]  # torques, and how long each [s]
-    disturbance: Wrench  # as it was known before
+    disturbance: Wrench | DisturbanceEstimate  # as it was known before
     reaction: float  # [s] in which a torque can answer
 
     @property
@@ -114,9 +114,9 @@ class Estimator:
 
     def ahead(self, age: float) -> ControlInput:
         """What an answer to the last odometry, given at its `age` [s], meets when it acts."""
-        begins = self.begin(age)
-        motion = self.expected_at(begins)
-        return ControlInput(motion, self._sent.last, self.disturbance, self.period, begins)
+        begins, learnt = self.begin(age), self.learnt
+        motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
+        return ControlInput(motion, self._sent.last, disturbance, self.period, begins)
 
     def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
@@ -168,7 +168,7 @@ class Estimator:
         """Correct what is `expected` at `stamp` [ns] by the `motion` that was told."""
         time = (stamp - self.stamp) / SECOND
         reaction = self._delay + self.period / 2
-        observed = Observed(before, motion, time, acted, self.disturbance, reaction)
+        observed = Observed(before, motion, time, acted, self.learnt, reaction)
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)
         self._period_is_measured = True

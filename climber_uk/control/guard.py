@@ -9,6 +9,7 @@ from collections import deque
 from typing import NamedTuple
 
 from climber_uk.control.estimator import Observed
+from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Adhesion
@@ -201,7 +202,9 @@ class Guard:
             return None
         return Mode.STALLED, f"{largest:.2f} N m"
 
-    def _watch_disturbance(self, climber: Climber, disturbance: Wrench) -> Trouble | None:
+    def _watch_disturbance(
+        self, climber: Climber, disturbance: Wrench | DisturbanceEstimate
+    ) -> Trouble | None:
         share, weight, lever = (
             self.options.max_disturbance,
             climber.mass * GRAVITY,

@@ -110,10 +110,8 @@ class Guidance:
         # R = min(√(v_d² + v_s²)/ρ, R_max)
         turn = root / self.turn_radius
         is_slower = turn < self.turn_rate
-        turn_rate = (
-            select(is_slower, turn, self.turn_rate),
-            select(is_slower, v * v_1 / (root * self.turn_radius), 0.0),
-        )
+        slower = turn, v * v_1 / (root * self.turn_radius)
+        turn_rate = either(is_slower, slower, (self.turn_rate, 0.0))
         gain = k_y * share, k_y * share_1, k_y * share_2
         limits = slow_down, catch_up, turn_rate
         return PreparedTarget(x, y, heading, cosine, sine, v, v_1, omega, omega_1, *limits, gain)
@@ -122,8 +120,8 @@ class Guidance:
         """v̇ [m/s²] and θ̈ [rad/s²] of a climber in `motion`, and the speed wanted [m/s]."""
         # unpacked by position: this runs twice for each odometry, and attributes would take longer
         x, y, heading, cosine, sine, v, omega = motion
-        x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, *others = prepared
-        slow_down, catch_up, (turn_rate, turn_rate_1), gain = others
+        (x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, slow_down, catch_up,
+         (turn_rate, turn_rate_1), (g, g_1, g_2)) = prepared  # fmt: skip
         # errors, actual minus wanted (§5.1); Δ = heading_error:
         #   ė_x = v cosΔ - v_d + ω_d e_y,  ė_y = v sinΔ - ω_d e_x,  Δ̇ = yaw_rate_error = ω - ω_d
         offset_x, offset_y, heading_error = x - x_d, y - y_d, wrapped(heading - heading_d)
@@ -151,7 +149,6 @@ class Guidance:
         #   ë_y = v̇ sinΔ + v cosΔ Δ̇ - ω̇_d e_x - ω_d ė_x
         #   d/dt atan w = ẇ / (1 + w²),  d²/dt² atan w = ẅ / (1 + w²) - 2 w (d/dt atan w)²
         e_y2 = v_1 * sine_e + v_along * yaw_rate_error - omega_d1 * e_x - omega_d * e_x1
-        g, g_1, g_2 = gain
         w, w_1 = g * e_y, g_1 * e_y + g * e_y1
         w_2 = g_2 * e_y + 2.0 * g_1 * e_y1 + g * e_y2
         slope = 1.0 / (1.0 + w * w)

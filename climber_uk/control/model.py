@@ -49,7 +49,7 @@ def predict(climber: Climber, motion: Motion, force: Any, moment: Any, time: flo
     v_1 = (push - rubbing) / mass
     way, end = time * (v + half * v_1), v + time * v_1
     stops = v * end < 0
-    if anywhere(stops):  # friction ends a motion, and does not reverse it
+    if stops is not False and anywhere(stops):  # friction ends a motion, and does not reverse it
         left = time + v / select(stops, v_1, 1.0)
         back_1 = (push - clipped(push, -friction, friction)) / mass
         way = select(stops, 0.5 * (v * (time - left) + left * left * back_1), way)

@@ -11,6 +11,7 @@ import rclpy
 from rclpy.clock import ClockType
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
+from sensor_msgs.msg import JointState
 
 import climber_uk
 from climber_uk.control.safety import Mode
@@ -18,6 +19,8 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages import writing
+from climber_uk.messages.in_place import NumberWriter
+from climber_uk.messages.topics import TORQUES
 from climber_uk.nodes.uk_torque_controller import UkTorqueController
 
 PACKAGE = str(Path(climber_uk.__file__).parent) + "/"
@@ -47,7 +50,7 @@ def traced(function, *arguments):
             depth += 1
         elif event == "return":
             depth -= 1
-            if code is writing.wheel_torques.__code__:
+            if code is NumberWriter.__call__.__code__:
                 sys.setprofile(None)
 
     sys.setprofile(on_event)
@@ -61,6 +64,9 @@ def main():
     arguments = ["--ros-args", "-p", "use_sim_time:=true"]
     rclpy.init(args=arguments)
     node, trajectory = UkTorqueController(), build_trajectory(Defaults().read)
+    node.create_subscription(JointState, TORQUES, print, 10)
+    while not node.torques.is_heard:
+        rclpy.spin_once(node, timeout_sec=0.1)
     start = SECOND
     times = [0.05 * i for i in range(40)]
     points = [writing.reference_point(trajectory.at(time), time) for time in times]
@@ -71,7 +77,8 @@ def main():
         )
         reference = trajectory.at((stamp - start) / SECOND)
         state = State(reference.pose, reference.velocity)
-        calls = traced(node.on_odometry, writing.odometry(state, stamp, *FRAMES))
+        odometry = serialize_message(writing.odometry(state, stamp, *FRAMES))
+        calls = traced(node.on_odometry, odometry)
     assert node.controller.mode is Mode.FOLLOWING, node.controller.mode
     for depth, file, name in calls:
         print(depth, file, name)
