@@ -65,7 +65,7 @@ class Collected:
         return [self.within(*span) for span in spans] if len(spans) > 1 else [self]
 
     def leave_out_strays(self) -> None:
-        """Mark odometry as unfit whose stamp is far off its neighbours', if it is little."""
+        """Mark odometry with a stamp far off its neighbours' as unfit, if it is an accident."""
         if parts := self.samples[topics.ODOMETRY]:
             samples = in_order(parts)
             fit = np.flatnonzero(samples.faults == 0)

@@ -230,7 +230,7 @@ class RunReader:
         """Rate and torque (n, 2) of the right and the left wheel; notes why there are none."""
         right, left = self.of_wheels(
             collected, topics.JOINTS, lambda parts: rates_and_torques(parts, parameters)
-        )[:2]
+        )
         return right, left
 
     def of_wheels(

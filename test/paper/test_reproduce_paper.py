@@ -229,7 +229,7 @@ def test_a_run_that_got_lost_has_no_finite_error():
 
 
 def test_steps_that_went_astray_are_a_row_that_says_so(monkeypatch):
-    def stuck(*_):
+    def stuck(*_, **__):
         raise RuntimeError("stuck at 11.464 s: required step size is less than spacing")
 
     monkeypatch.setattr(motion, "dormand_prince", stuck)
