@@ -146,8 +146,7 @@ class ControlLaw:
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         right, left = self._fixed_bounds or self._bounds(situation)
-        solve: Solve = self.generic if self.options.solver == "generic" else self.closed_form
-        solve = solve if self.other is None else self.of_forces
+        solve = self._solve
         drive, turn = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
             predicted = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
@@ -195,6 +194,12 @@ class ControlLaw:
         drive = weight - climber.mass * braking_rate * motion.speed
         turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
         return Torques(*climber.saturate(drive, turn, *self._bounds(situation))[2:4])
+
+    @cached_property
+    def _solve(self) -> Solve:
+        if self.other is not None:
+            return self.of_forces
+        return self.generic if self.options.solver == "generic" else self.closed_form
 
     @cached_property
     def _fixed_bounds(self) -> tuple[Bounds, Bounds] | None:

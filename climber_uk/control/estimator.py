@@ -18,6 +18,7 @@ from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 
 LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
 PERIOD_SMOOTHING = 0.1  # share of a new period in the mean
+Acting = list[tuple[Torques, float]]  # torques, and how long each acts [s]
 
 
 class Observed(NamedTuple):
@@ -26,7 +27,7 @@ class Observed(NamedTuple):
     before: Motion
     after: Motion
     time: float  # [s] between them
-    acted: list[tuple[Torques, float]]  # torques, and how long each [s]
+    acted: Acting  # torques, and how long each [s]
     disturbance: Wrench | DisturbanceEstimate  # as it was known before
     reaction: float  # [s] in which a torque can answer
 
@@ -51,11 +52,7 @@ class Estimator:
     """
 
     def __init__(
-        self,
-        climber: Climber,
-        observer: Observer,
-        timing: Timing,
-        safety: Safety | None = None,
+        self, climber: Climber, observer: Observer, timing: Timing, safety: Safety | None = None
     ) -> None:
         self.climber, self.observer, self.timing, self.safety = climber, observer, timing, safety
         self.period = timing.control_period  # [s] from one odometry to the next
@@ -148,7 +145,7 @@ class Estimator:
             return self.motion
         return self._rolled(self.motion, self._sent.between(self.stamp, stamp))
 
-    def _rolled(self, motion: Motion, acting: list[tuple[Torques, float]]) -> Motion:
+    def _rolled(self, motion: Motion, acting: Acting) -> Motion:
         """Motion after torques have acted, each for some time [s]."""
         climber, learnt = self.climber, self.learnt
         r_drive, r_turn = learnt.force, learnt.moment
@@ -158,12 +155,7 @@ class Estimator:
         return motion
 
     def _correct(
-        self,
-        stamp: int,
-        before: Motion,
-        acted: list[tuple[Torques, float]],
-        expected: Motion,
-        motion: Motion,
+        self, stamp: int, before: Motion, acted: Acting, expected: Motion, motion: Motion
     ) -> Observed:
         """Correct what is `expected` at `stamp` [ns] by the `motion` that was told."""
         time = (stamp - self.stamp) / SECOND
@@ -204,12 +196,7 @@ class Estimator:
         )
 
     def _learn_delay(
-        self,
-        acting: Torques,
-        expected: Motion,
-        found: Motion,
-        time: float,
-        shares: tuple[Any, Any],
+        self, acting: Torques, expected: Motion, found: Motion, time: float, shares: tuple[Any, Any]
     ) -> None:
         """Learn how much later than told torques act; `shares` are the observer's."""
         climber = self.climber

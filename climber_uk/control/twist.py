@@ -49,7 +49,7 @@ class TwistCheck:
 
     def restart(self) -> None:
         """Compare from now on."""
-        self._ways = [(0.0, 0.0), (0.0, 0.0)]  # [m] by pose and by twist: forward, rim in turning
+        self._ways = (0.0, 0.0), (0.0, 0.0)  # [m] by pose and by twist: forward, rim in turning
         self._opposed = 0
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
@@ -57,15 +57,13 @@ class TwistCheck:
         turned = wrapped(motion.heading - last.heading)
         middle = last.heading + turned / 2
         forward = (motion.x - last.x) * math.cos(middle) + (motion.y - last.y) * math.sin(middle)
-        gone = (
-            (forward, time * (last.speed + motion.speed) / 2),
-            (half_track * turned, half_track * time * (last.yaw_rate + motion.yaw_rate) / 2),
-        )
+        rim = half_track * time * (last.yaw_rate + motion.yaw_rate) / 2
         left = math.exp(-time / CHECK_MEMORY)
-        self._ways = [
-            (left * by_pose + pose, left * by_twist + twist)
-            for (by_pose, by_twist), (pose, twist) in zip(self._ways, gone, strict=True)
-        ]
+        (pose, twist), (turned_by_pose, turned_by_twist) = self._ways
+        self._ways = (
+            (left * pose + forward, left * twist + time * (last.speed + motion.speed) / 2),
+            (left * turned_by_pose + half_track * turned, left * turned_by_twist + rim),
+        )
 
     def opposed(self, least: float) -> str:
         """Which part of the twist has another sign than its way, of `least` [m]; else ''."""
@@ -80,9 +78,7 @@ class TwistCheck:
         self._opposed = self._opposed + 1 if opposed else 0
         if self._opposed >= IN_A_ROW:
             return opposed, True
-        differs = max(
-            abs(pose - twist) - SHARE * max(abs(pose), abs(twist)) for pose, twist in self._ways
-        )
+        differs = max(_difference(*self._ways[0]), _difference(*self._ways[1]))
         return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
 
 
@@ -94,3 +90,8 @@ def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
     # halfway (cosine, sine) is longer by 1 / cos(turned / 2) than the mean of those at the ends
     ahead = ahead * (1 + turned * turned / 8)
     return ahead / time, turned / time
+
+
+def _difference(pose: float, twist: float) -> float:
+    """By how much two ways differ, beyond what slip and scale explain [m]."""
+    return abs(pose - twist) - SHARE * max(abs(pose), abs(twist))
