@@ -56,7 +56,7 @@ class WithMatrices(ControlLaw):
 
     solve: Callable[[Array, Array, Array, Array], Array] = as_the_paper
 
-    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
+    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
         """See `ControlLaw.generic`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
         demand = self.constraints.desired_acceleration(prepared, motion)

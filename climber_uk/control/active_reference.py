@@ -211,21 +211,16 @@ class ActiveReference:
         ]
         nearest = int(times[int(np.argmin(offsets))])
         target = preview.target(nearest)
-        if target is None or abs(speed := _speed(target)) < SLOW:
+        if target is None or abs(speed := target.speed) < SLOW:
             return nearest
         ahead = (motion.x - target.x) * target.v_x + (motion.y - target.y) * target.v_y
         ahead = min(max(ahead / (speed * speed), -skip / SKIP_STEPS / SECOND), skip / SECOND)
         return min(max(nearest + round(ahead * SECOND), position), position + skip)
 
 
-def _speed(target: ReferencePoint) -> float:
-    """Speed of a target along its heading [m/s]."""
-    return float(target.v_x * math.cos(target.heading) + target.v_y * math.sin(target.heading))
-
-
 def _rate(motion: Motion, target: ReferencePoint) -> float:
     """Rate σ of a reference that is as fast as the climber is, 1 if that is nearly so."""
-    speed = _speed(target)
+    speed = target.speed
     if abs(speed) < SLOW:
         return 1.0
     rate = float(min(max(motion.speed / speed, 0.0), 1.0))

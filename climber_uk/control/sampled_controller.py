@@ -107,14 +107,16 @@ class SampledController:
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
         self.learnt = DisturbanceEstimate()
+        self._direction = 0.0  # of the reference: 1 forwards, -1 backwards, 0 at rest
         # whether no limit cut the last answer, so that what came out tells of the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
 
     @property
     def disturbance(self) -> Wrench:
-        """What pushes and turns the climber besides what the model knows."""
-        return Wrench(self.learnt.force, self.learnt.moment)
+        """What pushes and turns the climber besides what the model knows, friction included."""
+        learnt = self.learnt
+        return Wrench(learnt.force - self._direction * learnt.friction, learnt.moment)
 
     @disturbance.setter
     def disturbance(self, disturbance: Wrench) -> None:
@@ -150,7 +152,7 @@ class SampledController:
                 if self.timing.learn_delay and is_known:
                     self._learn_delay(stamp, expected, motion, shares)
             motion, learnt = self.observer.corrected(
-                self.law.climber, self.learnt, expected, motion, time, shares
+                self.law.climber, self.learnt, expected, motion, time, shares, self._direction
             )
             if is_known:
                 is_learnt = self._learning  # of many, each learns or holds what it has learnt
@@ -188,7 +190,8 @@ class SampledController:
             command = law.command(situation, progress.target(preview, aim) or target)
         wheels, _, _, (drive, turn) = command
         _check(wheels)
-        self.progress = progress
+        self.progress, speed = progress, target.speed
+        self._direction = math.copysign(1.0, speed) if abs(speed) > SLOW else 0.0
         self._learning = (abs(drive) <= CUT) & (abs(turn) <= CUT)
         self._send(begins, wheels)
         return command
@@ -227,12 +230,12 @@ class SampledController:
         """Motion at `stamp` [ns] as the model rolls on from the last odometry."""
         assert self.motion is not None
         motion, climber = self.motion, self.law.climber
-        r_drive, r_turn, _, _ = self.learnt
+        r_drive, r_turn, _, _, friction = self.learnt
         if stamp == self.stamp:
             return motion
         for torques, time in self._acting.between(self.stamp, stamp):
             drive, turn = climber.wrench(*torques)
-            motion = predict(climber, motion, drive + r_drive, turn + r_turn, time)
+            motion = predict(climber, motion, drive + r_drive, turn + r_turn, time, friction)
         return motion
 
     def _at_its_stamp(self, expected: Motion, found: Motion, time: float) -> Motion:
@@ -292,7 +295,9 @@ class SampledController:
     def _situation(self, age: float) -> tuple[int, ControlInput]:
         begins = self.begin(age)
         motion = self.expected_at(begins)
-        return begins, ControlInput(motion, self._acting.last, self.disturbance, self.period)
+        force, moment, _, _, friction = self.learnt
+        disturbance = Wrench(force, moment)
+        return begins, ControlInput(motion, self._acting.last, disturbance, self.period, friction)
 
     def _send(self, begins: int, torques: Torques) -> None:
         self._acting.add(begins, torques)
