@@ -4,12 +4,22 @@ from climbs import Climb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from climber_uk.closed_loop.simulate import sampled
+from climber_uk.control.active_reference import ActiveReference
 from climber_uk.control.approach import Approach
+from climber_uk.control.control_law import ControlLaw
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode
+from climber_uk.control.sampled_controller import SampledController
+from climber_uk.control.time_scaling import Pace
 from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, State
+from climber_uk.mechanics.shapes import Line
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
 
 slow = pytest.mark.slow
 
@@ -247,3 +257,55 @@ def test_a_climber_that_has_turned_while_nobody_answered_goes_on_along_its_path(
     assert climb.off_the_path(begin) < 0.02
     assert climb.fastest() <= 1.3 * climb.reference_speed
     assert climb.position > before + 1.0
+
+
+LINE = Trajectory(Line(length=2.0), RestToRest(rate=0.5, ramp_time=2.0))
+
+
+def at_rest_at(x, y=0.0):
+    """An active reference along a line, and its climber, at rest at a place."""
+    active = ActiveReference(SampledController(ControlLaw(Climber(), Guidance())), Approach())
+    active.sampled_controller.see(SECOND, State(np.array([x, y, 0.0]), np.zeros(3)).motion)
+    active.take(sampled(LINE, 5.0))
+    return active
+
+
+def test_a_pause_and_another_reference_end_a_way():
+    active = at_rest_at(1.0, 1.0)
+    assert active.follow(0.0).mode is Mode.APPROACHING
+    assert active.followed is active.way
+    assert active.position(2 * SECOND) == SECOND  # it waits meanwhile
+    active.pause(SECOND)
+    assert active.way is None
+    assert active.target is None
+    assert active.follow(0.0).mode is Mode.APPROACHING
+    other = sampled(Trajectory(Line(length=2.0), LINE.law, origin=(1.0, 1.0)), 5.0)
+    active.take(other)
+    assert active.followed is other
+    assert active.target is None
+    assert active.position(SECOND) is None
+    assert active.follow(0.0).mode is Mode.FOLLOWING
+
+
+def test_what_is_expected_is_that_of_the_reference_around_the_climber():
+    active = at_rest_at(0.0)
+    assert active.follow(0.0).mode is Mode.FOLLOWING
+    early = active.expected(active.target).allowed.speed
+    progress = active.sampled_controller.progress
+    active.sampled_controller.stamp = 4 * SECOND
+    target = active.target
+    late = active.expected(target)
+    assert late.allowed.speed > early + 0.2
+    assert late.wanted == (pytest.approx(0.5), 0)
+    assert not late.waits
+    for rate, waits in ((0.9, False), (0.0, True)):
+        behind = Pace(lag=0.1, rate=rate)
+        active.sampled_controller.progress = progress._replace(pace=behind)
+        expected = active.expected(target)
+        assert expected.allowed.speed > late.allowed.speed
+        assert expected.waits == waits
+    active.sampled_controller.progress = progress._replace(is_restarting=True)
+    active.approach_constraints = Guidance(catch_up_speed=3.0, catch_up_share=9.0)
+    assert active.expected(target).allowed.speed > late.allowed.speed + 1.0
+    active.sampled_controller.progress = progress
+    assert active.expected(target) == late
