@@ -309,3 +309,6 @@ def test_what_is_expected_is_that_of_the_reference_around_the_climber():
     assert active.expected(target).allowed.speed > late.allowed.speed + 1.0
     active.sampled_controller.progress = progress
     assert active.expected(target) == late
+    slower = Trajectory(Line(length=2.0), RestToRest(rate=0.1, ramp_time=2.0))
+    active.preview = sampled(slower, 5.0)
+    assert active.expected(target).allowed.speed < late.allowed.speed
