@@ -26,6 +26,9 @@ from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Stribeck
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.shapes import SineWave
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.messages import writing
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
@@ -34,6 +37,11 @@ STEP = 0.0025  # [s] of the plant: of all times
 DURATION = 12.0  # [s], of which the second half counts
 OFF, CHATTER = 5e-3, 0.05  # [m] RMS distance and [N m] RMS change of a torque: a limit cycle
 AT_FIRST = 50  # messages at rest before a trial
+FORTH_AND_BACK = Trajectory(
+    SineWave(length=0.6, amplitude=0.1, wavelength=0.6),
+    RestToRest(rate=0.25, ramp_time=0.5, runs=0, pause=0.0),
+)
+PATHS = {"eight": EIGHT, "forth_and_back": FORTH_AND_BACK}
 
 
 class Robot(NamedTuple):
@@ -115,14 +123,16 @@ def told(of: Robot) -> float:
     return respond(motion_of(trying.heard), record, BUILT).delay if record.pulses else 0.0
 
 
-def driven(seed: int, delay_of: Callable[[Robot], float], guard: GuardOptions) -> Result:
+def driven(
+    seed: int, path: Trajectory, delay_of: Callable[[Robot], float], guard: GuardOptions
+) -> Result:
     """How the robot of a seed drives, told of a delay."""
     of = robot(seed)
     controller = ours(BUILT, SLOW_GUIDANCE, delay_of(of))
     controller.guard.options = guard
     run = simulate(
-        EIGHT,
-        AT_REST,
+        path,
+        State(path.at(0.0).pose, np.zeros(3)),
         DURATION,
         controller,
         of.climber,
@@ -146,12 +156,16 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first one")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--guard", action="store_true", help="with the guard: whom does it stop?")
+    what = "forth_and_back reverses, which counts as chatter: use it with --guard"
+    parser.add_argument("--path", choices=PATHS, default="eight", help=what)
     options = parser.parse_args()
+    path = PATHS[options.path]
     guard = GuardOptions() if options.guard else UNGUARDED
     seeds = range(options.first, options.first + options.robots)
     with Pool(options.processes) as pool:
         for name, delay_of in (("told nothing", untold), ("told by check_driver", told)):
-            results = pool.map(partial(driven, delay_of=delay_of, guard=guard), seeds, chunksize=1)
+            drive = partial(driven, path=path, delay_of=delay_of, guard=guard)
+            results = pool.map(drive, seeds, chunksize=1)
             cycles = [seed for seed, result in zip(seeds, results, strict=True) if result.cycles]
             worst = 1e3 * max(result.distance for result in results)
             said = f"{name}: {len(cycles)} of {len(seeds)} in a limit cycle {cycles or ''}"

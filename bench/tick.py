@@ -64,7 +64,7 @@ class WithMatrices(ControlLaw):
 
     solve: Callable[[Array, Array, Array, Array], Array] = as_the_paper
 
-    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
+    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
         """See `ControlLaw.generic`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
         demand = self.constraints.desired_acceleration(prepared, motion)
@@ -104,7 +104,7 @@ def tick(controller: Controller, stamp: int, motion: Motion) -> Command:
     command = controller.law.command(ahead, target.point)
     check_finite(command.wheels)
     active.go_on(target)
-    estimator.sent(ahead.begins, command.wheels, command.fits)
+    estimator.sent(ahead.begins, command.wheels, command.fits, target.point.speed)
     return command
 
 

@@ -121,7 +121,7 @@ class Loops:
             aimed_at = preview.target(law.aim(ahead))
             assert aimed_at is not None  # the preview goes beyond the duration
             command = law.command(ahead, aimed_at)
-            estimator.sent(ahead.begins, command.wheels, command.fits)
+            estimator.sent(ahead.begins, command.wheels, command.fits, aimed_at.speed)
             if not on_their_way:
                 before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
                 on_their_way.extend([before] * course.delay)

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from climber_uk.control.approach import Approach, nearest, speed_along
+from climber_uk.control.approach import Approach, nearest
 from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.guard import STANDS, Expected, Rates
 from climber_uk.control.guidance import Guidance
@@ -250,7 +250,7 @@ class ActiveReference:
 
 def _rate(motion: Motion, target: ReferencePoint) -> float:
     """Rate σ of a reference that is as fast as the climber is, 1 if that is nearly so."""
-    speed = speed_along(target)
+    speed = target.speed
     if abs(speed) < SLOW:
         return 1.0
     rate = float(min(max(motion.speed / speed, 0.0), 1.0))

@@ -98,16 +98,11 @@ def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
     ]
     found = int(times[int(np.argmin(offsets))])
     target = preview.target(found)
-    if target is None or abs(speed := speed_along(target)) < SLOW:
+    if target is None or abs(speed := target.speed) < SLOW:
         return found
     ahead = (motion.x - target.x) * target.v_x + (motion.y - target.y) * target.v_y
     ahead = min(max(ahead / (speed * speed), -skip / SKIP_STEPS / SECOND), skip / SECOND)
     return min(max(found + round(ahead * SECOND), begin), begin + skip)
-
-
-def speed_along(target: ReferencePoint) -> float:
-    """Speed of a target along its heading [m/s]."""
-    return float(target.v_x * math.cos(target.heading) + target.v_y * math.sin(target.heading))
 
 
 def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:

@@ -32,7 +32,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
-Solve = Callable[[Any, Motion], tuple[Any, Any]]  # force and moment
+Solve = Callable[[Any, Motion, Any], tuple[Any, Any]]  # force and moment
 
 
 @parameters(slots=True)
@@ -69,6 +69,7 @@ class ControlInput(NamedTuple):
     disturbance: Wrench  # see `Observer`
     period: float  # [s] for which the answer is going to act
     begins: int = 0  # [ns] when that begins
+    friction: Any = 0.0  # [N] of the seal beyond the climber's
 
 
 class Command(NamedTuple):
@@ -142,32 +143,33 @@ class ControlLaw:
         A fixed-point iteration of two passes: the answer itself moves the state to the time that it
         is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
-        climber, (motion, held, (r_drive, r_turn), period, _) = self.climber, situation
+        climber, (motion, held, (r_drive, r_turn), period, _, friction) = self.climber, situation
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         right, left = self._fixed_bounds or self._bounds(situation)
         solve = self._solve
         drive, turn = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
-            predicted = predict(climber, motion, drive + r_drive, turn + r_turn, ahead)
-            force, moment = solve(prepared, predicted)
+            predicted = predict(climber, motion, drive + r_drive, turn + r_turn, ahead, friction)
+            force, moment = solve(prepared, predicted, friction)
             force, moment = force - r_drive, moment - r_turn
             drive, turn, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
         lost = NOTHING if fits else Wrench(force - drive, moment - turn)
         lateral = climber.lateral_reaction(predicted)
         return Command(Torques(tau_r, tau_l), Wrench(force, moment), lateral, lost)
 
-    def closed_form(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
+    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
         """Qc = M Aᵀ b - Q (docs/theory.md, §4.2) in the climber's frame.
 
-        Forward [N] and about z [N m]; floats, or arrays (N,) of many climbers.
+        Forward [N] and about z [N m]; floats, or arrays (N,) of many climbers. `friction` [N] is
+        that beyond the climber's.
         """
         v_1, yaw_acceleration, speed = self.constraints.desired_acceleration(prepared, motion)
-        mass, inertia, friction, weight = self.climber.inertial
-        rubbing = friction * tanh(speed / self.options.friction_speed)
+        mass, inertia, modelled, weight = self.climber.inertial
+        rubbing = (modelled + friction) * tanh(speed / self.options.friction_speed)
         return mass * v_1 + rubbing + weight * motion.sine, inertia * yaw_acceleration
 
-    def generic(self, prepared: Any, motion: Motion) -> tuple[Any, Any]:
+    def generic(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
         """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
 
         Rows that constraints give themselves need no closed form.
@@ -178,14 +180,18 @@ class ControlLaw:
         else:
             desired = constraints.desired_acceleration(prepared, motion)
             (A, b), speed = rows(state, desired), desired.speed
-        Q = self.climber.applied_force(heading, tanh(speed / self.options.friction_speed))
+        direction = tanh(speed / self.options.friction_speed)
+        Q = self.climber.applied_force(heading, direction)
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
-        return along(heading, Qc), unpack(Qc)[2]
+        return along(heading, Qc) + friction * direction, unpack(Qc)[2]
 
-    def of_forces(self, target: ReferencePoint, motion: Motion) -> Wrench:
-        """Force and moment of another law."""
+    def of_forces(
+        self, target: ReferencePoint, motion: Motion, friction: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Force and moment of another law, which knows the climber's friction only."""
         assert self.other is not None
-        return self.other.wrench(self.climber, target, motion)
+        force, moment = self.other.wrench(self.climber, target, motion)
+        return force + friction * tanh(target.speed / self.options.friction_speed), moment
 
     def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

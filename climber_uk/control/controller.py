@@ -356,7 +356,7 @@ class Controller:
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
         active.go_on(target)
-        estimator.sent(ahead.begins, command.wheels, command.fits)
+        estimator.sent(ahead.begins, command.wheels, command.fits, point.speed)
         return target.mode, target.detail, command
 
     def _law_for(self, is_gentle: bool) -> ControlLaw:

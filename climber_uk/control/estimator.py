@@ -4,6 +4,7 @@ One climber, or many in step: arrays (N,) where there are floats. Stamps are int
 nanoseconds, on the clock of the odometry.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from climber_uk.control.control_law import ControlInput
@@ -28,7 +29,7 @@ class Observed(NamedTuple):
     after: Motion
     time: float  # [s] between them
     acted: Acting  # torques, and how long each [s]
-    disturbance: Wrench | DisturbanceEstimate  # as it was known before
+    disturbance: Wrench  # as it was known before
     reaction: float  # [s] in which a torque can answer
 
     @property
@@ -77,14 +78,16 @@ class Estimator:
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
         self.learnt = DisturbanceEstimate()
+        self._direction = 0.0  # of the reference: 1 forwards, -1 backwards, 0 at rest
         # whether no limit cut the last answer, so that what came out tells of the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
 
     @property
     def disturbance(self) -> Wrench:
-        """What pushes and turns the climber besides what the model knows."""
-        return Wrench(self.learnt.force, self.learnt.moment)
+        """What pushes and turns the climber besides what the model knows, friction included."""
+        learnt = self.learnt
+        return Wrench(learnt.force - self._direction * learnt.friction, learnt.moment)
 
     @disturbance.setter
     def disturbance(self, disturbance: Wrench) -> None:
@@ -113,7 +116,8 @@ class Estimator:
         """What an answer to the last odometry, given at its `age` [s], meets when it acts."""
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
-        return ControlInput(motion, self._sent.last, disturbance, self.period, begins)
+        held, friction = self._sent.last, learnt.friction
+        return ControlInput(motion, held, disturbance, self.period, begins, friction)
 
     def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
@@ -123,13 +127,17 @@ class Estimator:
         self._delay = delay
         return self._sent.begin(self.stamp + round(delay * SECOND))
 
-    def sent(self, begins: int, torques: Torques, learning: Any = False) -> None:
-        """Torques were sent, which act from `begins` [ns] on.
+    def sent(
+        self, begins: int, torques: Torques, learning: Any = False, speed: float | None = None
+    ) -> None:
+        """Torques were sent, which act from `begins` [ns] on, to drive at a `speed` [m/s].
 
         `learning` is whether they are what was wanted: if a limit cut them, what comes out tells
         nothing of the disturbance.
         """
         self._learning = learning
+        if speed is not None:
+            self._direction = math.copysign(1.0, speed) if abs(speed) > SLOW else 0.0
         self._sent.add(begins, torques)
         # without odometry, too, that of long ago is not needed
         self._sent.forget_before(max(self.stamp, begins - LONG_AGO))
@@ -148,10 +156,10 @@ class Estimator:
     def _rolled(self, motion: Motion, acting: Acting) -> Motion:
         """Motion after torques have acted, each for some time [s]."""
         climber, learnt = self.climber, self.learnt
-        r_drive, r_turn = learnt.force, learnt.moment
+        r_drive, r_turn, friction = learnt.force, learnt.moment, learnt.friction
         for torques, time in acting:
             drive, turn = climber.wrench(*torques)
-            motion = predict(climber, motion, drive + r_drive, turn + r_turn, time)
+            motion = predict(climber, motion, drive + r_drive, turn + r_turn, time, friction)
         return motion
 
     def _correct(
@@ -160,7 +168,7 @@ class Estimator:
         """Correct what is `expected` at `stamp` [ns] by the `motion` that was told."""
         time = (stamp - self.stamp) / SECOND
         reaction = self._delay + self.period / 2
-        observed = Observed(before, motion, time, acted, self.learnt, reaction)
+        observed = Observed(before, motion, time, acted, self.disturbance, reaction)
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)
         self._period_is_measured = True
@@ -171,7 +179,7 @@ class Estimator:
             if self.timing.learn_delay and is_known:
                 self._learn_delay(acted[-1][0], expected, motion, time, shares)
         self.motion, learnt = self.observer.corrected(
-            self.climber, self.learnt, expected, motion, time, shares
+            self.climber, self.learnt, expected, motion, time, shares, self._direction
         )
         self.stamp = stamp
         if is_known:

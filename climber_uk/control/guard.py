@@ -25,7 +25,7 @@ STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
 EXCITED = 0.12  # of the largest torque: standard deviation that tells whether a wheel answers
-LETS_GO = 0.15  # [s] after rest, in which friction that lets go may make it faster
+LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
 UNTOLD = 0.012  # [s] that a loop may take longer to answer than it knows
 SUSPECTED = 0.4  # of both is enough where the climber runs away
 REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
@@ -178,9 +178,10 @@ class Guard:
         before, after = observed.before.speed, observed.after.speed
         rests = abs(after) < MOVES or before * after < 0
         self._since_rest = 0.0 if rests else self._since_rest + observed.time
-        if self._since_rest > LETS_GO:
+        answered = observed.reaction + UNTOLD
+        if self._since_rest > LETS_GO + answered:
             return 0.0
-        return climber.seal_friction / climber.mass * (observed.reaction + UNTOLD)
+        return climber.seal_friction / climber.mass * answered
 
     def _watch_limit(
         self, climber: Climber, observed: Observed, expected: Expected, torques: Torques

@@ -3,7 +3,8 @@
     m v̇ = F - f σ - m g_t sinθ + r_F        J ω̇ = N + r_N
 
 (11) and (15) with a disturbance r = (r_F, r_N) [N, N m] for all that the model does not know:
-other friction, mass or suction, a payload, a push.
+other mass or suction, a payload, a push; but what f is off by is learnt apart, as it changes its
+sign with σ.
 """
 
 from typing import Any, NamedTuple
@@ -29,14 +30,18 @@ FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 
 
-def predict(climber: Climber, motion: Motion, force: Any, moment: Any, time: float) -> Motion:
+def predict(
+    climber: Climber, motion: Motion, force: Any, moment: Any, time: float, friction: Any = 0.0
+) -> Motion:
     """Motion `time` [s] later under a constant force [N] and moment [N m], by the midpoint rule.
 
-    Both include the disturbance. Below `SLOW`, where the sign of a measured speed tells nothing,
-    friction is taken to balance what pushes, up to f: while that suffices the speed stays as it is,
-    rather than being braked to rest (docs/theory.md, §8.2).
+    Both include the disturbance; `friction` [N] is that of the seal beyond the model's f. Below
+    `SLOW`, where the sign of a measured speed tells nothing, friction is taken to balance what
+    pushes, up to all of it: while that suffices the speed stays as it is, rather than being braked
+    to rest (docs/theory.md, §8.2).
     """
-    mass, inertia, friction, weight = climber.inertial
+    mass, inertia, modelled, weight = climber.inertial
+    friction = modelled + friction
     x, y, heading, cosine, sine, v, omega = motion
     half, omega_1 = 0.5 * time, moment / inertia
     halfway, angle = half * (omega + 0.5 * half * omega_1), time * (omega + half * omega_1)
@@ -65,11 +70,26 @@ class DisturbanceEstimate(NamedTuple):
     moment: Any = 0.0  # r_N [N m]
     force_rate: Any = 0.0  # [N/s]
     moment_rate: Any = 0.0  # [N m/s]
+    friction: Any = 0.0  # [N] of the seal beyond the model's f; -f to f
 
     @property
     def held(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
-        return DisturbanceEstimate(self.force, self.moment)
+        return DisturbanceEstimate(self.force, self.moment, friction=self.friction)
+
+    def changed(
+        self, climber: Climber, change: Any, direction: float, speed: Any
+    ) -> tuple[Any, Any]:
+        """Force and friction [N] as a `change` of both together [N] teaches.
+
+        At `speed` [m/s] in a `direction` (1, -1) nothing tells one from the other: each takes half,
+        the least correction that explains it. The other direction tells the rest. In none (0), or
+        where it slides the other way, all of it is put down to the force.
+        """
+        f, before = climber.seal_friction, self.friction
+        friction = clipped(before - 0.5 * direction * change, -f, f)
+        friction = select(direction * speed > -SLOW, friction, before)
+        return self.force + change + direction * (friction - before), friction
 
 
 @parameters(slots=True)
@@ -110,27 +130,30 @@ class Observer:
         found: Motion,
         time: float,
         shares: tuple[Any, Any],
+        direction: float = 0.0,
     ) -> tuple[Motion, DisturbanceEstimate]:
         """Motion and disturbance after `time` [s] in which `expected` became `found`.
 
-        `shares` are those of the observer for that time.
+        `shares` are those of the observer for that time; `direction` is 1 where the climber is to
+        drive forwards, -1 backwards, 0 at rest.
         """
         if self.velocity_source == "pose":
-            return self._from_pose(climber, learnt, expected, found, time)
+            return self._from_pose(climber, learnt, expected, found, time, direction)
         if everywhere(self.bandwidth == 0):
             return found, _faded(learnt, time)
-        force, moment, force_rate, moment_rate = learnt
+        _, moment, force_rate, moment_rate, _ = learnt
         mass, inertia, _, _ = climber.inertial
         new, newer = shares
         faster = (found.speed - expected.speed) / time
         turning = (found.yaw_rate - expected.yaw_rate) / time
-        force, moment = force + time * force_rate, moment + time * moment_rate
-        force, moment = force + new * mass * faster, moment + new * inertia * turning
+        change = time * force_rate + new * mass * faster
+        force, friction = learnt.changed(climber, change, direction, expected.speed)
+        moment = moment + time * moment_rate + new * inertia * turning
         # at rest, where friction holds whatever it is, nothing tells of a change
         slides = abs(expected.speed) > REST
         force_rate = select(slides, force_rate + newer / time * mass * faster, 0.0)
         moment_rate = moment_rate + newer / time * inertia * turning
-        return found, DisturbanceEstimate(force, moment, force_rate, moment_rate)
+        return found, DisturbanceEstimate(force, moment, force_rate, moment_rate, friction)
 
     def shares(self, time: float, delay: float) -> tuple[Any, Any]:
         """What of an acceleration that was not expected is put down to the disturbance.
@@ -148,6 +171,7 @@ class Observer:
         expected: Motion,
         found: Motion,
         time: float,
+        direction: float,
     ) -> tuple[Motion, DisturbanceEstimate]:
         x, y, heading, cosine, sine, v, omega = expected
         ahead = (found.x - x) * cosine + (found.y - y) * sine
@@ -165,10 +189,12 @@ class Observer:
         v, omega = v + h / time * ahead, omega + h / time * turned
         motion = Motion(x, y, *rotated(heading, cosine, sine, g * turned), v, omega)
         mass, inertia, _, _ = climber.inertial
-        force = learnt.force + k / time**2 * mass * ahead
-        return motion, DisturbanceEstimate(force, learnt.moment + k / time**2 * inertia * turned)
+        force, friction = learnt.changed(climber, k / time**2 * mass * ahead, direction, v)
+        moment = learnt.moment + k / time**2 * inertia * turned
+        return motion, DisturbanceEstimate(force, moment, friction=friction)
 
 
 def _faded(learnt: DisturbanceEstimate, time: float) -> DisturbanceEstimate:
     left = exp(-time / FORGETTING_TIME)
-    return DisturbanceEstimate(learnt.force * left, learnt.moment * left)
+    force, moment = learnt.force * left, learnt.moment * left
+    return DisturbanceEstimate(force, moment, friction=learnt.friction * left)

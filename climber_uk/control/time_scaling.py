@@ -6,7 +6,6 @@ short of the demand, then just small enough that it suffices (online time scalin
 not followed at all, s stands still.
 """
 
-import math
 from typing import NamedTuple
 
 from climber_uk.mechanics import SECOND
@@ -59,8 +58,7 @@ class Pace(NamedTuple):
         found = preview.target(time - round(self.lag * SECOND))
         if found is None:
             return self
-        cosine, sine = math.cos(found.heading), math.sin(found.heading)
-        speed = found.v_x * cosine + found.v_y * sine
+        speed = found.speed
         if missing * speed <= 0 or abs(speed) < SLOW:
             return self
         return self._replace(change=max(self.change - missing / speed, -self.rate / step))

@@ -5,6 +5,7 @@ vectors. So the equations of every tick stand on the components here, floats of 
 arrays (N,) of many; `State` has the same as vectors. Time derivatives end in _1 and _2 (§1.3).
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -57,6 +58,12 @@ class ReferencePoint(NamedTuple):
     yaw_acceleration: Any  # [rad/s²]
     j_x: Any  # jerk [m/s³]
     j_y: Any  # [m/s³]
+
+    @property
+    def speed(self) -> float:
+        """Along its heading [m/s], of one climber."""
+        heading = self.heading
+        return float(self.v_x * math.cos(heading) + self.v_y * math.sin(heading))
 
 
 class Wrench(NamedTuple):

@@ -28,14 +28,25 @@ def as_it_is(_, value):
 
 
 class Climb:
-    """Odometry every 5 ms, torques that act at once; what spoils either is given by the time."""
+    """Odometry every 5 ms, torques that act at once; what spoils either is given by the time.
 
-    def __init__(self, *, planner=None, offset=(0.0, 0.0, 0.0), scrubs=False, **parameters):
+    `truth` makes the true climber from the one that is believed in.
+    """
+
+    def __init__(
+        self,
+        *,
+        planner=None,
+        offset=(0.0, 0.0, 0.0),
+        scrubs=False,
+        truth=lambda it: it,
+        **parameters,
+    ):
         build_trajectory = {**read_file(CONFIG, "/trajectory_publisher"), **(planner or {})}
         self.trajectory = plan.build_trajectory(Values(build_trajectory).read)
         given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
         self.controller = build_controller(Values(given), None)
-        climber = replace(self.controller.law.climber, max_wheel_torque=100.0)
+        climber = replace(truth(self.controller.law.climber), max_wheel_torque=100.0)
         self.plant = Plant(climber, STEP, **({"contact": SCRUB, "slip": True} if scrubs else {}))
         reference = self.trajectory.at(0.0)
         self.state = State(reference.pose + np.array(offset), reference.velocity)

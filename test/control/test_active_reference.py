@@ -4,12 +4,19 @@ from climbs import Climb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from climber_uk.closed_loop.simulate import sampled
+from climber_uk.control.active_reference import ActiveReference
 from climber_uk.control.approach import Approach
+from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode
+from climber_uk.control.time_scaling import Pace, Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, State
+from climber_uk.mechanics.shapes import Line
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
 
 slow = pytest.mark.slow
 
@@ -247,3 +254,67 @@ def test_a_climber_that_has_turned_while_nobody_answered_goes_on_along_its_path(
     assert climb.off_the_path(begin) < 0.02
     assert climb.fastest() <= 1.3 * climb.reference_speed
     assert climb.position > before + 1.0
+
+
+LINE = Trajectory(Line(length=2.0), RestToRest(rate=0.5, ramp_time=2.0))
+
+
+class AtRest:
+    """A climber at rest at a place, and its active reference along a line."""
+
+    def __init__(self, x, y=0.0):
+        self.active = ActiveReference(Pacing(), Approach(), Guidance())
+        self.motion = State(np.array([x, y, 0.0]), np.zeros(3)).motion
+        self.active.take(sampled(LINE, 5.0))
+
+    def follow(self, stamp=SECOND):
+        """Go on to the target of a stamp; return how."""
+        target = self.active.target(self.motion, stamp, stamp)
+        if target.point is not None:
+            self.active.go_on(target)
+        return target.mode
+
+
+def test_a_pause_and_another_reference_end_a_way():
+    climber = AtRest(1.0, 1.0)
+    active = climber.active
+    assert climber.follow() is Mode.APPROACHING
+    assert active.followed is active.way
+    assert active.position(2 * SECOND) == SECOND  # it waits meanwhile
+    active.pause(SECOND)
+    assert active.way is None
+    assert active.at(SECOND) is None
+    assert climber.follow() is Mode.APPROACHING
+    other = sampled(Trajectory(Line(length=2.0), LINE.law, origin=(1.0, 1.0)), 5.0)
+    active.take(other)
+    assert active.followed is other
+    assert active.at(SECOND) is None
+    assert active.position(SECOND) is None
+    assert climber.follow() is Mode.FOLLOWING
+
+
+def test_what_is_expected_is_that_of_the_reference_around_the_climber():
+    climber, law = AtRest(0.0), Guidance()
+    active = climber.active
+    assert climber.follow() is Mode.FOLLOWING
+
+    def expected(stamp):
+        return active.expected(stamp, active.at(stamp), law)
+
+    early, late = expected(SECOND).allowed.speed, expected(4 * SECOND)
+    progress = active.progress
+    assert late.allowed.speed > early + 0.2
+    assert late.wanted == (pytest.approx(0.5), 0)
+    assert not late.waits
+    for rate, waits in ((0.9, False), (0.0, True)):
+        active.progress = progress._replace(pace=Pace(lag=0.1, rate=rate))
+        assert expected(4 * SECOND).allowed.speed > late.allowed.speed
+        assert expected(4 * SECOND).waits == waits
+    active.progress = progress._replace(is_restarting=True)
+    active.gentle = Guidance(catch_up_speed=3.0, catch_up_share=9.0)
+    assert expected(4 * SECOND).allowed.speed > late.allowed.speed + 1.0
+    active.progress = progress
+    assert expected(4 * SECOND) == late
+    slower = Trajectory(Line(length=2.0), RestToRest(rate=0.1, ramp_time=2.0))
+    active.preview = sampled(slower, 5.0)
+    assert expected(4 * SECOND).allowed.speed < late.allowed.speed

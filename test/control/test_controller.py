@@ -387,3 +387,42 @@ def test_too_little_suction_stops_the_climber_until_it_is_back():
     assert is_safe(loop)
     loop.controller.law = whole
     assert loop.tell() is Mode.FOLLOWING
+
+
+def faster(loop, factor, times=1, moved=(0.0, 0.0, 0.0)):
+    """Odometry that tells `factor` times the speed; the mode after each."""
+    modes = []
+    for _ in range(times):
+        loop.now += PERIOD
+        state = loop.state(loop.now)
+        told = State(state.pose + np.array(moved), factor * state.velocity)
+        loop.answer = loop.controller.on_odometry(loop.now, loop.now, told)
+        modes.append(loop.controller.mode)
+    return modes
+
+
+def test_enabling_forgives_what_the_guard_found(loop):
+    assert faster(loop, 3.0, 5)[-1] is Mode.TOO_FAST
+    assert loop.tell(times=10) is Mode.TOO_FAST
+    loop.controller.enable(True)
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_a_twist_is_compared_from_a_jump_on(loop):
+    assert set(faster(loop, 0.4, 100)) == {Mode.FOLLOWING}
+    modes = faster(loop, 0.4, 60, moved=(1.0, 0.0, 0.0))
+    assert modes[0] is Mode.JUMPED
+    assert set(modes) == {Mode.JUMPED, Mode.FOLLOWING}
+
+
+def test_a_twist_is_compared_from_the_rest_after_a_fault_on(loop):
+    loop.controller.guard.options = replace(loop.controller.guard.options, recovery_time=0.02)
+    assert faster(loop, 0.4, 130)[-1] is Mode.TWIST_WRONG
+    still = State(loop.state(loop.now).pose, np.zeros(3))
+    begin = loop.now
+    while loop.controller.mode is Mode.TWIST_WRONG:
+        loop.now += PERIOD
+        loop.answer = loop.controller.on_odometry(loop.now, loop.now, still)
+        assert loop.now - begin < SECOND
+    moved = still.pose - loop.state(loop.now).pose
+    assert Mode.TWIST_WRONG not in faster(loop, 0.4, 60, moved * [1, 1, 0])

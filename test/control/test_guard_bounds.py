@@ -104,6 +104,6 @@ def test_friction_that_lets_go_is_forgiven_for_a_moment_after_rest_only():
     for rest in (0.019, -0.019):
         climb = Watched()
         climb.finds(speed=rest)
-        assert climb.periods_until(Mode.TOO_FAST, speed=within) == 9  # the second after 0.15 s
+        assert climb.periods_until(Mode.TOO_FAST, speed=within) == 11  # the second after 0.182 s
         climb.finds(speed=rest)
         assert climb.periods_until(Mode.TOO_FAST, speed=beyond) == 2
