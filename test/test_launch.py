@@ -11,7 +11,9 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
+import yaml
 
+from climber_uk.messages import topics
 from climber_uk.simulation.options import SimulationOptions
 
 ROOT = Path(__file__).parents[1]
@@ -167,6 +169,18 @@ def test_what_the_arguments_say_is_started_and_ends_together(launch, words, star
     assert (set(found), is_recorded) == (started, recorded)
     required = {name for name, named in found.items() if "on_exit" in named}
     assert required == started & {PLANNER, CONTROLLER, PLANT}
+
+
+@without_launch
+@pytest.mark.parametrize(("word", "under"), [("", "/"), ("namespace:=/wall/north", "/wall/north/")])
+def test_a_recorder_lets_messages_of_the_loop_wait(launch, word, under):
+    recorder, _ = start(launch, "record:=true", *[word] * bool(word))
+    command = recorder.named["cmd"]
+    file = Path(command[command.index("--qos-profile-overrides-path") + 1])
+    overrides = yaml.safe_load(file.read_text())
+    loop = {topics.ODOMETRY, topics.TORQUES, topics.REFERENCE, topics.JOINTS, topics.FORCE}
+    assert {f"{under}{name}" for name in loop} | {"/clock"} <= overrides.keys()
+    assert all(how["depth"] == 5000 for how in overrides.values())
 
 
 @without_launch
