@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Transform, Twist
+from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics import SECOND
@@ -69,9 +70,14 @@ class ReferenceWriter:
         point = MultiDOFJointTrajectoryPoint(
             transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()]
         )
-        data, layout = serialized(writing.reference([point] * number, 0, *self.frames))
-        _, stamp, (_, row, begin, stride) = _points(layout)
-        return data, np.frombuffer(data, stamp), np.ndarray(number, row, data, begin, stride)
+        # of many points, the first two tell where the others are
+        # of many points, the first two tell where the others are
+        _, layout = serialized(writing.reference([point] * min(number, 2), 0, *self.frames))
+        _, stamp, (_, row, begin, (stride,)) = _points(layout)
+        whole = serialize_message(writing.reference([point] * number, 0, *self.frames))
+        data = bytearray(whole[: begin + (number - 1) * stride + row.itemsize])
+        points = np.ndarray(number, row, data, begin, (stride,))
+        return data, np.ndarray(1, stamp, data), points
 
 
 def _points(layout: Layout) -> tuple[str, Any, tuple[Any, ...]]:
