@@ -19,7 +19,8 @@ from world import CONFIG, TIMEOUT
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.preview import joined
-from climber_uk.messages import reading, references, writing
+from climber_uk.messages import reading, writing
+from climber_uk.messages.references import preview
 
 pytestmark = pytest.mark.nodes
 
@@ -344,7 +345,7 @@ def test_in_the_plants_place_it_stays_within_5_mm_rms(world, planner, heading, r
     times = range(start, start + round((2 * math.pi / rate + 3.0) * SECOND), SECOND // 200)
     world.wait(lambda: board.odometry and stamp(board.odometry[-1]) > times[-1], "end of the lap")
 
-    reference = joined(references.preview(message, "odom") for message in previews)
+    reference = joined(preview(message, "odom") for message in previews)
     rows = board.rows()
     told = {stamp(m): reading.state(m, "odom", "base_link").pose for m in board.odometry}
     true = {round(row[0] * 1e3) * (SECOND // 1000): row[1:4] for row in rows}

@@ -15,6 +15,7 @@ from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.messages import reading, writing
+from climber_uk.messages.references import preview
 
 pytestmark = pytest.mark.nodes
 
@@ -35,7 +36,7 @@ def test_the_reference_starts_at_the_stamp_of_the_first_odometry(world):
     world.wait(lambda: len(references) > 5, "previews")
     world.wait(lambda: paths, "path")
     begin = reading.nanoseconds(references[0].header.stamp)
-    whole = joined(references.preview(message, "odom") for message in references)
+    whole = joined(preview(message, "odom") for message in references)
     trajectory = Trajectory(Circle(), RestToRest(ramp_time=0.5))
     for time in whole.times:
         expected = trajectory.at((time - begin) * 1e-9)
