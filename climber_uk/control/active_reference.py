@@ -17,7 +17,7 @@ from climber_uk.mechanics.quantities import Motion, ReferencePoint
 SAME = 0.05  # [m, rad] within which a new preview goes on with the old one
 AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastest motion counts
 KEPT = 2 * SECOND  # [ns] of a reference that is kept behind the climber
-MOST_POINTS = 5000  # of a reference that are kept: who plans it may not wait
+MOST_POINTS = 5000  # of a reference that are kept, however many come
 LONGEST_SKIP = SECOND  # [ns] of a reference that a climber, which went on unanswered, may be ahead
 SLOW = 0.01  # [m/s] of a reference that is at rest
 AS_FAST = 0.9  # of the reference's speed, from which a climber goes on in time
@@ -167,10 +167,10 @@ class ActiveReference:
 
     # Where it is to be next
 
-    def target(self, motion: Motion, begins: int, aim: int) -> Target:
-        """Target for `aim` [ns], of a climber whose torques act from `begins` [ns] on.
+    def target(self, motion: Motion, begins: int, target_time: int) -> Target:
+        """Target at `target_time` [ns], of a climber in `motion` at `begins` [ns].
 
-        It will be in `motion` by then.
+        Its torques act from `begins` on; they are computed for `target_time`.
         """
         if self.preview is None:
             return Target(Mode.WAITING)
@@ -180,24 +180,24 @@ class ActiveReference:
                 return refused
         progress = self.progress.advanced(begins, self.pacing)
         if self.way is not None:
-            point = progress.target(self.way, aim)
+            point = progress.target(self.way, target_time)
             if point is None:  # it has arrived
                 self.way, self._is_paused = None, True
-                return self.target(motion, begins, aim)
+                return self.target(motion, begins, target_time)
             mode, detail = Mode.APPROACHING, f"{self._began_at:.2f} m away"
             return Target(mode, detail, point, True, progress)
-        point = progress.target(self.preview, aim)
+        point = progress.target(self.preview, target_time)
         if point is None:
             return Target(Mode.WAITING)
         return Target(Mode.FOLLOWING, "", point, self.is_gentle, progress)
 
-    def slowed(self, target: Target, missing: float, aim: int, period: float) -> Target:
+    def slowed(self, target: Target, missing: float, target_time: int, period: float) -> Target:
         """Target that asks `missing` [m/s²] less along the climber; see `Pace.slowed`."""
         preview, progress = self.followed, target.progress
         assert preview is not None
-        pace = progress.pace.slowed(missing, preview, aim - progress.waited, period)
+        pace = progress.pace.slowed(missing, preview, target_time - progress.waited, period)
         progress = progress._replace(pace=pace)
-        return target._replace(point=progress.target(preview, aim), progress=progress)
+        return target._replace(point=progress.target(preview, target_time), progress=progress)
 
     def go_on(self, target: Target) -> None:
         """Go on to where it is followed now."""
@@ -228,8 +228,8 @@ class ActiveReference:
                 f"{point.y:.2f}); max_start_distance is {options.max_start_distance} m",
             )
         self._is_paused, self._began_at, self._position = False, distance, position
-        turned = abs(wrapped(motion.heading - point.heading))
-        if distance > options.max_distance or turned > options.max_heading:
+        heading_error = abs(wrapped(motion.heading - point.heading))
+        if distance > options.max_distance or heading_error > options.max_heading:
             self.way = options.way(motion, point, time)
             self.progress = Progress()
         else:

@@ -44,21 +44,21 @@ class Approach:
         distance = math.hypot(offset_x, offset_y)
         first, direction = float(motion.heading), 1.0
         if distance > HERE:
-            turned = float(wrapped(math.atan2(offset_y, offset_x) - first))
-            if abs(turned) > math.pi / 2:  # in reverse gear it is less of a turn
-                turned, direction = float(wrapped(turned + math.pi)), -1.0
-            active = first + turned
+            heading_change = float(wrapped(math.atan2(offset_y, offset_x) - first))
+            if abs(heading_change) > math.pi / 2:  # in reverse gear it is less of a turn
+                heading_change, direction = float(wrapped(heading_change + math.pi)), -1.0
+            drive_heading = first + heading_change
         else:
-            distance, active = 0.0, first
-        last = active + float(wrapped(target.heading - active))
+            distance, drive_heading = 0.0, first
+        last = drive_heading + float(wrapped(target.heading - drive_heading))
         start = (motion.x, motion.y)
         end = (target.x, target.y) if distance else start
-        parts = [
-            self._turn(start, first, active),
-            self._drive(start, active, direction, distance),
-            self._turn(end, active, last),
+        moves = [
+            self._turn(start, first, drive_heading),
+            self._drive(start, drive_heading, direction, distance),
+            self._turn(end, drive_heading, last),
         ]
-        return _joined([part for part in parts if part is not None] or [_rest(end, last)], begin)
+        return _joined([move for move in moves if move is not None] or [_rest(end, last)], begin)
 
     def _turn(self, place: tuple[float, float], first: float, last: float) -> Array | None:
         angle = last - first
@@ -71,15 +71,15 @@ class Approach:
         return rows
 
     def _drive(
-        self, place: tuple[float, float], active: float, direction: float, distance: float
+        self, place: tuple[float, float], heading: float, direction: float, distance: float
     ) -> Array | None:
         if not distance:
             return None
         time, p, p_1, p_2 = _move(distance, self.approach_speed)
-        way = direction * distance * np.array([math.cos(active), math.sin(active)])
+        displacement = direction * distance * np.array([math.cos(heading), math.sin(heading)])
         rows = np.zeros((len(time), 10))
-        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * way, active
-        rows[:, 4:6], rows[:, 7:9] = p_1[:, None] * way, p_2[:, None] * way
+        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * displacement, heading
+        rows[:, 4:6], rows[:, 7:9] = p_1[:, None] * displacement, p_2[:, None] * displacement
         return rows
 
 
@@ -96,13 +96,13 @@ def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
         for target in targets
         if target is not None
     ]
-    found = int(times[int(np.argmin(offsets))])
-    target = preview.target(found)
+    time = int(times[int(np.argmin(offsets))])
+    target = preview.target(time)
     if target is None or abs(speed := target.speed) < SLOW:
-        return found
+        return time
     ahead = (motion.x - target.x) * target.v_x + (motion.y - target.y) * target.v_y
     ahead = min(max(ahead / (speed * speed), -skip / SKIP_STEPS / SECOND), skip / SECOND)
-    return min(max(found + round(ahead * SECOND), begin), begin + skip)
+    return min(max(time + round(ahead * SECOND), begin), begin + skip)
 
 
 def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:
@@ -122,12 +122,12 @@ def _rest(place: tuple[float, float], heading: float) -> Array:
     return rows
 
 
-def _joined(parts: list[Array], begin: int) -> Preview:
+def _joined(moves: list[Array], begin: int) -> Preview:
     """Preview of moves one after the other: rows of time, pose, velocity and acceleration."""
     rows: list[Array] = []
     end = 0.0
-    for part in parts:
-        rows.append(part[1 if rows else 0 :] + np.eye(10)[0] * end)
+    for move in moves:
+        rows.append(move[1 if rows else 0 :] + np.eye(10)[0] * end)
         end = rows[-1][-1, 0]
     table = np.concatenate(rows)
     times = begin + np.round(table[:, 0] * SECOND).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The controller as its parameters say, whoever reads them: a node, or a replay of its bag."""
+"""The controller as its parameters say, for its node, and for a replay of its bag."""
 
 from dataclasses import replace
 from typing import Protocol, TypeVar

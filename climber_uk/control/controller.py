@@ -203,7 +203,7 @@ class Controller:
         self._safe_output.forget()
         self._calm = Calm()
 
-    # 1. What an odometry tells, and whether that can be
+    # 1. What an odometry tells, and whether that is possible
 
     def _see(self, stamp: int, motion: Motion) -> Trouble | None:
         """Take in an odometry; return what is wrong with it."""
@@ -273,8 +273,8 @@ class Controller:
     def _answer(self, now: int) -> Answer | None:
         """Torques for the last odometry, in the mode of now."""
         age = min(max(0, now - self._stamp) / SECOND, LONGEST_STEP)
-        found = self._find_mode(now)
-        mode, detail = self._calm.mode(self.mode, max(now, self._stamp), found)
+        current = self._find_mode(now)
+        mode, detail = self._calm.mode(self.mode, max(now, self._stamp), current)
         command = None
         if mode in (FOLLOWING, Mode.NO_REFERENCE):
             is_followed, why, command = self._follow(age)
@@ -311,7 +311,7 @@ class Controller:
             return Mode.WAITING, ""
         if now - self._heard > self.safety.odometry_timeout * SECOND:
             return Mode.NO_ODOMETRY, ""
-        return self._trouble or self.guard.told or self._unfit() or self._missing(now)
+        return self._trouble or self.guard.trouble or self._unfit() or self._missing(now)
 
     def _unfit(self) -> Trouble | None:
         """What forbids to follow, though nothing is wrong."""
@@ -341,8 +341,8 @@ class Controller:
             return WAITING, "", None
         try:
             ahead = estimator.ahead(self.ages.latency(age, estimator.timing.max_latency))
-            aim = self._law.aim(ahead)
-            target = active.target(ahead.motion, ahead.begins, aim)
+            target_time = self._law.target_time(ahead)
+            target = active.target(ahead.motion, ahead.begins, target_time)
             point = target.point
             if point is None:
                 return target.mode, target.detail, None
@@ -350,7 +350,7 @@ class Controller:
             command = law.command(ahead, point)
             lost = command.lost.force
             if abs(lost) > CUT and active.pacing.catch_up > 0:
-                target = active.slowed(target, lost / law.climber.mass, aim, ahead.period)
+                target = active.slowed(target, lost / law.climber.mass, target_time, ahead.period)
                 command = law.command(ahead, target.point or point)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
@@ -373,8 +373,8 @@ class Controller:
         if self._retuned is None:
             return self._law.constraints
         since, before = self._retuned
-        share = (self.estimator.stamp - since) / SECOND / RETUNING_TIME
-        if not 0 <= share < 1 or type(before) is not type(self._law.constraints):
+        done = (self.estimator.stamp - since) / SECOND / RETUNING_TIME
+        if not 0 <= done < 1 or type(before) is not type(self._law.constraints):
             self._retuned = None
             return self._law.constraints
-        return blended(before, self._law.constraints, share)
+        return blended(before, self._law.constraints, done)

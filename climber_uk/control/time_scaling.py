@@ -55,20 +55,20 @@ class Pace(NamedTuple):
 
     def slowed(self, missing: float, preview: Preview, time: int, step: float) -> "Pace":
         """Pace that asks `missing` [m/s²] less along the climber, as far as `step` [s] can do."""
-        found = preview.target(time - round(self.lag * SECOND))
-        if found is None:
+        target = preview.target(time - round(self.lag * SECOND))
+        if target is None:
             return self
-        speed = found.speed
+        speed = target.speed
         if missing * speed <= 0 or abs(speed) < SLOW:
             return self
         return self._replace(change=max(self.change - missing / speed, -self.rate / step))
 
     def target(self, preview: Preview, time: int) -> ReferencePoint | None:
         """Target for `time` [ns] at this pace; None outside of the preview."""
-        found = preview.target(time - round(self.lag * SECOND))
-        if found is None or (self.rate == 1 and self.change == 0):
-            return found
-        x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y = found
+        target = preview.target(time - round(self.lag * SECOND))
+        if target is None or (self.rate == 1 and self.change == 0):
+            return target
+        x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y = target
         rates = self.rate, self.change, 0.0
         _, v_x, a_x, j_x = compose((x, v_x, a_x, j_x), rates)
         _, v_y, a_y, j_y = compose((y, v_y, a_y, j_y), rates)

@@ -1,12 +1,13 @@
-"""When torques act: as told (`Timing`), as the clock shows (`Ages`), and as is learnt (`Latency`).
+"""When torques act: as configured (`Timing`), as clocks show (`Ages`), as learnt (`Latency`).
 
 Which act when, of those that were sent, is in a `TorqueHistory`. Stamps and times of clocks are
 integers in nanoseconds.
 """
 
 from collections import deque
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from climber_uk.control.model import Shares
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Torques
 from climber_uk.parameters.declaration import parameter, parameters
@@ -145,22 +146,22 @@ class Oscillation:
 
     def __init__(self) -> None:
         self.reversals = 0.0
-        self._way, self._extreme = 1.0, 0.0
+        self._direction, self._extreme = 1.0, 0.0
 
     def add(self, acceleration: float, left: float) -> bool:
         """Whether it oscillates, with an `acceleration` [m/s²]; `left` of what was before."""
-        back = self._way * (self._extreme - acceleration)
+        back = self._direction * (self._extreme - acceleration)
         self.reversals *= left
         if back < 0 or back > SWING:
             self._extreme = acceleration
         if back > SWING:
-            self._way = -self._way
+            self._direction = -self._direction
             self.reversals += 1.0
         return self.reversals > OSCILLATES
 
 
 class Sample(NamedTuple):
-    """What a period tells, of the drive and of the turn; lengths of a turn are at the wheels."""
+    """What a period tells of (drive, yaw); of yaw as speed and acceleration of a wheel's rim."""
 
     accelerations: tuple[float, float]  # a [m/s²]
     errors: tuple[float, float]  # ε [m/s]
@@ -169,12 +170,12 @@ class Sample(NamedTuple):
 
 
 class Latency:
-    """How much later than told a torque acts: learnt where the loop begins to oscillate for it.
+    """How much later than configured a torque acts: learnt where the loop oscillates for it.
 
     Where a torque acts δ later than the model believes, speeds are off by ε = -δ (a - a₀), with a
     and a₀ the accelerations by the torques that act at the end and at the begin of a period, so far
     as the disturbance observer does not put that down to a disturbance: φ = ∂ε/∂δ goes through the
-    observer as ε does. δ of drive and turn together follows by recursive least squares that forget
+    observer as ε does. δ of drive and yaw together follows by recursive least squares that forget
     (Ljung & Söderström 1983, 3.6):
 
         S ← S (1 - T / T_f) + φ²,    δ ← δ - ε φ / (S + S₀)
@@ -198,26 +199,26 @@ class Latency:
         self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
         return self._far_off
 
-    def learn(self, sample: Sample, shares: tuple[Any, Any], told: float = 0.0) -> None:
+    def learn(self, sample: Sample, shares: Shares, configured_delay: float = 0.0) -> None:
         """Take in a period; `shares` are those of the observer.
 
-        A delay that is `told` [s] may be too long: what is learnt may be as much less than 0.
+        The `configured_delay` [s] may be too long: what is learnt may be below 0 by as much.
         """
         accelerations, _, time, slides = sample
-        drive, turn = self.oscillations
+        drive, yaw = self.oscillations
         left = max(0.0, 1.0 - time / MEMORY)
         # at rest friction goes to and fro, and holds
-        drives = slides and drive.add(accelerations[0], left)
-        turns = turn.add(accelerations[1], left)
+        drive_oscillates = slides and drive.add(accelerations[0], left)
+        yaw_oscillates = yaw.add(accelerations[1], left)
         self._energy *= left
-        if drives or turns:
-            self._learn(sample, (drives, turns), shares, told)
+        if drive_oscillates or yaw_oscillates:
+            self._learn(sample, (drive_oscillates, yaw_oscillates), shares, -configured_delay)
         else:
             self._slopes = STEADY
         self._before = accelerations
 
     def _learn(
-        self, sample: Sample, oscillates: tuple[bool, bool], shares: tuple[Any, Any], told: float
+        self, sample: Sample, oscillates: tuple[bool, bool], shares: Shares, least: float
     ) -> None:
         (new, newer), time, product, slopes = shares, sample.time, 0.0, []
         for i, (slope, rate) in enumerate(self._slopes):
@@ -228,4 +229,4 @@ class Latency:
         self._slopes = tuple(slopes)
         most = FASTEST * time
         change = min(max(-product / (self._energy + LEAST), -most), most)
-        self.delay = min(max(self.delay + change, -told), LONGEST)
+        self.delay = min(max(self.delay + change, least), LONGEST)

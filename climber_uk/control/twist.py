@@ -30,11 +30,11 @@ class TwistKind:
         """Take in an odometry, `time` [s] after the one `before`."""
         speed, rate = mean_twist(before, now, time)
         left = max(0.0, 1.0 - time / KIND_MEMORY)
-        off, turned_off = now.speed - speed, now.yaw_rate - rate
-        off_0, turned_off_0 = before.speed - speed, before.yaw_rate - rate
-        self._as_mean = left * self._as_mean + off * off + turned_off * turned_off
-        off, turned_off = (off + off_0) / 2, (turned_off + turned_off_0) / 2
-        self._as_instant = left * self._as_instant + off * off + turned_off * turned_off
+        off, yaw_off = now.speed - speed, now.yaw_rate - rate
+        off_0, yaw_off_0 = before.speed - speed, before.yaw_rate - rate
+        self._as_mean = left * self._as_mean + off * off + yaw_off * yaw_off
+        off, yaw_off = (off + off_0) / 2, (yaw_off + yaw_off_0) / 2
+        self._as_instant = left * self._as_instant + off * off + yaw_off * yaw_off
         self.is_mean = self._as_mean < SURELY * self._as_instant
 
 
@@ -49,25 +49,26 @@ class TwistCheck:
 
     def restart(self) -> None:
         """Compare from now on."""
-        self._ways = (0.0, 0.0), (0.0, 0.0)  # [m] by pose and by twist: forward, rim in turning
+        # [m] by pose and by twist: forward, and of a rim by yawing
+        self._distances = (0.0, 0.0), (0.0, 0.0)
         self._opposed = 0
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
         """Add the way from the last odometry to the next, `time` [s] later."""
-        turned = wrapped(motion.heading - last.heading)
-        middle = last.heading + turned / 2
+        heading_change = wrapped(motion.heading - last.heading)
+        middle = last.heading + heading_change / 2
         forward = (motion.x - last.x) * math.cos(middle) + (motion.y - last.y) * math.sin(middle)
         rim = half_track * time * (last.yaw_rate + motion.yaw_rate) / 2
         left = math.exp(-time / CHECK_MEMORY)
-        (pose, twist), (turned_by_pose, turned_by_twist) = self._ways
-        self._ways = (
+        (pose, twist), (yaw_by_pose, yaw_by_twist) = self._distances
+        self._distances = (
             (left * pose + forward, left * twist + time * (last.speed + motion.speed) / 2),
-            (left * turned_by_pose + half_track * turned, left * turned_by_twist + rim),
+            (left * yaw_by_pose + half_track * heading_change, left * yaw_by_twist + rim),
         )
 
     def opposed(self, least: float) -> str:
         """Which part of the twist has another sign than its way, of `least` [m]; else ''."""
-        for name, (pose, twist) in zip(("linear.x", "angular.z"), self._ways, strict=True):
+        for name, (pose, twist) in zip(("linear.x", "angular.z"), self._distances, strict=True):
             if pose * twist < 0 and min(abs(pose), abs(twist)) > least:
                 return f"twist.{name}"
         return ""
@@ -78,18 +79,18 @@ class TwistCheck:
         self._opposed = self._opposed + 1 if opposed else 0
         if self._opposed >= IN_A_ROW:
             return opposed, True
-        differs = max(_difference(*self._ways[0]), _difference(*self._ways[1]))
+        differs = max(_difference(*self._distances[0]), _difference(*self._distances[1]))
         return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
 
 
 def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
     """Forward speed [m/s] and yaw rate [rad/s] that lead from one pose to another in `time` [s]."""
     x, y, heading, cosine, sine, _, _ = before
-    turned = now.heading - heading
+    heading_change = now.heading - heading
     ahead = ((now.x - x) * (cosine + now.cosine) + (now.y - y) * (sine + now.sine)) / 2
     # halfway (cosine, sine) is longer by 1 / cos(turned / 2) than the mean of those at the ends
-    ahead = ahead * (1 + turned * turned / 8)
-    return ahead / time, turned / time
+    ahead = ahead * (1 + heading_change * heading_change / 8)
+    return ahead / time, heading_change / time
 
 
 def _difference(pose: float, twist: float) -> float:

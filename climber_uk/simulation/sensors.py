@@ -191,12 +191,12 @@ class DeadReckoning:
             angles = resolution * np.floor(angles / resolution)
         right, left = (climber.wheel_radius * (angles - self.counted)).tolist()
         self.counted = angles
-        way, turn = (right + left) / 2, (right - left) / (2 * climber.half_track)
+        distance, angle = (right + left) / 2, (right - left) / (2 * climber.half_track)
         x, y, heading = self.pose.tolist()
-        middle = heading + turn / 2
+        middle = heading + angle / 2
         self.pose = np.array(
-            [x + way * math.cos(middle), y + way * math.sin(middle), heading + turn]
+            [x + distance * math.cos(middle), y + distance * math.sin(middle), heading + angle]
         )
         if resolution > 0:
-            return State.rolling(self.pose, way / self.period, turn / self.period)
+            return State.rolling(self.pose, distance / self.period, angle / self.period)
         return State.rolling(self.pose, float(wheels.forward_speed), float(wheels.yaw_rate))

@@ -133,6 +133,6 @@ def test_a_delay_stays_within_its_bounds():
         for step in range(2000):
             swing = (-1.0) ** step
             sample = Sample((swing, swing), (-sign * swing, -sign * swing), 0.005)
-            latency.learn(sample, (0.0, 0.0), told=0.01)
+            latency.learn(sample, (0.0, 0.0), configured_delay=0.01)
         assert latency.delay == (LONGEST if sign > 0 else -0.01)
         assert latency.is_far_off is (sign > 0)
