@@ -1,4 +1,8 @@
-"""What is followed: the reference, as far as it is followed, or the way to where it waits."""
+"""Where the climber should be: on its reference, or on the way to where that waits.
+
+Times are stamps [ns] on the odometry's clock; a reference's own time [ns] is behind them by as much
+as it has waited.
+"""
 
 import math
 from typing import NamedTuple
@@ -24,7 +28,7 @@ AS_FAST = 0.9  # of the reference's speed, from which a climber goes on in time
 STRAYED = 1.5  # times `max_distance`, beyond which a climber that follows is off its path
 LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
 LONGEST_GAP = round(0.3 * SECOND)  # [ns] between two answers over which the reference goes on
-IN_TIME_AGAIN = 1e-3  # [1] of σ that is missing at the end of a restart
+IN_TIME_AGAIN = 1e-3  # 1 - σ at the end of a restart
 
 
 class Progress(NamedTuple):
@@ -33,7 +37,7 @@ class Progress(NamedTuple):
     time: int | None = None  # [ns] of the last answer
     waited: int = 0  # [ns]
     pace: Pace = IN_TIME
-    is_restarting: bool = False  # σ is on its way up to 1, and what is lost by it is waited
+    is_restarting: bool = False  # σ rises to 1; what is lost until then is not made up for
 
     def at(self, time: int) -> int:
         """Time of the reference [ns] at `time` [ns], near that of the last answer."""
@@ -72,11 +76,11 @@ class Target(NamedTuple):
     detail: str = ""
     point: ReferencePoint | None = None
     is_gentle: bool = False  # to be followed by constraints that can begin at rest
-    progress: Progress = Progress()
+    progress: Progress = Progress()  # once it is followed
 
 
 class ActiveReference:
-    """Knows where on its reference the climber is, and takes it there if it is elsewhere."""
+    """How far along its reference a climber is; if it is elsewhere, the way there."""
 
     def __init__(self, pacing: Pacing, options: Approach, gentle: Guidance) -> None:
         self.pacing, self.options = pacing, options
@@ -159,7 +163,7 @@ class ActiveReference:
         )
 
     def strayed(self, motion: Motion, target: ReferencePoint) -> tuple[Mode, str] | None:
-        """Whether a climber is too far from where it should be."""
+        """Mode and detail if a climber is too far from its `target`, else None."""
         distance = math.hypot(motion.x - target.x, motion.y - target.y)
         if distance <= STRAYED * self.options.max_distance:
             return None
@@ -200,7 +204,7 @@ class ActiveReference:
         return target._replace(point=progress.target(preview, target_time), progress=progress)
 
     def go_on(self, target: Target) -> None:
-        """Go on to where it is followed now."""
+        """Take over the progress of a target whose torques are sent."""
         self.progress = target.progress
         if self.way is None and target.progress.time is not None:
             self._position = target.progress.at(target.progress.time)
@@ -208,13 +212,13 @@ class ActiveReference:
     # Beginning, and going on after a pause
 
     def _first_position(self, time: int) -> int:
-        """Where a reference that was not followed yet is begun: now, if it is there."""
+        """Time of the reference [ns] at which it is begun: `time`, or else its first."""
         assert self.preview is not None
         first, last = int(self.preview.times[0]), int(self.preview.times[-1])
         return time if first <= time <= last else first
 
     def _begin(self, preview: Preview, motion: Motion, time: int) -> Target | None:
-        """Follow from `time` [ns] on: the reference, or a way to it; else say why not."""
+        """Follow the reference, or a way to it, from `time` [ns]; else a target without a point."""
         options = self.options
         position = self._where(preview, motion, time)
         point = preview.target(position)

@@ -39,7 +39,7 @@ class Approach:
     approach_yaw_rate: float = parameter(0.5, "rad/s", "fastest turn of the approach", above=0)
 
     def way(self, motion: Motion, target: ReferencePoint, begin: int) -> Preview:
-        """Reference from where a climber is, at rest from `begin` [ns] on, to where `target` is."""
+        """Preview from a climber's pose at `begin` [ns], at rest there, to the pose of `target`."""
         offset_x, offset_y = target.x - motion.x, target.y - motion.y
         distance = math.hypot(offset_x, offset_y)
         first, direction = float(motion.heading), 1.0
@@ -88,7 +88,7 @@ ANYWHERE = Approach(max_start_distance=1e6, max_distance=1e6, max_heading=10.0)
 
 
 def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
-    """Time of a reference [ns], from `begin` to `skip` after it [ns], when it is nearest."""
+    """Time of a reference [ns], within `skip` [ns] after `begin`, when it is nearest."""
     times = begin + np.linspace(0, skip, SKIP_STEPS + 1).astype(np.int64)
     targets = [preview.target(int(at)) for at in times]
     offsets = [
@@ -123,7 +123,10 @@ def _rest(place: tuple[float, float], heading: float) -> Array:
 
 
 def _joined(moves: list[Array], begin: int) -> Preview:
-    """Preview of moves one after the other: rows of time, pose, velocity and acceleration."""
+    """Preview of moves one after the other, from `begin` [ns] on.
+
+    Each is rows (n, 10): time [s], pose, velocity, acceleration, in the wall's frame.
+    """
     rows: list[Array] = []
     end = 0.0
     for move in moves:

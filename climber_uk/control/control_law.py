@@ -62,11 +62,11 @@ class ControlOptions:
 
 
 class ControlInput(NamedTuple):
-    """What the controller answers: the motion at which its torques will begin to act, and more."""
+    """What a command is computed for: the motion when its torques will begin to act, and more."""
 
     motion: Motion
-    held: Torques  # that act until then
-    disturbance: Wrench  # see `Observer`
+    held: Torques  # [N m] of before, that act until then
+    disturbance: Wrench  # without friction; see `Observer`
     period: float  # [s] for which the answer is going to act
     begins: int = 0  # [ns] when that begins
     friction: Any = 0.0  # [N] of the seal beyond the climber's
@@ -133,7 +133,7 @@ class ControlLaw:
         return situation.begins + round(self.options.lookahead(situation.period) * SECOND)
 
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
-        """Torques for a situation; `target` is that of half a period after it begins.
+        """Torques for a situation; `target` is that of `target_time`. May be not finite.
 
         A fixed-point iteration of two passes: the answer itself moves the state to the time that it
         is computed for, so the first pass predicts with `held`, the second with the first's result.

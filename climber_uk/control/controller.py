@@ -141,7 +141,7 @@ class Controller:
         """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
         self._look_at_clock(now)
         # a simulation publishes its first odometry right before its first /clock: how long there
-        # was no clock until then tells nothing, and is counted anew
+        # was no clock until then does not count
         if self._stamp == 0:
             self._clockless_looks = 0
         if stamp == self._stamp and self.mode in (FOLLOWING, APPROACHING):
@@ -169,7 +169,7 @@ class Controller:
         return self._answer(now)
 
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
-        """Keep a reference; answer the odometry that waits for one."""
+        """Take a reference; answer the odometry that waits for one."""
         self.active.take(preview)
         waits = self._waiting_since is not None or self.mode is Mode.NO_REFERENCE
         return self._answer(now) if waits else None
@@ -229,7 +229,7 @@ class Controller:
         self._moved_without_twist = 0.0
 
     def _check_twist(self, observed: Observed) -> Trouble | None:
-        """Whether the twist is missing, or another one than the pose's rate."""
+        """Trouble if the twist is not the pose's rate; counts how far it goes without a twist."""
         before, after = observed.before, observed.after
         if self.estimator.observer.velocity_source == "pose":
             return None
@@ -324,7 +324,7 @@ class Controller:
         return None
 
     def _missing(self, now: int) -> Trouble:
-        """Whether there is a reference."""
+        """Mode while nothing else forbids to follow: is there a reference?"""
         if self.active.begins_after(self._stamp):
             return Mode.NOT_BEGUN, ""
         since = now if self._waiting_since is None else self._waiting_since

@@ -23,10 +23,10 @@ Acting = list[tuple[Torques, float]]  # torques, and how long each acts [s]
 
 
 class Observed(NamedTuple):
-    """What an odometry tells, and what acted since the one before."""
+    """Two odometry messages in a row, and what acted between them."""
 
-    before: Motion
-    after: Motion
+    before: Motion  # as estimated
+    after: Motion  # as measured
     time: float  # [s] between them
     acted: Acting  # torques, and how long each [s]
     disturbance: Wrench  # as it was known before
@@ -79,7 +79,7 @@ class Estimator:
         """Forget what was learnt of the disturbance."""
         self.learnt = DisturbanceEstimate()
         self._direction = 0.0  # of the reference: 1 forwards, -1 backwards, 0 at rest
-        # whether no limit cut the last answer, so that what came out tells of the disturbance:
+        # whether no limit cut the last answer, so that errors are due to the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
 
@@ -113,7 +113,7 @@ class Estimator:
         return None
 
     def ahead(self, age: float) -> ControlInput:
-        """What an answer to the last odometry, given at its `age` [s], meets when it acts."""
+        """Situation when an answer to the last odometry, given at its `age` [s], begins to act."""
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
         held, friction = self._sent.last, learnt.friction
@@ -132,8 +132,8 @@ class Estimator:
     ) -> None:
         """Torques were sent, which act from `begins` [ns] on, to drive at a `speed` [m/s].
 
-        `learning` is whether they are what was wanted: if a limit cut them, what comes out tells
-        nothing of the disturbance.
+        `learning` is whether they are what was wanted: where a limit cut them, nothing is
+        learnt of the disturbance.
         """
         self._learning = learning
         if speed is not None:

@@ -24,9 +24,9 @@ AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
-EXCITED = 0.12  # of the largest torque: standard deviation that tells whether a wheel answers
+EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
-UNTOLD = 0.012  # [s] that a loop may take longer to answer than it knows
+UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
 SUSPECTED = 0.4  # of both is enough where the climber runs away
 REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
 STALL_REST = 10  # times the rest after which a stalled climber tries again
@@ -73,7 +73,7 @@ class Rates(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """What a climber is to do."""
+    """What a climber is to do, by its reference and constraints."""
 
     wanted: Rates  # of the reference
     allowed: Rates  # at most
@@ -178,7 +178,7 @@ class Guard:
         before, after = observed.before.speed, observed.after.speed
         rests = abs(after) < MOVES or before * after < 0
         self._since_rest = 0.0 if rests else self._since_rest + observed.time
-        answered = observed.reaction + UNTOLD
+        answered = observed.reaction + UNKNOWN_DELAY
         if self._since_rest > LETS_GO + answered:
             return 0.0
         return climber.seal_friction / climber.mass * answered

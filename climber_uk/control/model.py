@@ -37,7 +37,7 @@ def predict(
     """Motion `time` [s] later under a constant force [N] and moment [N m], by the midpoint rule.
 
     Both include the disturbance; `friction` [N] is that of the seal beyond the model's f. Below
-    `SLOW`, where the sign of a measured speed tells nothing, friction is taken to balance what
+    `SLOW`, where the sign of a measured speed is chance, friction is taken to balance what
     pushes, up to all of it: while that suffices the speed stays as it is, rather than being braked
     to rest (docs/theory.md, §8.2).
     """
@@ -83,8 +83,8 @@ class DisturbanceEstimate(NamedTuple):
     ) -> tuple[Any, Any]:
         """Force and friction [N] as a `change` of both together [N] teaches.
 
-        At `speed` [m/s] in a `direction` (1, -1) nothing tells one from the other: each takes half,
-        the least correction that explains it. The other direction tells the rest. In none (0), or
+        At `speed` [m/s] in a `direction` (1, -1) the two cannot be told apart: each takes half, the
+        least correction that explains it. The other direction shows the rest. In none (0), or
         where it slides the other way, all of it is put down to the force.
         """
         f, before = climber.seal_friction, self.friction
@@ -100,8 +100,8 @@ class Observer:
     With measured speeds it is a momentum observer of second order: a disturbance that grows
     steadily leaves no error. Both poles are at K, or lower: K (2 T + δ) <= `MOST_LEARNT`, with T
     the period and δ the delay that is known. Without measured speeds it is a critically damped
-    filter of poses (fading memory of third order, or of second order if K = 0). What friction
-    holds teaches nothing: the model expects no motion.
+    filter of poses (fading memory of third order, or of second order if K = 0). What stiction
+    balances is not learnt: the model expects no motion.
     """
 
     bandwidth: float = parameter(
@@ -150,16 +150,16 @@ class Observer:
         change = time * force_rate + new * mass * acceleration
         force, friction = learnt.changed(climber, change, direction, expected.speed)
         moment = moment + time * moment_rate + new * inertia * yaw_acceleration
-        # at rest, where friction holds whatever it is, nothing tells of a change
+        # at rest stiction balances any force, so that no change of it shows
         slides = abs(expected.speed) > REST
         force_rate = select(slides, force_rate + newer / time * mass * acceleration, 0.0)
         moment_rate = moment_rate + newer / time * inertia * yaw_acceleration
         return measured, DisturbanceEstimate(force, moment, force_rate, moment_rate, friction)
 
     def shares(self, time: float, delay: float) -> Shares:
-        """What of an acceleration that was not expected is put down to the disturbance.
+        """Shares of an unexpected acceleration: disturbance, and its change in `time` [s].
 
-        And what of it to the disturbance's change in `time` [s]; `delay` [s] is that of torques.
+        `delay` [s] is that of torques.
         """
         most = MOST_LEARNT * time / (2.0 * time + delay)
         new = 1.0 - exp(-clipped(self.bandwidth * time, 0.0, most))

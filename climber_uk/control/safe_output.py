@@ -1,4 +1,4 @@
-"""The safe output: no torque, or the weight held and motion braked, as `Safety` says."""
+"""The safe output: no torque, or brake while carrying the weight, as `Safety` says."""
 
 from climber_uk.control.control_law import ControlLaw, check_finite
 from climber_uk.control.estimator import Estimator

@@ -17,7 +17,7 @@ SPEED_TIME = 0.1  # [s] in which a jump of the speed would become one of the pla
 
 
 class Mode(Enum):
-    """What the controller does; the value is what it says about it."""
+    """What the controller does; the value is its text in log and diagnostics."""
 
     FOLLOWING = "following"
     WAITING = "waiting for a reference"  # the only one without any output: a simulation waits
@@ -49,7 +49,7 @@ class Mode(Enum):
 
     @property
     def doubts_odometry(self) -> bool:
-        """Whether the speeds that odometry tells must not be braked by."""
+        """Whether speeds of odometry may be wrong, so that braking by them may drive."""
         return self in (
             Mode.BAD_ODOMETRY,
             Mode.JUMPED,

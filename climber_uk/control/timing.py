@@ -99,7 +99,7 @@ class TorqueHistory:
         self.last = NONE  # the torques that will act in the end
 
     def begin(self, wanted: int) -> int:
-        """When torques would begin to act [ns]: as wanted, but none overtakes the last ones."""
+        """When torques begin to act [ns]: at `wanted` [ns], but no earlier than the last ones."""
         return max(wanted, self._begun[-1][0]) if self._begun else wanted
 
     def add(self, begins: int, torques: Torques) -> None:
@@ -108,7 +108,7 @@ class TorqueHistory:
         self.last = torques
 
     def correct(self, torques: Torques) -> None:
-        """Have other torques acting in the place of the last ones."""
+        """Replace the last torques, from when those begin to act."""
         begins, _ = self._begun.pop()
         self.add(begins, torques)
 
@@ -207,7 +207,7 @@ class Latency:
         accelerations, _, time, slides = sample
         drive, yaw = self.oscillations
         left = max(0.0, 1.0 - time / MEMORY)
-        # at rest friction goes to and fro, and holds
+        # at rest friction oscillates with the force that it balances
         drive_oscillates = slides and drive.add(accelerations[0], left)
         yaw_oscillates = yaw.add(accelerations[1], left)
         self._energy *= left

@@ -9,7 +9,7 @@ KIND_MEMORY = 1.0  # [s]
 SURELY = 0.1  # share of the other's squares of misfits, below which a twist is taken for a mean
 CHECK_MEMORY = 0.5  # [s] in which a difference is forgotten
 SHARE = 0.3  # by which they may differ: slip, scale
-OPPOSED = 0.2  # of the largest error: way both of them must have gone, to opposite sides
+OPPOSED = 0.2  # of the largest error: distance of both, to opposite sides
 IN_A_ROW = 3  # odometry messages that say so
 SUSPECTED = 0.02  # of the largest error: enough, and once, where a climber is too fast as well
 
@@ -17,8 +17,8 @@ SUSPECTED = 0.02  # of the largest error: enough, and once, where a climber is t
 class TwistKind:
     """Whether the twist of late is that of its stamp, or the mean of the period before it.
 
-    Encoders tell means: the way of a period, by its time. A twist of the stamp is that way by the
-    time only together with the one before: (v + v₀)/2. What fits the poses better is taken; if in
+    Encoders give means: the distance of a period, by its time. A twist of the stamp is that only
+    together with the one before: (v + v₀)/2. What fits the poses better is taken; if in
     doubt, the twist is that of its stamp.
     """
 
@@ -41,7 +41,7 @@ class TwistKind:
 class TwistCheck:
     """Whether the twist is the rate of the pose: its sign may be wrong.
 
-    Compares ways by pose and by twist, each the sum of what was gone in the last moments.
+    Compares distances by pose and by twist, summed over the last moments, older ones counting less.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class TwistCheck:
         self._opposed = 0
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
-        """Add the way from the last odometry to the next, `time` [s] later."""
+        """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
         heading_change = wrapped(motion.heading - last.heading)
         middle = last.heading + heading_change / 2
         forward = (motion.x - last.x) * math.cos(middle) + (motion.y - last.y) * math.sin(middle)
@@ -67,7 +67,7 @@ class TwistCheck:
         )
 
     def opposed(self, least: float) -> str:
-        """Which part of the twist has another sign than its way, of `least` [m]; else ''."""
+        """Field of the twist whose sign is not its pose's, over `least` [m] of both; else ''."""
         for name, (pose, twist) in zip(("linear.x", "angular.z"), self._distances, strict=True):
             if pose * twist < 0 and min(abs(pose), abs(twist)) > least:
                 return f"twist.{name}"
@@ -88,11 +88,11 @@ def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
     x, y, heading, cosine, sine, _, _ = before
     heading_change = now.heading - heading
     ahead = ((now.x - x) * (cosine + now.cosine) + (now.y - y) * (sine + now.sine)) / 2
-    # halfway (cosine, sine) is longer by 1 / cos(turned / 2) than the mean of those at the ends
+    # (cosine, sine) halfway is longer than the mean of those at the ends by 1 / cos of half of it
     ahead = ahead * (1 + heading_change * heading_change / 8)
     return ahead / time, heading_change / time
 
 
 def _difference(pose: float, twist: float) -> float:
-    """By how much two ways differ, beyond what slip and scale explain [m]."""
+    """By how much two distances [m] differ, beyond what slip and scale explain [m]."""
     return abs(pose - twist) - SHARE * max(abs(pose), abs(twist))

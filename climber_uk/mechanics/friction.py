@@ -124,8 +124,8 @@ class Stribeck(Friction):
 
     def gamma(self, speed: Any) -> Any:
         """γ(v) (...), the level without its viscous part, by f."""
-        part = speed / self.speed
-        return 1 + (self.ratio - 1) * exp(-part * part)
+        relative = speed / self.speed
+        return 1 + (self.ratio - 1) * exp(-relative * relative)
 
     def steepness(self, f: Any) -> Any:
         """See `Friction`: √(2/e) at v_s/√2 is that of the Gaussian."""

@@ -146,21 +146,21 @@ class Plant:
                 return None
             direction = moment / resistance
         resisted = inputs._replace(push_moment=inputs.push_moment - resistance * direction)
-        if not self._wheels_hold(y, inputs, resisted):
+        if not self._wheels_stick(y, inputs, resisted):
             return None
         end = self._rolling.step(y, resisted)
         if end is None or (resistance > 0 and y[5] != 0 and end[5] * direction <= 0):
             return None
-        return end if self._wheels_hold(end, inputs, resisted) else None
+        return end if self._wheels_stick(end, inputs, resisted) else None
 
-    def _wheels_hold(self, y: Array, inputs: Inputs, resisted: Inputs) -> bool:
+    def _wheels_stick(self, y: Array, inputs: Inputs, resisted: Inputs) -> bool:
         """Whether no wheel slips at y; `resisted` are the inputs with the tracks' resistance."""
         if not self.slip:
             return True
         if abs(State(y[:3], y[3:6]).side_slip) > SIDEWAYS * (1 + abs(forward_speed(y))):
             return False
         rates = self._rolling.accelerations(y, resisted)
-        return self._sliding.wheels_hold(y, inputs, rates, self._load(y))
+        return self._sliding.wheels_stick(y, inputs, rates, self._load(y))
 
     @cached_property
     def _is_attached_everywhere(self) -> bool:

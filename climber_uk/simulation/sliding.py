@@ -53,7 +53,7 @@ class ContactStepper:
         climber = self.body.climber
         return climber.yaw_inertia - 2 * self.rim * climber.half_track**2 * self.slip
 
-    def wheels_hold(
+    def wheels_stick(
         self, y: Array, inputs: Inputs, accelerations: tuple[float, float], load: float
     ) -> bool:
         """Whether wheels that share `load` [N] can go on rolling, with v̇ [m/s²] and ω̇ [rad/s²]."""
@@ -105,8 +105,8 @@ class ContactStepper:
             lightness = 1 / (masses + h * drag)
             free[1] = lightness[1] = 0.0
         cones = self._cones(load, float(np.linalg.norm(sliding)), h)
-        velocities, holds = solve_friction_impulses(free * lightness, lightness, cones)
-        v, u, omega = self._velocities(velocities[:3], holds)
+        velocities, sticks = solve_friction_impulses(free * lightness, lightness, cones)
+        v, u, omega = self._velocities(velocities[:3], sticks)
 
         deflection_1 = self._deflected(
             sliding, np.array([v, u, omega * self._radius]), np.array(deflection), h
@@ -155,10 +155,10 @@ class ContactStepper:
         cones.append(Cone(np.eye(1, n, 2), h * resistance))
         return cones
 
-    def _velocities(self, velocities: Array, holds: list[bool]) -> tuple[float, float, float]:
+    def _velocities(self, velocities: Array, sticks: list[bool]) -> tuple[float, float, float]:
         """(v, u, ω) of `velocities` (n,), exactly 0 where a contact sticks."""
         v, u, omega = velocities.tolist()
-        seal_sticks, yaw_sticks = holds[-2:]
+        seal_sticks, yaw_sticks = sticks[-2:]
         if seal_sticks and math.hypot(v, u, self._radius * omega) < STUCK:
             v, u, omega = 0.0, 0.0, 0.0 if self._radius > 0 else omega
         return v, u, 0.0 if yaw_sticks and abs(omega) < STUCK else omega

@@ -223,6 +223,7 @@ def test_one_call_serves_many_climbers(constraints, limit):
     held, disturbance = random.normal(size=(2, n)), 10 * random.normal(size=(2, n))
     many = ControlInput(motion, Torques(*held), Wrench(*disturbance), PERIOD)
     together = law.command(many, reference.target)
+    lost = np.broadcast_to(np.transpose(together.lost), (n, 2))
     for i in range(n):
         one = ControlInput(
             Motion(*(float(number[i]) for number in motion)),
@@ -231,7 +232,9 @@ def test_one_call_serves_many_climbers(constraints, limit):
             PERIOD,
         )
         alone = law.command(one, reference.target)
-        for name in ("torques", "constraint_force", "missing"):
-            expected = getattr(alone, name)
-            got = getattr(together, name)[i]
+        for got, expected in (
+            (together.torques[i], alone.torques),
+            (together.constraint_force[i], alone.constraint_force),
+            (lost[i], alone.lost),
+        ):
             np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * 100)
