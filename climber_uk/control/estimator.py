@@ -89,10 +89,6 @@ class Estimator:
         learnt = self.learnt
         return Wrench(learnt.force - self._direction * learnt.friction, learnt.moment)
 
-    @disturbance.setter
-    def disturbance(self, disturbance: Wrench) -> None:
-        self.learnt = DisturbanceEstimate(*disturbance)
-
     def see(self, stamp: int, motion: Motion) -> Observed | None:
         """Correct state and disturbance by an odometry of `stamp` [ns], newer than the last.
 

@@ -89,7 +89,7 @@ def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: Spee
 def _cells(
     curve: Any, period: float | None, length: float, most: float, limits: SpeedLimits, least: float
 ) -> tuple[Array, Array]:
-    """Sizes (n,) of cells small enough to tell where it is how slow, and the ρ (n,) in each."""
+    """Sizes (n,) of cells in which ρ varies little, and the ρ (n,) needed in each."""
     edges = np.unique(np.clip(curve.t, 0.0, length))
     start, size = edges[:-1], np.diff(edges)
     _check_number(start)

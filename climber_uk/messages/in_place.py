@@ -29,12 +29,12 @@ class Layouts(Generic[Found]):
 
     def __init__(self, kind: type, find: Callable[[Layout], Found]) -> None:
         self.kind, self.find = kind, find
-        # by size: what was found, and the bytes that those messages have in common, with their ends
+        # by size: their contents, and the bytes that those messages have in common, with their ends
         self._known: dict[int, tuple[Found, list[tuple[int, int, bytes]]]] = {}
         self._left = MOST_LAYOUTS  # to be looked for
 
     def of(self, data: bytes) -> Found | None:
-        """What was found for messages with the strings and lengths of `data`; None: deserialise."""
+        """Contents of messages with the strings and lengths of `data`; None: deserialise."""
         known = self._known.get(len(data))
         if known is not None and all(data[i:j] == fixed for i, j, fixed in known[1]):
             return known[0]

@@ -19,7 +19,7 @@ from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import RigidBody, forward_speed
 
 PARTS = 8  # of a step
-STUCK = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds
+STUCK = 1e-10  # [m/s] of sliding that the iteration may leave where a contact sticks
 
 
 class ContactStepper:
