@@ -12,18 +12,17 @@ from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.guard import STANDS, Expected, Rates
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode
-from climber_uk.control.time_scaling import IN_TIME, Pace, Pacing
+from climber_uk.control.time_scaling import IN_TIME, STANDSTILL, Pace, Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
 
-SAME = 0.05  # [m, rad] within which a new preview goes on with the old one
+TOLERANCE = 0.05  # [m, rad] within which a new preview goes on with the old one
 AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastest motion counts
-KEPT = 2 * SECOND  # [ns] of a reference that is kept behind the climber
+KEPT_BEHIND = 2 * SECOND  # [ns] of a reference that is kept behind the climber
 MOST_POINTS = 5000  # of a reference that are kept, however many come
 LONGEST_SKIP = SECOND  # [ns] of a reference that a climber, which went on unanswered, may be ahead
-SLOW = 0.01  # [m/s] of a reference that is at rest
 AS_FAST = 0.9  # of the reference's speed, from which a climber goes on in time
 STRAYED = 1.5  # times `max_distance`, beyond which a climber that follows is off its path
 LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
@@ -121,11 +120,11 @@ class ActiveReference:
 
     def take(self, preview: Preview) -> None:
         """Take a newer part of the reference, or another reference."""
-        if self.preview is None or not self.preview.goes_on_with(preview, SAME):
+        if self.preview is None or not self.preview.goes_on_with(preview, TOLERANCE):
             self.preview, self.way, self._position, self._is_paused = preview, None, None, True
             return
         here = int(preview.times[0]) if self._position is None else self._position
-        self.preview = self.preview.continued(preview, here - KEPT).last(MOST_POINTS)
+        self.preview = self.preview.continued(preview, here - KEPT_BEHIND).last(MOST_POINTS)
 
     def pause(self, stamp: int) -> None:
         """Stand still on the reference, which is not followed at `stamp` [ns]."""
@@ -255,7 +254,7 @@ class ActiveReference:
 def _rate(motion: Motion, target: ReferencePoint) -> float:
     """Rate σ of a reference that is as fast as the climber is, 1 if that is nearly so."""
     speed = target.speed
-    if abs(speed) < SLOW:
+    if abs(speed) < STANDSTILL:
         return 1.0
     rate = float(min(max(motion.speed / speed, 0.0), 1.0))
     return 1.0 if rate > AS_FAST else rate

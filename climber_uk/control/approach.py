@@ -8,18 +8,18 @@ import math
 
 import numpy as np
 
+from climber_uk.control.time_scaling import STANDSTILL
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
 
-PEAK = 15 / 8  # of p'
+PEAK_RATE = 15 / 8  # of p'
 SHORTEST = 0.4  # [s] that a move takes
 POINT_PERIOD = 0.05  # [s]
-HERE = 1e-3  # [m] that need not be driven
+NO_DISTANCE = 1e-3  # [m] that need not be driven
 SKIP_STEPS = 20  # in which it is looked for where the climber is ahead
-SLOW = 0.01  # [m/s] of a reference that is at rest
 
 
 @parameters
@@ -43,7 +43,7 @@ class Approach:
         offset_x, offset_y = target.x - motion.x, target.y - motion.y
         distance = math.hypot(offset_x, offset_y)
         first, direction = float(motion.heading), 1.0
-        if distance > HERE:
+        if distance > NO_DISTANCE:
             heading_change = float(wrapped(math.atan2(offset_y, offset_x) - first))
             if abs(heading_change) > math.pi / 2:  # in reverse gear it is less of a turn
                 heading_change, direction = float(wrapped(heading_change + math.pi)), -1.0
@@ -98,7 +98,7 @@ def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
     ]
     time = int(times[int(np.argmin(offsets))])
     target = preview.target(time)
-    if target is None or abs(speed := target.speed) < SLOW:
+    if target is None or abs(speed := target.speed) < STANDSTILL:
         return time
     ahead = (motion.x - target.x) * target.v_x + (motion.y - target.y) * target.v_y
     ahead = min(max(ahead / (speed * speed), -skip / SKIP_STEPS / SECOND), skip / SECOND)
@@ -107,7 +107,7 @@ def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
 
 def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:
     """Times (n,) [s], and p, ṗ, p̈ at them, of a move of `size` at a rate of `fastest` at most."""
-    duration = max(PEAK * size / fastest, SHORTEST)
+    duration = max(PEAK_RATE * size / fastest, SHORTEST)
     time = np.linspace(0.0, duration, math.ceil(duration / POINT_PERIOD) + 1)
     u = time / duration
     p = u**3 * (10 - 15 * u + 6 * u**2)

@@ -27,7 +27,7 @@ from climber_uk.control.safe_output import SafeOutput
 from climber_uk.control.safety import Calm, Mode, Safety, Trouble
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import LONGEST_STEP, Ages, Timing
-from climber_uk.control.twist import SUSPECTED, TwistCheck
+from climber_uk.control.twist import OPPOSED_IF_TOO_FAST, TwistCheck
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.preview import Preview
@@ -264,7 +264,7 @@ class Controller:
         fault = self.guard.watch(self._law.climber, observed, expected)
         fault = fault or self.active.strayed(observed.before, target)
         if fault is not None and fault[0] is Mode.TOO_FAST:
-            sign = self._twist.opposed(SUSPECTED * self.safety.max_twist_error)
+            sign = self._twist.opposed(OPPOSED_IF_TOO_FAST * self.safety.max_twist_error)
             return (Mode.SIGN_WRONG, sign) if sign else fault
         return fault
 

@@ -17,7 +17,7 @@ from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.parameters.declaration import parameter, parameters
 
-IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
+TOO_FAST_IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
 SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
 AT_LIMIT = 0.98  # of the largest torque
@@ -27,8 +27,8 @@ UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
-SUSPECTED = 0.4  # of both is enough where the climber runs away
-REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
+PROOF_IF_TOO_FAST = 0.4  # of `EXCITED` and `UNANSWERED` is enough where it is too fast as well
+RIM_REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
 STALL_REST = 10  # times the rest after which a stalled climber tries again
 
 
@@ -153,7 +153,7 @@ class Guard:
         self._add_to_wheels(climber, observed, torques)
         too_fast = self._watch_rates(climber, observed, expected.allowed)
         return (
-            self._watch_wheels(climber, torques, SUSPECTED if too_fast else 1.0)
+            self._watch_wheels(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
             or too_fast
             or self._watch_limit(climber, observed, expected, torques)
             or self._watch_disturbance(climber, observed.disturbance)
@@ -166,7 +166,7 @@ class Guard:
         is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
         is_yawing = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_yaw_rate
         self._too_fast = self._too_fast + 1 if is_fast or is_yawing else 0
-        if self._too_fast < IN_A_ROW:
+        if self._too_fast < TOO_FAST_IN_A_ROW:
             return None
         measured, most, unit = motion.speed, fastest, "m/s"
         if not is_fast:
@@ -260,7 +260,7 @@ class Guard:
     def rest(self, climber: Climber, motion: Motion, time: float) -> None:
         """A climber that had a fault is in `motion` for `time` [s]; if it has rested, trust it."""
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
-        self._rested = self._rested + time if rim < REST else 0.0
+        self._rested = self._rested + time if rim < RIM_REST else 0.0
         needed = self.options.recovery_time * (STALL_REST if self._is(Mode.STALLED) else 1)
         if self._rested > needed and not self.is_for_good:
             self.fault = None

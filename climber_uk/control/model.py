@@ -25,7 +25,7 @@ from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import parameter, parameters
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
-REST = 1e-3  # [m/s] of an expected speed that is none
+EXPECTED_REST = 1e-3  # [m/s] of an expected speed that is none
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 Shares = tuple[Any, Any]  # of an error, put down to the disturbance and to its change
@@ -151,7 +151,7 @@ class Observer:
         force, friction = learnt.changed(climber, change, direction, expected.speed)
         moment = moment + time * moment_rate + new * inertia * yaw_acceleration
         # at rest stiction balances any force, so that no change of it shows
-        slides = abs(expected.speed) > REST
+        slides = abs(expected.speed) > EXPECTED_REST
         force_rate = select(slides, force_rate + newer / time * mass * acceleration, 0.0)
         moment_rate = moment_rate + newer / time * inertia * yaw_acceleration
         return measured, DisturbanceEstimate(force, moment, force_rate, moment_rate, friction)

@@ -3,7 +3,7 @@
 from climber_uk.control.control_law import ControlLaw, check_finite
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.timing import LONGEST_STEP, NONE
+from climber_uk.control.timing import LONGEST_STEP, NO_TORQUES
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Torques
 
@@ -51,8 +51,8 @@ class SafeOutput:
 
 
 def _let_go(estimator: Estimator, age: float) -> Torques:
-    estimator.sent(estimator.begin(age), NONE)
-    return NONE
+    estimator.sent(estimator.begin(age), NO_TORQUES)
+    return NO_TORQUES
 
 
 def _brake(estimator: Estimator, law: ControlLaw, age: float, braking_rate: float) -> Torques:

@@ -14,7 +14,7 @@ from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
 
-SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
+STANDSTILL = 0.01  # [m/s] of a reference that may as well be at rest
 
 
 @parameters(slots=True)
@@ -59,7 +59,7 @@ class Pace(NamedTuple):
         if target is None:
             return self
         speed = target.speed
-        if missing * speed <= 0 or abs(speed) < SLOW:
+        if missing * speed <= 0 or abs(speed) < STANDSTILL:
             return self
         return self._replace(change=max(self.change - missing / speed, -self.rate / step))
 

@@ -14,12 +14,12 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
 WINDOW = SECOND // 2  # [ns] in which one odometry at least is not late
-NONE = Torques(0.0, 0.0)
-LONGEST = 0.05  # [s] that is taken for a delay
+NO_TORQUES = Torques(0.0, 0.0)
+LONGEST_DELAY = 0.05  # [s] that is taken for a delay
 FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
-FASTEST = 0.05  # [s/s] by which it changes
-MEMORY = 1.0  # T_f [s]
-LEAST = 0.1  # S₀ [m²/s²] of changes of acceleration
+FASTEST_CHANGE = 0.05  # [s/s] by which it changes
+MEMORY_TIME = 1.0  # T_f [s]
+LEAST_ENERGY = 0.1  # S₀ [m²/s²] of changes of acceleration
 SWING = 0.3  # [m/s²] by which an acceleration has to go back to count as a reversal
 OSCILLATES = 4.0  # reversals in the memory
 STEADY: tuple[tuple[float, float], ...] = (0.0, 0.0), (0.0, 0.0)
@@ -96,7 +96,7 @@ class TorqueHistory:
 
     def __init__(self) -> None:
         self._begun: deque[tuple[int, Torques]] = deque()  # [ns] from when, torques
-        self.last = NONE  # the torques that will act in the end
+        self.last = NO_TORQUES  # the torques that will act in the end
 
     def begin(self, wanted: int) -> int:
         """When torques begin to act [ns]: at `wanted` [ns], but no earlier than the last ones."""
@@ -128,7 +128,7 @@ class TorqueHistory:
 
     def between(self, start: int, end: int) -> list[tuple[Torques, float]]:
         """Torques that act from `start` to `end` [ns], each with how long it does [s]."""
-        torques, spans = NONE, []
+        torques, spans = NO_TORQUES, []
         for begins, following in self._begun:
             if begins >= end:
                 break
@@ -206,7 +206,7 @@ class Latency:
         """
         accelerations, _, time, slides = sample
         drive, yaw = self.oscillations
-        left = max(0.0, 1.0 - time / MEMORY)
+        left = max(0.0, 1.0 - time / MEMORY_TIME)
         # at rest friction oscillates with the force that it balances
         drive_oscillates = slides and drive.add(accelerations[0], left)
         yaw_oscillates = yaw.add(accelerations[1], left)
@@ -227,6 +227,6 @@ class Latency:
             self._energy += phi * phi * oscillates[i]
             slopes.append((slope + time * rate + new * phi / time, rate + newer * phi / time**2))
         self._slopes = tuple(slopes)
-        most = FASTEST * time
-        change = min(max(-product / (self._energy + LEAST), -most), most)
-        self.delay = min(max(self.delay + change, least), LONGEST)
+        most = FASTEST_CHANGE * time
+        change = min(max(-product / (self._energy + LEAST_ENERGY), -most), most)
+        self.delay = min(max(self.delay + change, least), LONGEST_DELAY)

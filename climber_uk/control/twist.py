@@ -9,9 +9,9 @@ KIND_MEMORY = 1.0  # [s]
 SURELY = 0.1  # share of the other's squares of misfits, below which a twist is taken for a mean
 CHECK_MEMORY = 0.5  # [s] in which a difference is forgotten
 SHARE = 0.3  # by which they may differ: slip, scale
-OPPOSED = 0.2  # of the largest error: distance of both, to opposite sides
-IN_A_ROW = 3  # odometry messages that say so
-SUSPECTED = 0.02  # of the largest error: enough, and once, where a climber is too fast as well
+OPPOSED_DISTANCE = 0.2  # of the largest error: distance of both, to opposite sides
+OPPOSED_IN_A_ROW = 3  # odometry messages
+OPPOSED_IF_TOO_FAST = 0.02  # of the largest error: enough, once, where it is too fast as well
 
 
 class TwistKind:
@@ -75,9 +75,9 @@ class TwistCheck:
 
     def trouble(self, largest: float) -> tuple[str, bool]:
         """What is wrong if they differ by more than `largest` [m], and whether a sign is."""
-        opposed = self.opposed(OPPOSED * largest)
+        opposed = self.opposed(OPPOSED_DISTANCE * largest)
         self._opposed = self._opposed + 1 if opposed else 0
-        if self._opposed >= IN_A_ROW:
+        if self._opposed >= OPPOSED_IN_A_ROW:
             return opposed, True
         differs = max(_difference(*self._distances[0]), _difference(*self._distances[1]))
         return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
