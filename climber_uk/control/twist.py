@@ -17,9 +17,9 @@ OPPOSED_IF_TOO_FAST = 0.02  # of the largest error: enough, once, where it is to
 class TwistKind:
     """Whether the twist of late is that of its stamp, or the mean of the period before it.
 
-    Encoders give means: the distance of a period, by its time. A twist of the stamp is that only
-    together with the one before: (v + v₀)/2. What fits the poses better is taken; if in
-    doubt, the twist is that of its stamp.
+    Encoders give means: the distance of a period, by its time. For twists of the stamp that is the
+    mean (v + v₀)/2 of two in a row. What fits the poses better is taken; if in doubt, the twist is
+    that of its stamp.
     """
 
     def __init__(self) -> None:
@@ -88,7 +88,7 @@ def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
     x, y, heading, cosine, sine, _, _ = before
     heading_change = now.heading - heading
     ahead = ((now.x - x) * (cosine + now.cosine) + (now.y - y) * (sine + now.sine)) / 2
-    # (cosine, sine) halfway is longer than the mean of those at the ends by 1 / cos of half of it
+    # the mean of the directions at both ends has the length cos(heading_change / 2), not 1
     ahead = ahead * (1 + heading_change * heading_change / 8)
     return ahead / time, heading_change / time
 
