@@ -9,12 +9,13 @@ from climber_uk.control.constraint_set import demanded
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer, Controller
 from climber_uk.control.guidance import Guidance
+from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import arctan, cos, sin
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import State, Wrench
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.reference import Reference, tracking_error
 
 IDEAL = Link()
@@ -113,7 +114,7 @@ class AdaptiveRobust(Controller):
                 forces.append(-gamma * mu * bound)
                 growth = gains.growth * abs(beta) - gains.leakage * bound
                 self.bounds[i] = max(bound + estimator.period * growth, 0.0)
-            estimator.disturbance = Wrench(*(-force for force in forces))
+            estimator.learnt = DisturbanceEstimate(*(-force for force in forces))
         return super()._follow(age)
 
 

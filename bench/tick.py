@@ -98,8 +98,8 @@ def tick(controller: Controller, stamp: int, motion: Motion) -> Command:
     estimator, active = controller.estimator, controller.active
     estimator.see(stamp, motion)
     ahead = estimator.ahead(0.0)
-    aim = controller.law.aim(ahead)
-    target = active.target(ahead.motion, ahead.begins, aim)
+    target_time = controller.law.target_time(ahead)
+    target = active.target(ahead.motion, ahead.begins, target_time)
     assert target.point is not None
     command = controller.law.command(ahead, target.point)
     check_finite(command.wheels)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from climber_uk.bags.batches import Batch
 from climber_uk.mechanics import SECOND, Array
-from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE, turn_about_z
+from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE, rotation_about_z
 from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, REFERENCE_TIME, TRUTH
 
 Faults = NDArray[np.intp]  # (n,) places in FAULTS
@@ -29,7 +29,7 @@ def heading(batch: Batch, path: str) -> tuple[Array, Faults]:
     """Headings (n,) [rad] of orientations at `path`, and what is wrong with them."""
     x, y, z, w = batch.columns(*(f"{path}.{axis}" for axis in "xyzw")).T
     with np.errstate(over="ignore", invalid="ignore"):
-        angle, _, _, is_unit, is_planar = turn_about_z(x, y, z, w)
+        angle, _, _, is_unit, is_planar = rotation_about_z(x, y, z, w)
         is_finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z) & np.isfinite(w)
         return angle, np.select([~is_finite, ~is_unit, ~is_planar], [3, 4, 5])
 

@@ -36,15 +36,13 @@ class RecordedRun:
 
     name: str  # the climber's namespace
     start: int  # [ns] stamp of time 0
-    odometry: (
-        TimeSeries  # n messages: x [m], y [m], θ [rad], forwards, to the left [m/s], ω [rad/s]
-    )
+    # n messages: x [m], y [m], θ [rad], forwards, to the left [m/s], ω [rad/s]
+    odometry: TimeSeries
     reference: Array  # (n, 3) pose of the reference then; nan where there is none
     commands: TimeSeries  # torques right, left [N m] that answer these odometry messages
     unanswerable: Stamps  # [ns] of torques that answer no odometry of the bag
-    wheels: tuple[
-        TimeSeries, TimeSeries
-    ]  # right, left: rates [rad/s] and torques [N m] at the joints
+    # right, left: rates [rad/s] and torques [N m] at the joints
+    wheels: tuple[TimeSeries, TimeSeries]
     truth_reference: Array  # (k, 3) as `reference`, at the stamps of the ground truth
     recorded: dict[str, TimeSeries]  # of the other topics, by their names
     events: list[tuple[float, Event]]  # [s] and each change, see `events.changes`

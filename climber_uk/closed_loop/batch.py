@@ -27,7 +27,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Wheeled
 from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
-from climber_uk.mechanics.many import chosen, keep_what_is_freed, part
+from climber_uk.mechanics.many import chosen, indexed, keep_what_is_freed
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques, Wrench
 from climber_uk.mechanics.trajectory import Trajectory
@@ -91,7 +91,7 @@ class Loops:
         keep_what_is_freed()
         preview = sampled(course.trajectory, course.duration)
         outcomes = [
-            part(self, slice(first, first + block)).run_block(course, preview)
+            indexed(self, slice(first, first + block)).run_block(course, preview)
             for first in range(0, number, block)
         ]
         return Outcome(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
@@ -118,10 +118,10 @@ class Loops:
             estimator.climber = law.climber
             estimator.see(SECOND + round(tick * course.period * SECOND), measured)
             ahead = estimator.ahead(0.0)
-            aimed_at = preview.target(law.aim(ahead))
-            assert aimed_at is not None  # the preview goes beyond the duration
-            command = law.command(ahead, aimed_at)
-            estimator.sent(ahead.begins, command.wheels, command.fits, aimed_at.speed)
+            next_target = preview.target(law.target_time(ahead))
+            assert next_target is not None  # the preview goes beyond the duration
+            command = law.command(ahead, next_target)
+            estimator.sent(ahead.begins, command.wheels, command.fits, next_target.speed)
             if not on_their_way:
                 before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
                 on_their_way.extend([before] * course.delay)

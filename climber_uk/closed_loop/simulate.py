@@ -146,7 +146,7 @@ def sampled(trajectory: Trajectory, duration: float) -> Preview:
 
 
 def measured(state: State, link: Link, random: np.random.Generator) -> State:
-    """State as odometry tells it, with its errors."""
+    """State as odometry measures it, with its errors."""
     x, y, heading, _, _, speed, yaw_rate = link.sensors.corrupted(
         state.motion, random.normal(size=5)
     )

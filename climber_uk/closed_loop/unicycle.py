@@ -90,13 +90,13 @@ def slid(rates: Accelerations, motion: Motion, friction: Any, time: Any) -> Moti
     omega_1 = omega + faster
     halfway, angle = 0.5 * time * (omega + 0.5 * faster), time * omega_1
     c_1, s_1, heading, c_2, s_2 = swept(heading, c_0, s_0, halfway, angle)
-    part = time / 6
-    fall = part * rates.gravity
+    weight = time / 6
+    fall = weight * rates.gravity
     v_2 = v_0 + (time * (rates.forward - friction) - fall * (s_0 + 4 * s_1 + s_2))
     v_14 = 2 * (v_0 + v_2) - 3 * fall * (s_0 - s_2)  # four times the speed halfway
     return Motion(
-        x + part * (v_0 * c_0 + v_14 * c_1 + v_2 * c_2),
-        y + part * (v_0 * s_0 + v_14 * s_1 + v_2 * s_2),
+        x + weight * (v_0 * c_0 + v_14 * c_1 + v_2 * c_2),
+        y + weight * (v_0 * s_0 + v_14 * s_1 + v_2 * s_2),
         heading,
         c_2,
         s_2,

@@ -1,4 +1,8 @@
-"""What is followed: the reference, as far as it is followed, or the way to where it waits."""
+"""Where the climber should be: on its reference, or on the way to where that waits.
+
+Times are stamps [ns] on the odometry's clock; a reference's own time [ns] is behind them by as much
+as it has waited.
+"""
 
 import math
 from typing import NamedTuple
@@ -8,23 +12,22 @@ from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.guard import STANDS, Expected, Rates
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode
-from climber_uk.control.time_scaling import IN_TIME, Pace, Pacing
+from climber_uk.control.time_scaling import IN_TIME, STANDSTILL, Pace, Pacing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
 
-SAME = 0.05  # [m, rad] within which a new preview goes on with the old one
+TOLERANCE = 0.05  # [m, rad] within which a new preview goes on with the old one
 AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastest motion counts
-KEPT = 2 * SECOND  # [ns] of a reference that is kept behind the climber
-MOST_POINTS = 5000  # of a reference that are kept: who plans it may not wait
+KEPT_BEHIND = 2 * SECOND  # [ns] of a reference that is kept behind the climber
+MOST_POINTS = 5000  # of a reference that are kept, however many come
 LONGEST_SKIP = SECOND  # [ns] of a reference that a climber, which went on unanswered, may be ahead
-SLOW = 0.01  # [m/s] of a reference that is at rest
 AS_FAST = 0.9  # of the reference's speed, from which a climber goes on in time
 STRAYED = 1.5  # times `max_distance`, beyond which a climber that follows is off its path
 LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
 LONGEST_GAP = round(0.3 * SECOND)  # [ns] between two answers over which the reference goes on
-IN_TIME_AGAIN = 1e-3  # [1] of σ that is missing at the end of a restart
+IN_TIME_AGAIN = 1e-3  # 1 - σ at the end of a restart
 
 
 class Progress(NamedTuple):
@@ -33,7 +36,7 @@ class Progress(NamedTuple):
     time: int | None = None  # [ns] of the last answer
     waited: int = 0  # [ns]
     pace: Pace = IN_TIME
-    is_restarting: bool = False  # σ is on its way up to 1, and what is lost by it is waited
+    is_restarting: bool = False  # σ rises to 1; what is lost until then is not made up for
 
     def at(self, time: int) -> int:
         """Time of the reference [ns] at `time` [ns], near that of the last answer."""
@@ -72,11 +75,11 @@ class Target(NamedTuple):
     detail: str = ""
     point: ReferencePoint | None = None
     is_gentle: bool = False  # to be followed by constraints that can begin at rest
-    progress: Progress = Progress()
+    progress: Progress = Progress()  # once it is followed
 
 
 class ActiveReference:
-    """Knows where on its reference the climber is, and takes it there if it is elsewhere."""
+    """How far along its reference a climber is; if it is elsewhere, the way there."""
 
     def __init__(self, pacing: Pacing, options: Approach, gentle: Guidance) -> None:
         self.pacing, self.options = pacing, options
@@ -117,11 +120,11 @@ class ActiveReference:
 
     def take(self, preview: Preview) -> None:
         """Take a newer part of the reference, or another reference."""
-        if self.preview is None or not self.preview.goes_on_with(preview, SAME):
+        if self.preview is None or not self.preview.goes_on_with(preview, TOLERANCE):
             self.preview, self.way, self._position, self._is_paused = preview, None, None, True
             return
         here = int(preview.times[0]) if self._position is None else self._position
-        self.preview = self.preview.continued(preview, here - KEPT).last(MOST_POINTS)
+        self.preview = self.preview.continued(preview, here - KEPT_BEHIND).last(MOST_POINTS)
 
     def pause(self, stamp: int) -> None:
         """Stand still on the reference, which is not followed at `stamp` [ns]."""
@@ -159,7 +162,7 @@ class ActiveReference:
         )
 
     def strayed(self, motion: Motion, target: ReferencePoint) -> tuple[Mode, str] | None:
-        """Whether a climber is too far from where it should be."""
+        """Mode and detail if a climber is too far from its `target`, else None."""
         distance = math.hypot(motion.x - target.x, motion.y - target.y)
         if distance <= STRAYED * self.options.max_distance:
             return None
@@ -167,10 +170,10 @@ class ActiveReference:
 
     # Where it is to be next
 
-    def target(self, motion: Motion, begins: int, aim: int) -> Target:
-        """Target for `aim` [ns], of a climber whose torques act from `begins` [ns] on.
+    def target(self, motion: Motion, begins: int, target_time: int) -> Target:
+        """Target at `target_time` [ns], of a climber in `motion` at `begins` [ns].
 
-        It will be in `motion` by then.
+        Its torques act from `begins` on; they are computed for `target_time`.
         """
         if self.preview is None:
             return Target(Mode.WAITING)
@@ -180,27 +183,27 @@ class ActiveReference:
                 return refused
         progress = self.progress.advanced(begins, self.pacing)
         if self.way is not None:
-            point = progress.target(self.way, aim)
+            point = progress.target(self.way, target_time)
             if point is None:  # it has arrived
                 self.way, self._is_paused = None, True
-                return self.target(motion, begins, aim)
+                return self.target(motion, begins, target_time)
             mode, detail = Mode.APPROACHING, f"{self._began_at:.2f} m away"
             return Target(mode, detail, point, True, progress)
-        point = progress.target(self.preview, aim)
+        point = progress.target(self.preview, target_time)
         if point is None:
             return Target(Mode.WAITING)
         return Target(Mode.FOLLOWING, "", point, self.is_gentle, progress)
 
-    def slowed(self, target: Target, missing: float, aim: int, period: float) -> Target:
+    def slowed(self, target: Target, missing: float, target_time: int, period: float) -> Target:
         """Target that asks `missing` [m/s²] less along the climber; see `Pace.slowed`."""
         preview, progress = self.followed, target.progress
         assert preview is not None
-        pace = progress.pace.slowed(missing, preview, aim - progress.waited, period)
+        pace = progress.pace.slowed(missing, preview, target_time - progress.waited, period)
         progress = progress._replace(pace=pace)
-        return target._replace(point=progress.target(preview, aim), progress=progress)
+        return target._replace(point=progress.target(preview, target_time), progress=progress)
 
     def go_on(self, target: Target) -> None:
-        """Go on to where it is followed now."""
+        """Take over the progress of a target whose torques are sent."""
         self.progress = target.progress
         if self.way is None and target.progress.time is not None:
             self._position = target.progress.at(target.progress.time)
@@ -208,13 +211,13 @@ class ActiveReference:
     # Beginning, and going on after a pause
 
     def _first_position(self, time: int) -> int:
-        """Where a reference that was not followed yet is begun: now, if it is there."""
+        """Time of the reference [ns] at which it is begun: `time`, or else its first."""
         assert self.preview is not None
         first, last = int(self.preview.times[0]), int(self.preview.times[-1])
         return time if first <= time <= last else first
 
     def _begin(self, preview: Preview, motion: Motion, time: int) -> Target | None:
-        """Follow from `time` [ns] on: the reference, or a way to it; else say why not."""
+        """Follow the reference, or a way to it, from `time` [ns]; else a target without a point."""
         options = self.options
         position = self._where(preview, motion, time)
         point = preview.target(position)
@@ -228,8 +231,8 @@ class ActiveReference:
                 f"{point.y:.2f}); max_start_distance is {options.max_start_distance} m",
             )
         self._is_paused, self._began_at, self._position = False, distance, position
-        turned = abs(wrapped(motion.heading - point.heading))
-        if distance > options.max_distance or turned > options.max_heading:
+        heading_error = abs(wrapped(motion.heading - point.heading))
+        if distance > options.max_distance or heading_error > options.max_heading:
             self.way = options.way(motion, point, time)
             self.progress = Progress()
         else:
@@ -251,7 +254,7 @@ class ActiveReference:
 def _rate(motion: Motion, target: ReferencePoint) -> float:
     """Rate σ of a reference that is as fast as the climber is, 1 if that is nearly so."""
     speed = target.speed
-    if abs(speed) < SLOW:
+    if abs(speed) < STANDSTILL:
         return 1.0
     rate = float(min(max(motion.speed / speed, 0.0), 1.0))
     return 1.0 if rate > AS_FAST else rate

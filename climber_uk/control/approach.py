@@ -8,18 +8,18 @@ import math
 
 import numpy as np
 
+from climber_uk.control.time_scaling import STANDSTILL
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
 
-PEAK = 15 / 8  # of p'
+PEAK_RATE = 15 / 8  # of p'
 SHORTEST = 0.4  # [s] that a move takes
 POINT_PERIOD = 0.05  # [s]
-HERE = 1e-3  # [m] that need not be driven
+NO_DISTANCE = 1e-3  # [m] that need not be driven
 SKIP_STEPS = 20  # in which it is looked for where the climber is ahead
-SLOW = 0.01  # [m/s] of a reference that is at rest
 
 
 @parameters
@@ -39,26 +39,26 @@ class Approach:
     approach_yaw_rate: float = parameter(0.5, "rad/s", "fastest turn of the approach", above=0)
 
     def way(self, motion: Motion, target: ReferencePoint, begin: int) -> Preview:
-        """Reference from where a climber is, at rest from `begin` [ns] on, to where `target` is."""
+        """Preview from a climber's pose at `begin` [ns], at rest there, to the pose of `target`."""
         offset_x, offset_y = target.x - motion.x, target.y - motion.y
         distance = math.hypot(offset_x, offset_y)
         first, direction = float(motion.heading), 1.0
-        if distance > HERE:
-            turned = float(wrapped(math.atan2(offset_y, offset_x) - first))
-            if abs(turned) > math.pi / 2:  # in reverse gear it is less of a turn
-                turned, direction = float(wrapped(turned + math.pi)), -1.0
-            active = first + turned
+        if distance > NO_DISTANCE:
+            heading_change = float(wrapped(math.atan2(offset_y, offset_x) - first))
+            if abs(heading_change) > math.pi / 2:  # in reverse gear it is less of a turn
+                heading_change, direction = float(wrapped(heading_change + math.pi)), -1.0
+            drive_heading = first + heading_change
         else:
-            distance, active = 0.0, first
-        last = active + float(wrapped(target.heading - active))
+            distance, drive_heading = 0.0, first
+        last = drive_heading + float(wrapped(target.heading - drive_heading))
         start = (motion.x, motion.y)
         end = (target.x, target.y) if distance else start
-        parts = [
-            self._turn(start, first, active),
-            self._drive(start, active, direction, distance),
-            self._turn(end, active, last),
+        moves = [
+            self._turn(start, first, drive_heading),
+            self._drive(start, drive_heading, direction, distance),
+            self._turn(end, drive_heading, last),
         ]
-        return _joined([part for part in parts if part is not None] or [_rest(end, last)], begin)
+        return _joined([move for move in moves if move is not None] or [_rest(end, last)], begin)
 
     def _turn(self, place: tuple[float, float], first: float, last: float) -> Array | None:
         angle = last - first
@@ -71,15 +71,15 @@ class Approach:
         return rows
 
     def _drive(
-        self, place: tuple[float, float], active: float, direction: float, distance: float
+        self, place: tuple[float, float], heading: float, direction: float, distance: float
     ) -> Array | None:
         if not distance:
             return None
         time, p, p_1, p_2 = _move(distance, self.approach_speed)
-        way = direction * distance * np.array([math.cos(active), math.sin(active)])
+        displacement = direction * distance * np.array([math.cos(heading), math.sin(heading)])
         rows = np.zeros((len(time), 10))
-        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * way, active
-        rows[:, 4:6], rows[:, 7:9] = p_1[:, None] * way, p_2[:, None] * way
+        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * displacement, heading
+        rows[:, 4:6], rows[:, 7:9] = p_1[:, None] * displacement, p_2[:, None] * displacement
         return rows
 
 
@@ -88,7 +88,7 @@ ANYWHERE = Approach(max_start_distance=1e6, max_distance=1e6, max_heading=10.0)
 
 
 def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
-    """Time of a reference [ns], from `begin` to `skip` after it [ns], when it is nearest."""
+    """Time of a reference [ns], within `skip` [ns] after `begin`, when it is nearest."""
     times = begin + np.linspace(0, skip, SKIP_STEPS + 1).astype(np.int64)
     targets = [preview.target(int(at)) for at in times]
     offsets = [
@@ -96,18 +96,18 @@ def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
         for target in targets
         if target is not None
     ]
-    found = int(times[int(np.argmin(offsets))])
-    target = preview.target(found)
-    if target is None or abs(speed := target.speed) < SLOW:
-        return found
+    time = int(times[int(np.argmin(offsets))])
+    target = preview.target(time)
+    if target is None or abs(speed := target.speed) < STANDSTILL:
+        return time
     ahead = (motion.x - target.x) * target.v_x + (motion.y - target.y) * target.v_y
     ahead = min(max(ahead / (speed * speed), -skip / SKIP_STEPS / SECOND), skip / SECOND)
-    return min(max(found + round(ahead * SECOND), begin), begin + skip)
+    return min(max(time + round(ahead * SECOND), begin), begin + skip)
 
 
 def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:
     """Times (n,) [s], and p, ṗ, p̈ at them, of a move of `size` at a rate of `fastest` at most."""
-    duration = max(PEAK * size / fastest, SHORTEST)
+    duration = max(PEAK_RATE * size / fastest, SHORTEST)
     time = np.linspace(0.0, duration, math.ceil(duration / POINT_PERIOD) + 1)
     u = time / duration
     p = u**3 * (10 - 15 * u + 6 * u**2)
@@ -122,12 +122,15 @@ def _rest(place: tuple[float, float], heading: float) -> Array:
     return rows
 
 
-def _joined(parts: list[Array], begin: int) -> Preview:
-    """Preview of moves one after the other: rows of time, pose, velocity and acceleration."""
+def _joined(moves: list[Array], begin: int) -> Preview:
+    """Preview of moves one after the other, from `begin` [ns] on.
+
+    Each is rows (n, 10): time [s], pose, velocity, acceleration, in the wall's frame.
+    """
     rows: list[Array] = []
     end = 0.0
-    for part in parts:
-        rows.append(part[1 if rows else 0 :] + np.eye(10)[0] * end)
+    for move in moves:
+        rows.append(move[1 if rows else 0 :] + np.eye(10)[0] * end)
         end = rows[-1][-1, 0]
     table = np.concatenate(rows)
     times = begin + np.round(table[:, 0] * SECOND).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The controller as its parameters say, whoever reads them: a node, or a replay of its bag."""
+"""The controller as its parameters say, for its node, and for a replay of its bag."""
 
 from dataclasses import replace
 from typing import Protocol, TypeVar
@@ -29,7 +29,7 @@ class ParameterSource(Protocol):
 
 @parameters
 class ControllerChoice:
-    """Which control law runs, with which constraints, and what holds the climber."""
+    """Which control law runs, with which constraints, and which adhesion."""
 
     constraints: str = parameter("guidance", "", "constraint set", choices=CONSTRAINTS)
     controller: str = parameter(
@@ -52,7 +52,10 @@ KINDS: list[tuple[type, str]] = [
 
 
 def settings(parameters: ParameterSource, pressure: float | None) -> Settings:
-    """What the parameters, and the measured pressure [Pa], say now."""
+    """Settings by the parameters; a measured `pressure` [Pa] replaces the climber's.
+
+    Raises `ValueError` naming parameter, value and bound.
+    """
     read = parameters.read
     choice = read(ControllerChoice)
     name, climber = choice.constraints, with_its_seal(read(Climber), choice.adhesion)
@@ -68,7 +71,7 @@ def settings(parameters: ParameterSource, pressure: float | None) -> Settings:
 
 
 def build_controller(parameters: ParameterSource, pressure: float | None) -> Controller:
-    """Controller as the parameters say, that has seen nothing yet."""
+    """New controller by the parameters; see `settings`."""
     read = parameters.read
     name = read(ControllerChoice).adhesion
     return Controller(

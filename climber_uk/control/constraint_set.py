@@ -40,11 +40,11 @@ class ConstraintSet(Protocol):
         """
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
-        """Speed [m/s] and yaw rate [rad/s] at most asked for, on a reference with those at most."""
+        """Largest speed [m/s] and yaw rate [rad/s] asked for on a reference with these at most."""
 
 
 def blended(before: ConstraintSet, after: ConstraintSet, share: float) -> ConstraintSet:
-    """Constraints on their way from gains to others; `share` of it is done."""
+    """`after`, with gains `share` (0 to 1) of the way from those of `before` to its own."""
     gains = {
         field.name: (1 - share) * getattr(before, field.name) + share * getattr(after, field.name)
         for field in dataclasses.fields(after)  # type: ignore[arg-type]
@@ -54,7 +54,7 @@ def blended(before: ConstraintSet, after: ConstraintSet, share: float) -> Constr
 
 
 def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> DesiredAcceleration:
-    """Accelerations that constraints ask of a climber in `state`, each (...)."""
+    """Accelerations (...) that constraints ask of a climber in `state` (...)."""
     return constraints.desired_acceleration(constraints.prepare(reference.target), state.motion)
 
 

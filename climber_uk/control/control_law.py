@@ -62,11 +62,11 @@ class ControlOptions:
 
 
 class ControlInput(NamedTuple):
-    """What the controller answers: the motion at which its torques will begin to act, and more."""
+    """What a command is computed for: the motion when its torques will begin to act, and more."""
 
     motion: Motion
-    held: Torques  # that act until then
-    disturbance: Wrench  # see `Observer`
+    held: Torques  # [N m] of before, that act until then
+    disturbance: Wrench  # without friction; see `Observer`
     period: float  # [s] for which the answer is going to act
     begins: int = 0  # [ns] when that begins
     friction: Any = 0.0  # [N] of the seal beyond the climber's
@@ -78,7 +78,7 @@ class Command(NamedTuple):
     wheels: Torques  # within the limits
     demanded: Wrench
     lateral: Any  # [N] reaction of the wheels
-    lost: Wrench  # what the limits took away; of many, `NOTHING` if nothing from any of them
+    lost: Wrench  # drive and moment that limits took away; of many, `NOTHING` if none of any
 
     @property
     def torques(self) -> Array:
@@ -96,11 +96,6 @@ class Command(NamedTuple):
         force, moment = self.lost
         return (abs(force) <= CUT) & (abs(moment) <= CUT)
 
-    @property
-    def missing(self) -> Array:
-        """Drive [N] and turn [N m] that the limits took away, (..., 2)."""
-        return np.broadcast_to(pack(*self.lost), self.torques.shape)
-
 
 class ForceLaw(Protocol):
     """A control law in the place of the constraints: force and moment, whatever it is made of.
@@ -113,7 +108,7 @@ class ForceLaw(Protocol):
     """
 
     def wrench(self, climber: Climber, target: ReferencePoint, motion: Motion) -> Wrench:
-        """Drive [N] and turn [N m] wanted of the wheels of a climber in `motion`.
+        """Drive [N] and yaw moment [N m] wanted of the wheels of a climber in `motion`.
 
         They include what carries the climber's weight and overcomes its friction. `target` is the
         reference at the time of `motion`, both in the wall's frame. What is not finite, or raises
@@ -133,28 +128,28 @@ class ControlLaw:
     options: ControlOptions = field(default_factory=ControlOptions)
     other: ForceLaw | None = None  # in the constraints' place
 
-    def aim(self, situation: ControlInput) -> int:
+    def target_time(self, situation: ControlInput) -> int:
         """Time [ns] for which a situation's torques are computed: that of its `target`."""
         return situation.begins + round(self.options.lookahead(situation.period) * SECOND)
 
     def command(self, situation: ControlInput, target: ReferencePoint) -> Command:
-        """Torques for a situation; `target` is that of half a period after it begins.
+        """Torques for a situation; `target` is that of `target_time`. May be not finite.
 
         A fixed-point iteration of two passes: the answer itself moves the state to the time that it
         is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
-        climber, (motion, held, (r_drive, r_turn), period, _, friction) = self.climber, situation
+        climber, (motion, held, (r_F, r_N), period, _, friction) = self.climber, situation
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         right, left = self._fixed_bounds or self._bounds(situation)
         solve = self._solve
-        drive, turn = climber.wrench(held.right, held.left)
+        drive, yaw_moment = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
-            predicted = predict(climber, motion, drive + r_drive, turn + r_turn, ahead, friction)
+            predicted = predict(climber, motion, drive + r_F, yaw_moment + r_N, ahead, friction)
             force, moment = solve(prepared, predicted, friction)
-            force, moment = force - r_drive, moment - r_turn
-            drive, turn, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
-        lost = NOTHING if fits else Wrench(force - drive, moment - turn)
+            force, moment = force - r_F, moment - r_N
+            drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
+        lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
         lateral = climber.lateral_reaction(predicted)
         return Command(Torques(tau_r, tau_l), Wrench(force, moment), lateral, lost)
 
@@ -193,13 +188,13 @@ class ControlLaw:
         force, moment = self.other.wrench(self.climber, target, motion)
         return force + friction * tanh(target.speed / self.options.friction_speed), moment
 
-    def holding(self, situation: ControlInput, braking_rate: float) -> Torques:
+    def braking(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
         climber, motion = self.climber, situation.motion
         weight = climber.weight_along_wall * motion.sine
-        drive = weight - climber.mass * braking_rate * motion.speed
-        turn = -climber.yaw_inertia * braking_rate * motion.yaw_rate
-        return Torques(*climber.saturate(drive, turn, *self._bounds(situation))[2:4])
+        force = weight - climber.mass * braking_rate * motion.speed
+        moment = -climber.yaw_inertia * braking_rate * motion.yaw_rate
+        return Torques(*climber.saturate(force, moment, *self._bounds(situation))[2:4])
 
     @cached_property
     def _solve(self) -> Solve:

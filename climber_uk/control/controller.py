@@ -27,7 +27,7 @@ from climber_uk.control.safe_output import SafeOutput
 from climber_uk.control.safety import Calm, Mode, Safety, Trouble
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import LONGEST_STEP, Ages, Timing
-from climber_uk.control.twist import SUSPECTED, TwistCheck
+from climber_uk.control.twist import OPPOSED_IF_TOO_FAST, TwistCheck
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.preview import Preview
@@ -141,7 +141,7 @@ class Controller:
         """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
         self._look_at_clock(now)
         # a simulation publishes its first odometry right before its first /clock: how long there
-        # was no clock until then tells nothing, and is counted anew
+        # was no clock until then does not count
         if self._stamp == 0:
             self._clockless_looks = 0
         if stamp == self._stamp and self.mode in (FOLLOWING, APPROACHING):
@@ -169,7 +169,7 @@ class Controller:
         return self._answer(now)
 
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
-        """Keep a reference; answer the odometry that waits for one."""
+        """Take a reference; answer the odometry that waits for one."""
         self.active.take(preview)
         waits = self._waiting_since is not None or self.mode is Mode.NO_REFERENCE
         return self._answer(now) if waits else None
@@ -203,7 +203,7 @@ class Controller:
         self._safe_output.forget()
         self._calm = Calm()
 
-    # 1. What an odometry tells, and whether that can be
+    # 1. What an odometry tells, and whether that is possible
 
     def _see(self, stamp: int, motion: Motion) -> Trouble | None:
         """Take in an odometry; return what is wrong with it."""
@@ -229,7 +229,7 @@ class Controller:
         self._moved_without_twist = 0.0
 
     def _check_twist(self, observed: Observed) -> Trouble | None:
-        """Whether the twist is missing, or another one than the pose's rate."""
+        """Trouble if the twist is not the pose's rate; counts how far it goes without a twist."""
         before, after = observed.before, observed.after
         if self.estimator.observer.velocity_source == "pose":
             return None
@@ -264,7 +264,7 @@ class Controller:
         fault = self.guard.watch(self._law.climber, observed, expected)
         fault = fault or self.active.strayed(observed.before, target)
         if fault is not None and fault[0] is Mode.TOO_FAST:
-            sign = self._twist.opposed(SUSPECTED * self.safety.max_twist_error)
+            sign = self._twist.opposed(OPPOSED_IF_TOO_FAST * self.safety.max_twist_error)
             return (Mode.SIGN_WRONG, sign) if sign else fault
         return fault
 
@@ -273,8 +273,8 @@ class Controller:
     def _answer(self, now: int) -> Answer | None:
         """Torques for the last odometry, in the mode of now."""
         age = min(max(0, now - self._stamp) / SECOND, LONGEST_STEP)
-        found = self._find_mode(now)
-        mode, detail = self._calm.mode(self.mode, max(now, self._stamp), found)
+        current = self._find_mode(now)
+        mode, detail = self._calm.mode(self.mode, max(now, self._stamp), current)
         command = None
         if mode in (FOLLOWING, Mode.NO_REFERENCE):
             is_followed, why, command = self._follow(age)
@@ -311,7 +311,7 @@ class Controller:
             return Mode.WAITING, ""
         if now - self._heard > self.safety.odometry_timeout * SECOND:
             return Mode.NO_ODOMETRY, ""
-        return self._trouble or self.guard.told or self._unfit() or self._missing(now)
+        return self._trouble or self.guard.trouble or self._unfit() or self._missing(now)
 
     def _unfit(self) -> Trouble | None:
         """What forbids to follow, though nothing is wrong."""
@@ -324,7 +324,7 @@ class Controller:
         return None
 
     def _missing(self, now: int) -> Trouble:
-        """Whether there is a reference."""
+        """Mode while nothing else forbids to follow: is there a reference?"""
         if self.active.begins_after(self._stamp):
             return Mode.NOT_BEGUN, ""
         since = now if self._waiting_since is None else self._waiting_since
@@ -341,8 +341,8 @@ class Controller:
             return WAITING, "", None
         try:
             ahead = estimator.ahead(self.ages.latency(age, estimator.timing.max_latency))
-            aim = self._law.aim(ahead)
-            target = active.target(ahead.motion, ahead.begins, aim)
+            target_time = self._law.target_time(ahead)
+            target = active.target(ahead.motion, ahead.begins, target_time)
             point = target.point
             if point is None:
                 return target.mode, target.detail, None
@@ -350,7 +350,7 @@ class Controller:
             command = law.command(ahead, point)
             lost = command.lost.force
             if abs(lost) > CUT and active.pacing.catch_up > 0:
-                target = active.slowed(target, lost / law.climber.mass, aim, ahead.period)
+                target = active.slowed(target, lost / law.climber.mass, target_time, ahead.period)
                 command = law.command(ahead, target.point or point)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
@@ -373,8 +373,8 @@ class Controller:
         if self._retuned is None:
             return self._law.constraints
         since, before = self._retuned
-        share = (self.estimator.stamp - since) / SECOND / RETUNING_TIME
-        if not 0 <= share < 1 or type(before) is not type(self._law.constraints):
+        done = (self.estimator.stamp - since) / SECOND / RETUNING_TIME
+        if not 0 <= done < 1 or type(before) is not type(self._law.constraints):
             self._retuned = None
             return self._law.constraints
-        return blended(before, self._law.constraints, share)
+        return blended(before, self._law.constraints, done)

@@ -8,7 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 from climber_uk.control.control_law import ControlInput
-from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, predict
+from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, Shares, predict
 from climber_uk.control.safety import Safety
 from climber_uk.control.timing import LONGEST_STEP, Latency, Sample, Timing, TorqueHistory
 from climber_uk.control.twist import TwistKind, mean_twist
@@ -23,10 +23,10 @@ Acting = list[tuple[Torques, float]]  # torques, and how long each acts [s]
 
 
 class Observed(NamedTuple):
-    """What an odometry tells, and what acted since the one before."""
+    """Two odometry messages in a row, and what acted between them."""
 
-    before: Motion
-    after: Motion
+    before: Motion  # as estimated
+    after: Motion  # as measured
     time: float  # [s] between them
     acted: Acting  # torques, and how long each [s]
     disturbance: Wrench  # as it was known before
@@ -47,9 +47,9 @@ class Observed(NamedTuple):
 class Estimator:
     """Predicts the climber's motion by its model, and corrects it by odometry.
 
-    `see` takes an odometry, `ahead` tells where the climber will be when an answer begins to act,
-    and `sent` is told which that is. What moves further than `safety` allows is not believed: it
-    starts anew from there.
+    In turn: `see` takes an odometry, `ahead` gives the motion with which its answer will begin to
+    act, and `sent` takes that answer. Odometry further off than `safety` allows is a jump: the
+    estimate starts anew from there.
     """
 
     def __init__(
@@ -73,30 +73,26 @@ class Estimator:
         self.stamp = 0  # [ns]
         self._sent.restart()
         self.motion: Motion | None = None
-        self._told: Motion | None = None  # the last odometry, as it was told
+        self._last_odometry: Motion | None = None  # as it came
 
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
         self.learnt = DisturbanceEstimate()
         self._direction = 0.0  # of the reference: 1 forwards, -1 backwards, 0 at rest
-        # whether no limit cut the last answer, so that what came out tells of the disturbance:
+        # whether no limit cut the last answer, so that errors are due to the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
 
     @property
     def disturbance(self) -> Wrench:
-        """What pushes and turns the climber besides what the model knows, friction included."""
+        """Force [N] along the climber and moment [N m] beside the model's, friction included."""
         learnt = self.learnt
         return Wrench(learnt.force - self._direction * learnt.friction, learnt.moment)
-
-    @disturbance.setter
-    def disturbance(self, disturbance: Wrench) -> None:
-        self.learnt = DisturbanceEstimate(*disturbance)
 
     def see(self, stamp: int, motion: Motion) -> Observed | None:
         """Correct state and disturbance by an odometry of `stamp` [ns], newer than the last.
 
-        Returns what it tells of the time since the last; None if it starts anew.
+        Returns what it tells of the time since the last; None for the first, and after a jump.
         """
         before, has_twist = self.motion, self.observer.velocity_source == "odometry"
         if before is not None:
@@ -113,7 +109,7 @@ class Estimator:
         return None
 
     def ahead(self, age: float) -> ControlInput:
-        """What an answer to the last odometry, given at its `age` [s], meets when it acts."""
+        """Situation when an answer to the last odometry, given at its `age` [s], begins to act."""
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
         held, friction = self._sent.last, learnt.friction
@@ -132,8 +128,8 @@ class Estimator:
     ) -> None:
         """Torques were sent, which act from `begins` [ns] on, to drive at a `speed` [m/s].
 
-        `learning` is whether they are what was wanted: if a limit cut them, what comes out tells
-        nothing of the disturbance.
+        `learning` is whether they are what was wanted: where a limit cut them, nothing is
+        learnt of the disturbance.
         """
         self._learning = learning
         if speed is not None:
@@ -143,7 +139,7 @@ class Estimator:
         self._sent.forget_before(max(self.stamp, begins - LONG_AGO))
 
     def correct(self, torques: Torques) -> None:
-        """Believe that other torques were sent than it was told last."""
+        """Have `torques` in the place of those that were sent last."""
         self._sent.correct(torques)
 
     def expected_at(self, stamp: int) -> Motion:
@@ -156,16 +152,16 @@ class Estimator:
     def _rolled(self, motion: Motion, acting: Acting) -> Motion:
         """Motion after torques have acted, each for some time [s]."""
         climber, learnt = self.climber, self.learnt
-        r_drive, r_turn, friction = learnt.force, learnt.moment, learnt.friction
+        r_F, r_N, friction = learnt.force, learnt.moment, learnt.friction
         for torques, time in acting:
-            drive, turn = climber.wrench(*torques)
-            motion = predict(climber, motion, drive + r_drive, turn + r_turn, time, friction)
+            force, moment = climber.wrench(*torques)
+            motion = predict(climber, motion, force + r_F, moment + r_N, time, friction)
         return motion
 
     def _correct(
         self, stamp: int, before: Motion, acted: Acting, expected: Motion, motion: Motion
     ) -> Observed:
-        """Correct what is `expected` at `stamp` [ns] by the `motion` that was told."""
+        """Correct what is `expected` at `stamp` [ns] by the `motion` that odometry gives."""
         time = (stamp - self.stamp) / SECOND
         reaction = self._delay + self.period / 2
         observed = Observed(before, motion, time, acted, self.disturbance, reaction)
@@ -183,34 +179,33 @@ class Estimator:
         )
         self.stamp = stamp
         if is_known:
-            is_learnt = self._learning  # of many, each learns or holds what it has learnt
-            self.learnt = (
-                learnt if is_learnt is True else chosen(is_learnt, learnt, self.learnt.held)
-            )
+            if self._learning is not True:  # of many, each learns or keeps what it has learnt
+                learnt = chosen(self._learning, learnt, self.learnt.without_rates)
+            self.learnt = learnt
         return observed
 
-    def _at_its_stamp(self, before: Motion, expected: Motion, found: Motion, time: float) -> Motion:
+    def _at_its_stamp(self, before: Motion, expected: Motion, now: Motion, time: float) -> Motion:
         """Motion whose speeds are those of its stamp, not the mean of the `time` [s] before."""
         kind = self.observer.twist
-        if kind == "auto" and self._told is not None:
-            self.twist.learn(self._told, found, time)
-        self._told = found
+        if kind == "auto" and self._last_odometry is not None:
+            self.twist.learn(self._last_odometry, now, time)
+        self._last_odometry = now
         if kind == "instantaneous" or (kind == "auto" and not self.twist.is_mean):
-            return found
+            return now
         speed, rate = mean_twist(before, expected, time)
-        return found._replace(
-            speed=found.speed + expected.speed - speed,
-            yaw_rate=found.yaw_rate + expected.yaw_rate - rate,
+        return now._replace(
+            speed=now.speed + expected.speed - speed,
+            yaw_rate=now.yaw_rate + expected.yaw_rate - rate,
         )
 
     def _learn_delay(
-        self, acting: Torques, expected: Motion, found: Motion, time: float, shares: tuple[Any, Any]
+        self, acting: Torques, expected: Motion, measured: Motion, time: float, shares: Shares
     ) -> None:
-        """Learn how much later than told torques act; `shares` are the observer's."""
+        """Learn how much later than configured torques act; `shares` are the observer's."""
         climber = self.climber
-        drive, turn = climber.wrench(*acting)
+        force, moment = climber.wrench(*acting)
         lever = climber.half_track
-        accelerations = drive / climber.mass, lever * turn / climber.yaw_inertia
-        errors = found.speed - expected.speed, lever * (found.yaw_rate - expected.yaw_rate)
-        sample = Sample(accelerations, errors, time, abs(found.speed) > SLOW)
+        accelerations = force / climber.mass, lever * moment / climber.yaw_inertia
+        errors = measured.speed - expected.speed, lever * (measured.yaw_rate - expected.yaw_rate)
+        sample = Sample(accelerations, errors, time, abs(measured.speed) > SLOW)
         self.latency.learn(sample, shares, self.timing.transport_delay)

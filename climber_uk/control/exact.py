@@ -5,7 +5,7 @@ from climber_uk.mechanics.quantities import DesiredAcceleration, Motion, Referen
 from climber_uk.parameters.declaration import parameter, parameters
 
 REACH = 0.2  # [m] from the path, within which the exact set is expected to stay
-REST_SPEED = 1e-3  # [m/s] below which a heading cannot be told from the way a climber moves
+REST_SPEED = 1e-3  # [m/s] below which v θ̈ says nothing of θ̈
 
 
 @parameters(slots=True)
@@ -33,6 +33,7 @@ class Exact:
 
     def desired_acceleration(self, target: ReferencePoint, motion: Motion) -> DesiredAcceleration:
         """See `ConstraintSet`."""
+        # here x, y, v_x … j_y are in the wall's frame; v and omega are the climber's
         x, y, _, cosine, sine, v, omega = motion
         x_d, y_d, heading_d, v_x, v_y, _, a_x, a_y, _, j_x, j_y = target
         K_d, K_p = 2 * self.natural_frequency, self.natural_frequency * self.natural_frequency
@@ -46,9 +47,9 @@ class Exact:
         u_y1 = j_y + K_d * (a_y - v_1 * sine - centripetal * cosine) + K_p * e_y1
 
         phi = centripetal - (u_y * cosine - u_x * sine)
-        turning = u_y1 * cosine - u_x1 * sine - 2 * v_1 * omega - self.hidden_rate * phi
+        v_theta_2 = u_y1 * cosine - u_x1 * sine - 2 * v_1 * omega - self.hidden_rate * phi
         at_rest = abs(v) < REST_SPEED
-        theta_2 = select(at_rest, 0.0, turning / select(at_rest, 1.0, v))
+        theta_2 = select(at_rest, 0.0, v_theta_2 / select(at_rest, 1.0, v))
         # friction is that of the speed at which the error along the track goes as exp(-ω_n t)
         wanted_x = v_x + self.natural_frequency * (x_d - x)
         wanted_y = v_y + self.natural_frequency * (y_d - y)

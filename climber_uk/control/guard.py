@@ -17,18 +17,18 @@ from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.parameters.declaration import parameter, parameters
 
-IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
+TOO_FAST_IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
 SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
-EXCITED = 0.12  # of the largest torque: standard deviation that tells whether a wheel answers
+EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
-UNTOLD = 0.012  # [s] that a loop may take longer to answer than it knows
-SUSPECTED = 0.4  # of both is enough where the climber runs away
-REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
+UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
+PROOF_IF_TOO_FAST = 0.4  # of `EXCITED` and `UNANSWERED` is enough where it is too fast as well
+RIM_REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
 STALL_REST = 10  # times the rest after which a stalled climber tries again
 
 
@@ -73,7 +73,7 @@ class Rates(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """What a climber is to do."""
+    """What a climber is to do, by its reference and constraints."""
 
     wanted: Rates  # of the reference
     allowed: Rates  # at most
@@ -86,38 +86,38 @@ class Variance:
     def __init__(self) -> None:
         self.number, self.mean, self.variance = 0, 0.0, 0.0
 
-    def add(self, value: float, share: float) -> None:
-        """Add a value with a `share` of all weight."""
+    def add(self, value: float, weight: float) -> None:
+        """Add a value that has `weight` (0 to 1), and all before it the rest."""
         self.number += 1
         if self.number == 1:
             self.mean = value
             return
         off = value - self.mean
-        self.mean += share * off
-        self.variance = (1 - share) * (self.variance + share * off * off)
+        self.mean += weight * off
+        self.variance = (1 - weight) * (self.variance + weight * off * off)
 
 
 class Wheel:
     """A wheel that answers its torque: the force that acted follows the one that was asked for.
 
-    Of a dead one the force stays what it was, and what is left, their difference, varies instead.
+    Of a dead one the force stays what it was, and what is unexplained, the difference, varies.
     What resists the climber as a whole makes that vary on both sides.
     """
 
     def __init__(self) -> None:
-        self.asked, self.found, self.left = Variance(), Variance(), Variance()
+        self.asked, self.acted, self.unexplained = Variance(), Variance(), Variance()
 
-    def add(self, asked: float, found: float, share: float) -> None:
+    def add(self, asked: float, acted: float, weight: float) -> None:
         """Add the force [N] that a torque should cause, and the one that acted."""
-        self.asked.add(asked, share)
-        self.found.add(found, share)
-        self.left.add(found - asked, share)
+        self.asked.add(asked, weight)
+        self.acted.add(acted, weight)
+        self.unexplained.add(acted - asked, weight)
 
     def answers(self, other: "Wheel", largest: float, proof: float) -> bool:
         """Whether it does, or too little was asked of it to know; of `largest` [N] at most."""
         excited = self.asked.variance > (proof * EXCITED * largest) ** 2
-        explained = max(self.found.variance, other.left.variance)
-        return not (excited and self.left.variance > proof * UNANSWERED * explained)
+        explained = max(self.acted.variance, other.unexplained.variance)
+        return not (excited and self.unexplained.variance > proof * UNANSWERED * explained)
 
 
 class Guard:
@@ -153,7 +153,7 @@ class Guard:
         self._add_to_wheels(climber, observed, torques)
         too_fast = self._watch_rates(climber, observed, expected.allowed)
         return (
-            self._watch_wheels(climber, torques, SUSPECTED if too_fast else 1.0)
+            self._watch_wheels(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
             or too_fast
             or self._watch_limit(climber, observed, expected, torques)
             or self._watch_disturbance(climber, observed.disturbance)
@@ -162,23 +162,23 @@ class Guard:
     def _watch_rates(self, climber: Climber, observed: Observed, allowed: Rates) -> Trouble | None:
         options, motion = self.options, observed.after
         fastest = allowed.speed + options.speed_margin + self._let_go(climber, observed)
-        fastest_turn = allowed.yaw_rate + options.yaw_rate_margin
+        fastest_yaw_rate = allowed.yaw_rate + options.yaw_rate_margin
         is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
-        is_turning = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_turn
-        self._too_fast = self._too_fast + 1 if is_fast or is_turning else 0
-        if self._too_fast < IN_A_ROW:
+        is_yawing = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_yaw_rate
+        self._too_fast = self._too_fast + 1 if is_fast or is_yawing else 0
+        if self._too_fast < TOO_FAST_IN_A_ROW:
             return None
-        told, most, unit = motion.speed, fastest, "m/s"
+        measured, most, unit = motion.speed, fastest, "m/s"
         if not is_fast:
-            told, most, unit = motion.yaw_rate, fastest_turn, "rad/s"
-        return Mode.TOO_FAST, f"{told:.2f} {unit}, at most {most:.2f} are asked for"
+            measured, most, unit = motion.yaw_rate, fastest_yaw_rate, "rad/s"
+        return Mode.TOO_FAST, f"{measured:.2f} {unit}, at most {most:.2f} are asked for"
 
     def _let_go(self, climber: Climber, observed: Observed) -> float:
         """Speed [m/s] at which friction may let go of it before a torque can answer."""
         before, after = observed.before.speed, observed.after.speed
         rests = abs(after) < MOVES or before * after < 0
         self._since_rest = 0.0 if rests else self._since_rest + observed.time
-        answered = observed.reaction + UNTOLD
+        answered = observed.reaction + UNKNOWN_DELAY
         if self._since_rest > LETS_GO + answered:
             return 0.0
         return climber.seal_friction / climber.mass * answered
@@ -188,15 +188,15 @@ class Guard:
     ) -> Trouble | None:
         motion, wanted = observed.after, expected.wanted
         largest = max(abs(torques.right), abs(torques.left))
-        share = largest / climber.max_wheel_torque
+        load = largest / climber.max_wheel_torque
         if wanted.speed > MOVES:
             stands = abs(motion.speed) < STANDS * wanted.speed
         else:  # it turns in place, or rests
             stands = abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
         effort = 0.0
-        if stands and share >= STRONG:
-            effort = share / STRONG  # it shows the sooner, the stronger it is
-        elif expected.waits and share >= AT_LIMIT:
+        if stands and load >= STRONG:
+            effort = load / STRONG  # it shows the sooner, the stronger it is
+        elif expected.waits and load >= AT_LIMIT:
             effort = 1.0
         self._stalled = self._stalled + effort * observed.time if effort else 0.0
         if not 0 < self.options.stall_time < self._stalled:
@@ -206,25 +206,22 @@ class Guard:
     def _watch_disturbance(
         self, climber: Climber, disturbance: Wrench | DisturbanceEstimate
     ) -> Trouble | None:
-        share, weight, lever = (
-            self.options.max_disturbance,
-            climber.mass * GRAVITY,
-            climber.half_track,
-        )
-        force, turn = abs(disturbance.force), abs(disturbance.moment)
-        if force <= share * weight and turn <= share * weight * lever:
+        weight, lever = climber.mass * GRAVITY, climber.half_track
+        bound = self.options.max_disturbance
+        force, moment = abs(disturbance.force), abs(disturbance.moment)
+        if force <= bound * weight and moment <= bound * weight * lever:
             return None  # which weight alone explains
-        most = share * (self.adhesion.force(climber) + weight)
-        moment = most * lever
-        if most == 0 or (force <= most and turn <= moment):
+        most = bound * (self.adhesion.force(climber) + weight)
+        most_moment = most * lever
+        if most == 0 or (force <= most and moment <= most_moment):
             return None
         return Mode.DISTURBED, (
             f"{disturbance.force:.0f} N, {disturbance.moment:.0f} N m; "
-            f"explained are {most:.0f} N, {moment:.0f} N m"
+            f"explained are {most:.0f} N, {most_moment:.0f} N m"
         )
 
     def _add_to_wheels(self, climber: Climber, observed: Observed, torques: Torques) -> None:
-        """See `Wheel`; (11) and (15) tell the force that acted on each."""
+        """See `Wheel`; (11) and (15) give the force that acted on each."""
         before, after, time = observed.before, observed.after, observed.time
         response_time = self.options.response_time
         if response_time == 0 or min(abs(before.speed), abs(after.speed)) < SLIDES:
@@ -234,11 +231,11 @@ class Guard:
         mass, inertia, friction, weight = climber.inertial
         drive = mass * (after.speed - before.speed) / time + weight * after.sine
         drive += math.copysign(friction, after.speed)
-        turn = inertia * (after.yaw_rate - before.yaw_rate) / time / climber.half_track
-        share = 1 - math.exp(-time / response_time)
-        found = (drive + turn) / 2, (drive - turn) / 2
-        for wheel, torque, force in zip(self._wheels, torques, found, strict=True):
-            wheel.add(torque / climber.wheel_radius, force, share)
+        yaw_force = inertia * (after.yaw_rate - before.yaw_rate) / time / climber.half_track
+        new = 1 - math.exp(-time / response_time)
+        acted = (drive + yaw_force) / 2, (drive - yaw_force) / 2
+        for wheel, torque, force in zip(self._wheels, torques, acted, strict=True):
+            wheel.add(torque / climber.wheel_radius, force, new)
 
     def _watch_wheels(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
         if not 0 < self.options.response_time < self._moved:
@@ -263,7 +260,7 @@ class Guard:
     def rest(self, climber: Climber, motion: Motion, time: float) -> None:
         """A climber that had a fault is in `motion` for `time` [s]; if it has rested, trust it."""
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
-        self._rested = self._rested + time if rim < REST else 0.0
+        self._rested = self._rested + time if rim < RIM_REST else 0.0
         needed = self.options.recovery_time * (STALL_REST if self._is(Mode.STALLED) else 1)
         if self._rested > needed and not self.is_for_good:
             self.fault = None
@@ -271,12 +268,12 @@ class Guard:
 
     @property
     def is_for_good(self) -> bool:
-        """Whether somebody has to look after the climber first."""
+        """Whether it ends only by ~/enable, once the climber has been looked after."""
         many = len(self.faults) >= self.options.attempts
         return many or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
 
     @property
-    def told(self) -> Trouble | None:
+    def trouble(self) -> Trouble | None:
         """The fault, and how it ends."""
         if self.fault is None:
             return None

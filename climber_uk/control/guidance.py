@@ -75,8 +75,8 @@ class Guidance:
         hurry = math.hypot(v_s / 2, min(self.catch_up_share * speed, self.catch_up_speed))
         root = math.hypot(speed, v_s)
         steering = self.cross_track_gain * speed / root * (speed + hurry)
-        turning = min(root / self.turn_radius, self.turn_rate)
-        return speed + hurry, yaw_rate + turning + steering
+        return_rate = min(root / self.turn_radius, self.turn_rate)
+        return speed + hurry, yaw_rate + return_rate + steering
 
     def prepare(self, target: ReferencePoint) -> PreparedTarget:
         """Prepare a reference, given in the wall's frame to the jerk: L, R and g with their rates.
@@ -97,23 +97,23 @@ class Guidance:
         root = sqrt(root2)
         # g = k_y ς(v_d), ς = v/√(v² + v_s²), ς' = v_s²/(v² + v_s²)^(3/2),
         # ς'' = -3 v ς'/(v² + v_s²):  ς̇ = ς' v̇,  ς̈ = ς' v̈ + ς'' v̇²
-        share, slope = v / root, v_s2 / (root * root2)
-        share_1 = slope * v_1
-        share_2 = slope * v_2 - 3.0 * share_1 * v * v_1 / root2
+        fade, slope = v / root, v_s2 / (root * root2)
+        fade_1 = slope * v_1
+        fade_2 = slope * v_2 - 3.0 * fade_1 * v * v_1 / root2
         # ahead L = √(v_d² + v_s²/4), L̇ = v_d v̇_d / L; behind L = √(v_s²/4 + min(c |v_d|, v_c)²),
         # L̇ = c² v_d v̇_d / L, or 0 at the ceiling v_c
         slow = sqrt(v2 + 0.25 * v_s2)
         slow_down = slow, v * v_1 / slow
-        is_shared = c * abs(v) < self.catch_up_speed  # the ceiling of what is added is not reached
-        fast = sqrt(0.25 * v_s2 + select(is_shared, c * c * v2, self.catch_up_speed**2))
-        catch_up = fast, select(is_shared, c * c * v * v_1 / fast, 0.0)
+        is_below_ceiling = c * abs(v) < self.catch_up_speed
+        fast = sqrt(0.25 * v_s2 + select(is_below_ceiling, c * c * v2, self.catch_up_speed**2))
+        catch_up = fast, select(is_below_ceiling, c * c * v * v_1 / fast, 0.0)
         # R = min(√(v_d² + v_s²)/ρ, R_max)
-        turn = root / self.turn_radius
-        is_slower = turn < self.turn_rate
-        slower = turn, v * v_1 / (root * self.turn_radius)
-        turn_rate = either(is_slower, slower, (self.turn_rate, 0.0))
-        gain = k_y * share, k_y * share_1, k_y * share_2
-        limits = slow_down, catch_up, turn_rate
+        tightest = root / self.turn_radius
+        is_slower = tightest < self.turn_rate
+        slower = tightest, v * v_1 / (root * self.turn_radius)
+        return_rate = either(is_slower, slower, (self.turn_rate, 0.0))
+        gain = k_y * fade, k_y * fade_1, k_y * fade_2
+        limits = slow_down, catch_up, return_rate
         return PreparedTarget(x, y, heading, cosine, sine, v, v_1, omega, omega_1, *limits, gain)
 
     def desired_acceleration(self, prepared: PreparedTarget, motion: Motion) -> DesiredAcceleration:
@@ -121,7 +121,7 @@ class Guidance:
         # unpacked by position: this runs twice for each odometry, and attributes would take longer
         x, y, heading, cosine, sine, v, omega = motion
         (x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, slow_down, catch_up,
-         (turn_rate, turn_rate_1), (g, g_1, g_2)) = prepared  # fmt: skip
+         (R, R_1), (g, g_1, g_2)) = prepared  # fmt: skip
         # errors, actual minus wanted (§5.1); Δ = heading_error:
         #   ė_x = v cosΔ - v_d + ω_d e_y,  ė_y = v sinΔ - ω_d e_x,  Δ̇ = yaw_rate_error = ω - ω_d
         offset_x, offset_y, heading_error = x - x_d, y - y_d, wrapped(heading - heading_d)
@@ -132,17 +132,17 @@ class Guidance:
         yaw_rate_error = omega - omega_d
         e_x1, e_y1 = v_along - v_d + omega_d * e_y, v_across - omega_d * e_x
 
-        # speed (§5.2), with u = k_x e_x / L and part = tanh u, so that u̇ = k_x ė_x / L - u L̇ / L:
+        # speed (§5.2), with u = k_x e_x / L, so that u̇ = k_x ė_x / L - u L̇ / L:
         #   d/dt (L tanh u) = k_x (1 - tanh² u) ė_x + (tanh u - u (1 - tanh² u)) L̇
         #   v̇ = v̇_d - d/dt (L tanh u) - λ (v - wanted)
         is_ahead = e_x * v_d > 0.0
         limit, limit_1 = either(is_ahead, slow_down, catch_up)
         k_x = self.along_track_gain
         u = k_x * e_x / limit
-        part = tanh(u)
-        inside = 1.0 - part * part
-        wanted = v_d - limit * part
-        back_1 = k_x * inside * e_x1 + (part - u * inside) * limit_1
+        tanh_u = tanh(u)
+        sech2_u = 1.0 - tanh_u * tanh_u
+        wanted = v_d - limit * tanh_u
+        back_1 = k_x * sech2_u * e_x1 + (tanh_u - u * sech2_u) * limit_1
         v_1 = v_d1 - back_1 - self.speed_rate * (v - wanted)
 
         # heading (§5.3), with w = g e_y:
@@ -158,14 +158,14 @@ class Guidance:
         # what of ψ̈ = θ̈ - ω̇_d + … is not θ̈ - ω̇_d
         psi_2 = slope * w_2 - 2.0 * w * steered_1 * steered_1
 
-        # ṡ = -ω_n s, with u = ω_n ψ / R and part = tanh u:
+        # ṡ = -ω_n s, with u = ω_n ψ / R:
         #   ψ̈ + ω_n (1 - tanh² u) ψ̇ + (tanh u - u (1 - tanh² u)) Ṙ = -ω_n s,  solved for θ̈
         omega_n = self.heading_frequency
-        u = omega_n * psi / turn_rate
-        part = tanh(u)
-        inside = 1.0 - part * part
-        s = psi_1 + turn_rate * part  # s: 0 when it turns back as fast as it should
-        theta_2 = omega_d1 - psi_2 - omega_n * (inside * psi_1 + s)
-        theta_2 = theta_2 - turn_rate_1 * (part - u * inside)
+        u = omega_n * psi / R
+        tanh_u = tanh(u)
+        sech2_u = 1.0 - tanh_u * tanh_u
+        s = psi_1 + R * tanh_u  # s: 0 when it turns back as fast as it should
+        theta_2 = omega_d1 - psi_2 - omega_n * (sech2_u * psi_1 + s)
+        theta_2 = theta_2 - R_1 * (tanh_u - u * sech2_u)
         # ahead of a reference that comes it waits, and overcomes no friction to go back
         return DesiredAcceleration(v_1, theta_2, select(wanted * v_d < 0.0, 0.0, wanted))

@@ -25,9 +25,10 @@ from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import parameter, parameters
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
-REST = 1e-3  # [m/s] of an expected speed that is none
+EXPECTED_REST = 1e-3  # [m/s] of an expected speed that is none
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
+Shares = tuple[Any, Any]  # of an error, put down to the disturbance and to its change
 
 
 def predict(
@@ -36,7 +37,7 @@ def predict(
     """Motion `time` [s] later under a constant force [N] and moment [N m], by the midpoint rule.
 
     Both include the disturbance; `friction` [N] is that of the seal beyond the model's f. Below
-    `SLOW`, where the sign of a measured speed tells nothing, friction is taken to balance what
+    `SLOW`, where the sign of a measured speed is chance, friction is taken to balance what
     pushes, up to all of it: while that suffices the speed stays as it is, rather than being braked
     to rest (docs/theory.md, §8.2).
     """
@@ -52,15 +53,15 @@ def predict(
     if not (slides is True or everywhere(slides)):
         rubbing = select(slides, rubbing, clipped(push, -friction, friction))
     v_1 = (push - rubbing) / mass
-    way, end = time * (v + half * v_1), v + time * v_1
+    displacement, end = time * (v + half * v_1), v + time * v_1
     stops = v * end < 0
     if stops is not False and anywhere(stops):  # friction ends a motion, and does not reverse it
         left = time + v / select(stops, v_1, 1.0)
         back_1 = (push - clipped(push, -friction, friction)) / mass
-        way = select(stops, 0.5 * (v * (time - left) + left * left * back_1), way)
+        displacement = select(stops, 0.5 * (v * (time - left) + left * left * back_1), displacement)
         end = select(stops, left * back_1, end)
     v, omega = end, omega + time * omega_1
-    return Motion(x + way * c, y + way * s, heading, cosine, sine, v, omega)
+    return Motion(x + displacement * c, y + displacement * s, heading, cosine, sine, v, omega)
 
 
 class DisturbanceEstimate(NamedTuple):
@@ -73,7 +74,7 @@ class DisturbanceEstimate(NamedTuple):
     friction: Any = 0.0  # [N] of the seal beyond the model's f; -f to f
 
     @property
-    def held(self) -> "DisturbanceEstimate":
+    def without_rates(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
         return DisturbanceEstimate(self.force, self.moment, friction=self.friction)
 
@@ -82,8 +83,8 @@ class DisturbanceEstimate(NamedTuple):
     ) -> tuple[Any, Any]:
         """Force and friction [N] as a `change` of both together [N] teaches.
 
-        At `speed` [m/s] in a `direction` (1, -1) nothing tells one from the other: each takes half,
-        the least correction that explains it. The other direction tells the rest. In none (0), or
+        At `speed` [m/s] in a `direction` (1, -1) the two cannot be told apart: each takes half, the
+        least correction that explains it. The other direction shows the rest. In none (0), or
         where it slides the other way, all of it is put down to the force.
         """
         f, before = climber.seal_friction, self.friction
@@ -99,8 +100,8 @@ class Observer:
     With measured speeds it is a momentum observer of second order: a disturbance that grows
     steadily leaves no error. Both poles are at K, or lower: K (2 T + δ) <= `MOST_LEARNT`, with T
     the period and δ the delay that is known. Without measured speeds it is a critically damped
-    filter of poses (fading memory of third order, or of second order if K = 0). What friction
-    holds teaches nothing: the model expects no motion.
+    filter of poses (fading memory of third order, or of second order if K = 0). What stiction
+    balances is not learnt: the model expects no motion.
     """
 
     bandwidth: float = parameter(
@@ -127,38 +128,38 @@ class Observer:
         climber: Climber,
         learnt: DisturbanceEstimate,
         expected: Motion,
-        found: Motion,
+        measured: Motion,
         time: float,
-        shares: tuple[Any, Any],
+        shares: Shares,
         direction: float = 0.0,
     ) -> tuple[Motion, DisturbanceEstimate]:
-        """Motion and disturbance after `time` [s] in which `expected` became `found`.
+        """Motion and disturbance after `time` [s] in which `expected` became `measured`.
 
         `shares` are those of the observer for that time; `direction` is 1 where the climber is to
         drive forwards, -1 backwards, 0 at rest.
         """
         if self.velocity_source == "pose":
-            return self._from_pose(climber, learnt, expected, found, time, direction)
+            return self._from_pose(climber, learnt, expected, measured, time, direction)
         if everywhere(self.bandwidth == 0):
-            return found, _faded(learnt, time)
+            return measured, _faded(learnt, time)
         _, moment, force_rate, moment_rate, _ = learnt
         mass, inertia, _, _ = climber.inertial
         new, newer = shares
-        faster = (found.speed - expected.speed) / time
-        turning = (found.yaw_rate - expected.yaw_rate) / time
-        change = time * force_rate + new * mass * faster
+        acceleration = (measured.speed - expected.speed) / time
+        yaw_acceleration = (measured.yaw_rate - expected.yaw_rate) / time
+        change = time * force_rate + new * mass * acceleration
         force, friction = learnt.changed(climber, change, direction, expected.speed)
-        moment = moment + time * moment_rate + new * inertia * turning
-        # at rest, where friction holds whatever it is, nothing tells of a change
-        slides = abs(expected.speed) > REST
-        force_rate = select(slides, force_rate + newer / time * mass * faster, 0.0)
-        moment_rate = moment_rate + newer / time * inertia * turning
-        return found, DisturbanceEstimate(force, moment, force_rate, moment_rate, friction)
+        moment = moment + time * moment_rate + new * inertia * yaw_acceleration
+        # at rest stiction balances any force, so that no change of it shows
+        slides = abs(expected.speed) > EXPECTED_REST
+        force_rate = select(slides, force_rate + newer / time * mass * acceleration, 0.0)
+        moment_rate = moment_rate + newer / time * inertia * yaw_acceleration
+        return measured, DisturbanceEstimate(force, moment, force_rate, moment_rate, friction)
 
-    def shares(self, time: float, delay: float) -> tuple[Any, Any]:
-        """What of an acceleration that was not expected is put down to the disturbance.
+    def shares(self, time: float, delay: float) -> Shares:
+        """Shares of an unexpected acceleration: disturbance, and its change in `time` [s].
 
-        And what of it to the disturbance's change in `time` [s]; `delay` [s] is that of torques.
+        `delay` [s] is that of torques.
         """
         most = MOST_LEARNT * time / (2.0 * time + delay)
         new = 1.0 - exp(-clipped(self.bandwidth * time, 0.0, most))
@@ -169,14 +170,14 @@ class Observer:
         climber: Climber,
         learnt: DisturbanceEstimate,
         expected: Motion,
-        found: Motion,
+        measured: Motion,
         time: float,
         direction: float,
     ) -> tuple[Motion, DisturbanceEstimate]:
         x, y, heading, cosine, sine, v, omega = expected
-        ahead = (found.x - x) * cosine + (found.y - y) * sine
-        beside = (found.y - y) * cosine - (found.x - x) * sine
-        turned = wrapped(found.heading - heading)
+        ahead = (measured.x - x) * cosine + (measured.y - y) * sine
+        beside = (measured.y - y) * cosine - (measured.x - x) * sine
+        heading_change = wrapped(measured.heading - heading)
 
         memory = exp(-self.pose_bandwidth * time)
         new = 1 - memory
@@ -186,11 +187,11 @@ class Observer:
             g, h, k = 1 - memory**2, new**2, 0.0
             learnt = _faded(learnt, time)
         x, y = x + g * (ahead * cosine - beside * sine), y + g * (ahead * sine + beside * cosine)
-        v, omega = v + h / time * ahead, omega + h / time * turned
-        motion = Motion(x, y, *rotated(heading, cosine, sine, g * turned), v, omega)
+        v, omega = v + h / time * ahead, omega + h / time * heading_change
+        motion = Motion(x, y, *rotated(heading, cosine, sine, g * heading_change), v, omega)
         mass, inertia, _, _ = climber.inertial
         force, friction = learnt.changed(climber, k / time**2 * mass * ahead, direction, v)
-        moment = learnt.moment + k / time**2 * inertia * turned
+        moment = learnt.moment + k / time**2 * inertia * heading_change
         return motion, DisturbanceEstimate(force, moment, friction=friction)
 
 

@@ -1,9 +1,9 @@
-"""The safe output: no torque, or the weight held and motion braked, as `Safety` says."""
+"""The safe output: no torque, or brake while carrying the weight, as `Safety` says."""
 
 from climber_uk.control.control_law import ControlLaw, check_finite
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.timing import LONGEST_STEP, NONE
+from climber_uk.control.timing import LONGEST_STEP, NO_TORQUES
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Torques
 
@@ -33,9 +33,9 @@ class SafeOutput:
     ) -> Torques:
         """Torques in a mode, for the odometry of `stamp` [ns], of `age` [s]; they count as sent."""
         motion, climber, safety = estimator.motion, law.climber, self.safety
-        # one wheel that holds turns the climber
-        turns = mode is Mode.DEAD_WHEEL and climber.seal_friction >= climber.weight_along_wall
-        if motion is None or turns or safety.safe_output != "hold" or stamp < self._coasts_until:
+        # one wheel that brakes yaws the climber
+        yaws = mode is Mode.DEAD_WHEEL and climber.seal_friction >= climber.weight_along_wall
+        if motion is None or yaws or safety.safe_output != "hold" or stamp < self._coasts_until:
             return _let_go(estimator, age)
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
         begin, before = self._braked = self._braked or (stamp, rim)
@@ -44,24 +44,24 @@ class SafeOutput:
             return _let_go(estimator, age)
         braking = 0.0 if mode.doubts_odometry else safety.braking_rate
         try:
-            return _hold(estimator, law, age, braking)
+            return _brake(estimator, law, age, braking)
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
 
 
 def _let_go(estimator: Estimator, age: float) -> Torques:
-    estimator.sent(estimator.begin(age), NONE)
-    return NONE
+    estimator.sent(estimator.begin(age), NO_TORQUES)
+    return NO_TORQUES
 
 
-def _hold(estimator: Estimator, law: ControlLaw, age: float, braking_rate: float) -> Torques:
+def _brake(estimator: Estimator, law: ControlLaw, age: float, braking_rate: float) -> Torques:
     """Torques that carry the weight and brake; raises `ValueError` if they are not finite."""
     ahead = estimator.ahead(age)
     if age >= LONGEST_STEP:  # it has been braked, as far as can be known
         at_rest = ahead.motion._replace(speed=0.0, yaw_rate=0.0)
         ahead = ahead._replace(motion=at_rest)
-    torques = law.holding(ahead, braking_rate)
+    torques = law.braking(ahead, braking_rate)
     check_finite(torques)
     estimator.sent(ahead.begins, torques)
     return torques

@@ -17,7 +17,7 @@ SPEED_TIME = 0.1  # [s] in which a jump of the speed would become one of the pla
 
 
 class Mode(Enum):
-    """What the controller does; the value is what it says about it."""
+    """What the controller does; the value is its text in log and diagnostics."""
 
     FOLLOWING = "following"
     WAITING = "waiting for a reference"  # the only one without any output: a simulation waits
@@ -49,7 +49,7 @@ class Mode(Enum):
 
     @property
     def doubts_odometry(self) -> bool:
-        """Whether the speeds that odometry tells must not be braked by."""
+        """Whether speeds of odometry may be wrong, so that braking by them may drive."""
         return self in (
             Mode.BAD_ODOMETRY,
             Mode.JUMPED,
@@ -77,13 +77,13 @@ class Calm:
         self._last: tuple[int, Trouble] | None = None  # [ns] when it was there last
         self._times: deque[int] = deque(maxlen=FLAPPING)  # [ns] when each began
 
-    def mode(self, before: Mode, time: int, found: Trouble) -> Trouble:
-        """What was found at `time` [ns], in the mode of `before`; or the last fault instead."""
-        mode, _ = found
+    def mode(self, before: Mode, time: int, current: Trouble) -> Trouble:
+        """`current` trouble at `time` [ns], after a mode `before`; or the last fault instead."""
+        mode, _ = current
         if mode.is_fault:
             if not before.is_fault:
                 self._times.append(time)
-            self._last = time, found
+            self._last = time, current
         elif before.is_fault and self._last is not None and mode is Mode.FOLLOWING:
             over_since, fault = self._last
             if (
@@ -92,7 +92,7 @@ class Calm:
                 and 0 <= time - over_since < CALM
             ):
                 return fault
-        return found
+        return current
 
 
 @parameters
@@ -134,12 +134,13 @@ class Safety:
         0.05, "m", "of the way in half a second, between twist and pose, beside 30 %", above=0
     )
 
-    def has_jumped(self, expected: Motion, found: Motion, half_track: float) -> bool:
+    def has_jumped(self, expected: Motion, measured: Motion, half_track: float) -> bool:
         """Whether a wheel is, or will soon be, further than `max_jump` from where expected."""
-        turned = wrapped(found.heading - expected.heading)
-        gone = math.hypot(found.x - expected.x, found.y - expected.y) + half_track * abs(turned)
-        going = half_track * abs(found.yaw_rate - expected.yaw_rate) + math.hypot(
-            found.speed * found.cosine - expected.speed * expected.cosine,
-            found.speed * found.sine - expected.speed * expected.sine,
+        heading_change = wrapped(measured.heading - expected.heading)
+        gone = math.hypot(measured.x - expected.x, measured.y - expected.y)
+        gone += half_track * abs(heading_change)
+        going = half_track * abs(measured.yaw_rate - expected.yaw_rate) + math.hypot(
+            measured.speed * measured.cosine - expected.speed * expected.cosine,
+            measured.speed * measured.sine - expected.speed * expected.sine,
         )
         return not max(gone, going * SPEED_TIME) <= self.max_jump

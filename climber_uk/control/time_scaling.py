@@ -14,7 +14,7 @@ from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
 
-SLOW = 0.01  # [m/s] speed of a reference that is not worth waiting for
+STANDSTILL = 0.01  # [m/s] of a reference that may as well be at rest
 
 
 @parameters(slots=True)
@@ -55,20 +55,20 @@ class Pace(NamedTuple):
 
     def slowed(self, missing: float, preview: Preview, time: int, step: float) -> "Pace":
         """Pace that asks `missing` [m/s²] less along the climber, as far as `step` [s] can do."""
-        found = preview.target(time - round(self.lag * SECOND))
-        if found is None:
+        target = preview.target(time - round(self.lag * SECOND))
+        if target is None:
             return self
-        speed = found.speed
-        if missing * speed <= 0 or abs(speed) < SLOW:
+        speed = target.speed
+        if missing * speed <= 0 or abs(speed) < STANDSTILL:
             return self
         return self._replace(change=max(self.change - missing / speed, -self.rate / step))
 
     def target(self, preview: Preview, time: int) -> ReferencePoint | None:
         """Target for `time` [ns] at this pace; None outside of the preview."""
-        found = preview.target(time - round(self.lag * SECOND))
-        if found is None or (self.rate == 1 and self.change == 0):
-            return found
-        x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y = found
+        target = preview.target(time - round(self.lag * SECOND))
+        if target is None or (self.rate == 1 and self.change == 0):
+            return target
+        x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y = target
         rates = self.rate, self.change, 0.0
         _, v_x, a_x, j_x = compose((x, v_x, a_x, j_x), rates)
         _, v_y, a_y, j_y = compose((y, v_y, a_y, j_y), rates)

@@ -1,24 +1,25 @@
-"""When torques act: as told (`Timing`), as the clock shows (`Ages`), and as is learnt (`Latency`).
+"""When torques act: as configured (`Timing`), as clocks show (`Ages`), as learnt (`Latency`).
 
 Which act when, of those that were sent, is in a `TorqueHistory`. Stamps and times of clocks are
 integers in nanoseconds.
 """
 
 from collections import deque
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from climber_uk.control.model import Shares
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Torques
 from climber_uk.parameters.declaration import parameter, parameters
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
 WINDOW = SECOND // 2  # [ns] in which one odometry at least is not late
-NONE = Torques(0.0, 0.0)
-LONGEST = 0.05  # [s] that is taken for a delay
+NO_TORQUES = Torques(0.0, 0.0)
+LONGEST_DELAY = 0.05  # [s] that is taken for a delay
 FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
-FASTEST = 0.05  # [s/s] by which it changes
-MEMORY = 1.0  # T_f [s]
-LEAST = 0.1  # S₀ [m²/s²] of changes of acceleration
+FASTEST_CHANGE = 0.05  # [s/s] by which it changes
+MEMORY_TIME = 1.0  # T_f [s]
+LEAST_ENERGY = 0.1  # S₀ [m²/s²] of changes of acceleration
 SWING = 0.3  # [m/s²] by which an acceleration has to go back to count as a reversal
 OSCILLATES = 4.0  # reversals in the memory
 STEADY: tuple[tuple[float, float], ...] = (0.0, 0.0), (0.0, 0.0)
@@ -95,10 +96,10 @@ class TorqueHistory:
 
     def __init__(self) -> None:
         self._begun: deque[tuple[int, Torques]] = deque()  # [ns] from when, torques
-        self.last = NONE  # the torques that will act in the end
+        self.last = NO_TORQUES  # the torques that will act in the end
 
     def begin(self, wanted: int) -> int:
-        """When torques would begin to act [ns]: as wanted, but none overtakes the last ones."""
+        """When torques begin to act [ns]: at `wanted` [ns], but no earlier than the last ones."""
         return max(wanted, self._begun[-1][0]) if self._begun else wanted
 
     def add(self, begins: int, torques: Torques) -> None:
@@ -107,7 +108,7 @@ class TorqueHistory:
         self.last = torques
 
     def correct(self, torques: Torques) -> None:
-        """Have other torques acting in the place of the last ones."""
+        """Replace the last torques, from when those begin to act."""
         begins, _ = self._begun.pop()
         self.add(begins, torques)
 
@@ -127,7 +128,7 @@ class TorqueHistory:
 
     def between(self, start: int, end: int) -> list[tuple[Torques, float]]:
         """Torques that act from `start` to `end` [ns], each with how long it does [s]."""
-        torques, spans = NONE, []
+        torques, spans = NO_TORQUES, []
         for begins, following in self._begun:
             if begins >= end:
                 break
@@ -145,22 +146,22 @@ class Oscillation:
 
     def __init__(self) -> None:
         self.reversals = 0.0
-        self._way, self._extreme = 1.0, 0.0
+        self._direction, self._extreme = 1.0, 0.0
 
     def add(self, acceleration: float, left: float) -> bool:
         """Whether it oscillates, with an `acceleration` [m/s²]; `left` of what was before."""
-        back = self._way * (self._extreme - acceleration)
+        back = self._direction * (self._extreme - acceleration)
         self.reversals *= left
         if back < 0 or back > SWING:
             self._extreme = acceleration
         if back > SWING:
-            self._way = -self._way
+            self._direction = -self._direction
             self.reversals += 1.0
         return self.reversals > OSCILLATES
 
 
 class Sample(NamedTuple):
-    """What a period tells, of the drive and of the turn; lengths of a turn are at the wheels."""
+    """What a period tells of (drive, yaw); of yaw as speed and acceleration of a wheel's rim."""
 
     accelerations: tuple[float, float]  # a [m/s²]
     errors: tuple[float, float]  # ε [m/s]
@@ -169,12 +170,12 @@ class Sample(NamedTuple):
 
 
 class Latency:
-    """How much later than told a torque acts: learnt where the loop begins to oscillate for it.
+    """How much later than configured a torque acts: learnt where the loop oscillates for it.
 
     Where a torque acts δ later than the model believes, speeds are off by ε = -δ (a - a₀), with a
     and a₀ the accelerations by the torques that act at the end and at the begin of a period, so far
     as the disturbance observer does not put that down to a disturbance: φ = ∂ε/∂δ goes through the
-    observer as ε does. δ of drive and turn together follows by recursive least squares that forget
+    observer as ε does. δ of drive and yaw together follows by recursive least squares that forget
     (Ljung & Söderström 1983, 3.6):
 
         S ← S (1 - T / T_f) + φ²,    δ ← δ - ε φ / (S + S₀)
@@ -198,26 +199,26 @@ class Latency:
         self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
         return self._far_off
 
-    def learn(self, sample: Sample, shares: tuple[Any, Any], told: float = 0.0) -> None:
+    def learn(self, sample: Sample, shares: Shares, configured_delay: float = 0.0) -> None:
         """Take in a period; `shares` are those of the observer.
 
-        A delay that is `told` [s] may be too long: what is learnt may be as much less than 0.
+        The `configured_delay` [s] may be too long: what is learnt may be below 0 by as much.
         """
         accelerations, _, time, slides = sample
-        drive, turn = self.oscillations
-        left = max(0.0, 1.0 - time / MEMORY)
-        # at rest friction goes to and fro, and holds
-        drives = slides and drive.add(accelerations[0], left)
-        turns = turn.add(accelerations[1], left)
+        drive, yaw = self.oscillations
+        left = max(0.0, 1.0 - time / MEMORY_TIME)
+        # at rest friction oscillates with the force that it balances
+        drive_oscillates = slides and drive.add(accelerations[0], left)
+        yaw_oscillates = yaw.add(accelerations[1], left)
         self._energy *= left
-        if drives or turns:
-            self._learn(sample, (drives, turns), shares, told)
+        if drive_oscillates or yaw_oscillates:
+            self._learn(sample, (drive_oscillates, yaw_oscillates), shares, -configured_delay)
         else:
             self._slopes = STEADY
         self._before = accelerations
 
     def _learn(
-        self, sample: Sample, oscillates: tuple[bool, bool], shares: tuple[Any, Any], told: float
+        self, sample: Sample, oscillates: tuple[bool, bool], shares: Shares, least: float
     ) -> None:
         (new, newer), time, product, slopes = shares, sample.time, 0.0, []
         for i, (slope, rate) in enumerate(self._slopes):
@@ -226,6 +227,6 @@ class Latency:
             self._energy += phi * phi * oscillates[i]
             slopes.append((slope + time * rate + new * phi / time, rate + newer * phi / time**2))
         self._slopes = tuple(slopes)
-        most = FASTEST * time
-        change = min(max(-product / (self._energy + LEAST), -most), most)
-        self.delay = min(max(self.delay + change, -told), LONGEST)
+        most = FASTEST_CHANGE * time
+        change = min(max(-product / (self._energy + LEAST_ENERGY), -most), most)
+        self.delay = min(max(self.delay + change, least), LONGEST_DELAY)

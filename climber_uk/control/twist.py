@@ -9,17 +9,17 @@ KIND_MEMORY = 1.0  # [s]
 SURELY = 0.1  # share of the other's squares of misfits, below which a twist is taken for a mean
 CHECK_MEMORY = 0.5  # [s] in which a difference is forgotten
 SHARE = 0.3  # by which they may differ: slip, scale
-OPPOSED = 0.2  # of the largest error: way both of them must have gone, to opposite sides
-IN_A_ROW = 3  # odometry messages that say so
-SUSPECTED = 0.02  # of the largest error: enough, and once, where a climber is too fast as well
+OPPOSED_DISTANCE = 0.2  # of the largest error: distance of both, to opposite sides
+OPPOSED_IN_A_ROW = 3  # odometry messages
+OPPOSED_IF_TOO_FAST = 0.02  # of the largest error: enough, once, where it is too fast as well
 
 
 class TwistKind:
     """Whether the twist of late is that of its stamp, or the mean of the period before it.
 
-    Encoders tell means: the way of a period, by its time. A twist of the stamp is that way by the
-    time only together with the one before: (v + v₀)/2. What fits the poses better is taken; if in
-    doubt, the twist is that of its stamp.
+    Encoders give means: the distance of a period, by its time. For twists of the stamp that is the
+    mean (v + v₀)/2 of two in a row. What fits the poses better is taken; if in doubt, the twist is
+    that of its stamp.
     """
 
     def __init__(self) -> None:
@@ -30,18 +30,18 @@ class TwistKind:
         """Take in an odometry, `time` [s] after the one `before`."""
         speed, rate = mean_twist(before, now, time)
         left = max(0.0, 1.0 - time / KIND_MEMORY)
-        off, turned_off = now.speed - speed, now.yaw_rate - rate
-        off_0, turned_off_0 = before.speed - speed, before.yaw_rate - rate
-        self._as_mean = left * self._as_mean + off * off + turned_off * turned_off
-        off, turned_off = (off + off_0) / 2, (turned_off + turned_off_0) / 2
-        self._as_instant = left * self._as_instant + off * off + turned_off * turned_off
+        off, yaw_off = now.speed - speed, now.yaw_rate - rate
+        off_0, yaw_off_0 = before.speed - speed, before.yaw_rate - rate
+        self._as_mean = left * self._as_mean + off * off + yaw_off * yaw_off
+        off, yaw_off = (off + off_0) / 2, (yaw_off + yaw_off_0) / 2
+        self._as_instant = left * self._as_instant + off * off + yaw_off * yaw_off
         self.is_mean = self._as_mean < SURELY * self._as_instant
 
 
 class TwistCheck:
     """Whether the twist is the rate of the pose: its sign may be wrong.
 
-    Compares ways by pose and by twist, each the sum of what was gone in the last moments.
+    Compares distances by pose and by twist, summed over the last moments, older ones counting less.
     """
 
     def __init__(self) -> None:
@@ -49,49 +49,50 @@ class TwistCheck:
 
     def restart(self) -> None:
         """Compare from now on."""
-        self._ways = (0.0, 0.0), (0.0, 0.0)  # [m] by pose and by twist: forward, rim in turning
+        # [m] by pose and by twist: forward, and of a rim by yawing
+        self._distances = (0.0, 0.0), (0.0, 0.0)
         self._opposed = 0
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
-        """Add the way from the last odometry to the next, `time` [s] later."""
-        turned = wrapped(motion.heading - last.heading)
-        middle = last.heading + turned / 2
+        """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
+        heading_change = wrapped(motion.heading - last.heading)
+        middle = last.heading + heading_change / 2
         forward = (motion.x - last.x) * math.cos(middle) + (motion.y - last.y) * math.sin(middle)
         rim = half_track * time * (last.yaw_rate + motion.yaw_rate) / 2
         left = math.exp(-time / CHECK_MEMORY)
-        (pose, twist), (turned_by_pose, turned_by_twist) = self._ways
-        self._ways = (
+        (pose, twist), (yaw_by_pose, yaw_by_twist) = self._distances
+        self._distances = (
             (left * pose + forward, left * twist + time * (last.speed + motion.speed) / 2),
-            (left * turned_by_pose + half_track * turned, left * turned_by_twist + rim),
+            (left * yaw_by_pose + half_track * heading_change, left * yaw_by_twist + rim),
         )
 
     def opposed(self, least: float) -> str:
-        """Which part of the twist has another sign than its way, of `least` [m]; else ''."""
-        for name, (pose, twist) in zip(("linear.x", "angular.z"), self._ways, strict=True):
+        """Field of the twist whose sign is not its pose's, over `least` [m] of both; else ''."""
+        for name, (pose, twist) in zip(("linear.x", "angular.z"), self._distances, strict=True):
             if pose * twist < 0 and min(abs(pose), abs(twist)) > least:
                 return f"twist.{name}"
         return ""
 
     def trouble(self, largest: float) -> tuple[str, bool]:
         """What is wrong if they differ by more than `largest` [m], and whether a sign is."""
-        opposed = self.opposed(OPPOSED * largest)
+        opposed = self.opposed(OPPOSED_DISTANCE * largest)
         self._opposed = self._opposed + 1 if opposed else 0
-        if self._opposed >= IN_A_ROW:
+        if self._opposed >= OPPOSED_IN_A_ROW:
             return opposed, True
-        differs = max(_difference(*self._ways[0]), _difference(*self._ways[1]))
+        differs = max(_difference(*self._distances[0]), _difference(*self._distances[1]))
         return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
 
 
 def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
     """Forward speed [m/s] and yaw rate [rad/s] that lead from one pose to another in `time` [s]."""
     x, y, heading, cosine, sine, _, _ = before
-    turned = now.heading - heading
+    heading_change = now.heading - heading
     ahead = ((now.x - x) * (cosine + now.cosine) + (now.y - y) * (sine + now.sine)) / 2
-    # halfway (cosine, sine) is longer by 1 / cos(turned / 2) than the mean of those at the ends
-    ahead = ahead * (1 + turned * turned / 8)
-    return ahead / time, turned / time
+    # the mean of the directions at both ends has the length cos(heading_change / 2), not 1
+    ahead = ahead * (1 + heading_change * heading_change / 8)
+    return ahead / time, heading_change / time
 
 
 def _difference(pose: float, twist: float) -> float:
-    """By how much two ways differ, beyond what slip and scale explain [m]."""
+    """By how much two distances [m] differ, beyond what slip and scale explain [m]."""
     return abs(pose - twist) - SHARE * max(abs(pose), abs(twist))

@@ -167,10 +167,10 @@ class Attachment:
 
         The seal carries its share of the suction, whatever the weight (§2.2).
         """
-        held_by_seal = 0.0
+        seal_load = 0.0
         if self.adhesion.has_seal:
-            held_by_seal = (1 - climber.wheel_load_share) * self.adhesion.force(climber)
-        return clipped(self.normal_force(climber, into_wall) - held_by_seal, 0.0, float("inf"))
+            seal_load = (1 - climber.wheel_load_share) * self.adhesion.force(climber)
+        return clipped(self.normal_force(climber, into_wall) - seal_load, 0.0, float("inf"))
 
     def slip_margin(self, climber: Climber, into_wall: Any, drive: Any, lateral: Any) -> Any:
         """μ_w N_w / √(drive² + lateral²) (...): below 1 the wheels slip; at most `MAX_MARGIN`.
@@ -185,8 +185,8 @@ class Attachment:
 
         `along_wall` (...) [m/s²] is gravity along the wall.
         """
-        holding = self.normal_force(climber, into_wall) * self.grip.wheelbase / 2
-        return _margin(holding, climber.mass * abs(along_wall) * self.grip.centre_height)
+        righting_moment = self.normal_force(climber, into_wall) * self.grip.wheelbase / 2
+        return _margin(righting_moment, climber.mass * abs(along_wall) * self.grip.centre_height)
 
 
 @parameters
@@ -205,9 +205,10 @@ class Alarm:
         )
 
 
-def _margin(held: Any, demanded: Any) -> Any:
-    """`held` by `demanded` (>= 0), clipped to ± `MAX_MARGIN`."""
-    within = abs(held) < MAX_MARGIN * demanded
+def _margin(available: Any, demanded: Any) -> Any:
+    """`available` by `demanded` (>= 0), clipped to ± `MAX_MARGIN`."""
+    within = abs(available) < MAX_MARGIN * demanded
     if everywhere(within):
-        return held / demanded
-    return select(within, held / select(within, demanded, 1.0), with_sign_of(MAX_MARGIN, held))
+        return available / demanded
+    largest = with_sign_of(MAX_MARGIN, available)
+    return select(within, available / select(within, demanded, 1.0), largest)

@@ -123,11 +123,6 @@ class Climber:
         friction, weight = -self.seal_friction * direction, self.weight_along_wall
         return pack(friction * cos(heading), friction * sin(heading) - weight, 0 * heading)
 
-    def wheel_force(self, heading: Array, torques: Array) -> Array:
-        """E(θ) τ of wheel torques (..., 2), in the wall's frame, (..., 3) [N, N, N m]."""
-        force, moment = self.force_and_moment(torques)
-        return pack(force * cos(heading), force * sin(heading), moment)
-
     def wrench(self, right: Any, left: Any) -> tuple[Any, Any]:
         """Drive force (τR + τL)/r [N] and yaw moment d (τR - τL)/r [N m] of two torques [N m]."""
         radius = self.wheel_radius

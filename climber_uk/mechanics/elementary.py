@@ -13,7 +13,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 
-TURN = 2 * math.pi  # [rad]
+FULL_TURN = 2 * math.pi  # [rad]
 Derivatives = tuple[Any, Any, Any, Any]  # (...) of order 0, 1, 2, 3
 
 
@@ -45,10 +45,11 @@ def with_sign_of(size: Any, of: Any) -> Any:
 def wrapped(angle: Any) -> Any:
     """The angle [rad] in [-π, π)."""
     if isinstance(angle, float):
-        return angle if -3.0 < angle < 3.0 else (angle + math.pi) % TURN - math.pi
+        return angle if -3.0 < angle < 3.0 else (angle + math.pi) % FULL_TURN - math.pi
     if np.abs(angle).max(initial=0.0) < 3.0:
         return angle
-    return angle - TURN * np.floor(angle / TURN + 0.5)  # numpy's remainder takes ten times as long
+    # numpy's remainder takes ten times as long
+    return angle - FULL_TURN * np.floor(angle / FULL_TURN + 0.5)
 
 
 def clipped(value: Any, lowest: Any, highest: Any) -> Any:

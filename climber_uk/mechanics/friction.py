@@ -23,7 +23,7 @@ class Friction(Protocol):
     """A friction law; f (...) is Coulomb's [N], `speed` (...) that of sliding, >= 0 [m/s]."""
 
     def stiction(self, f: Any) -> Any:
-        """Most that friction holds at rest (...) [N]; 0 if it holds nothing."""
+        """Largest force that friction balances at rest (...) [N]; 0 for one without stiction."""
 
     def level(self, f: Any, speed: Any) -> Any:
         """Force (...) against steady sliding [N]."""
@@ -39,7 +39,7 @@ class Friction(Protocol):
 
     @property
     def bristles(self) -> "Bristles | None":
-        """What gives way before it slides, of a law without stiction; None: nothing."""
+        """Bristles that give way before it slides, of a law without stiction; else None."""
         return None
 
 
@@ -49,7 +49,7 @@ class Bristles(Friction, Protocol):
     damping_time: float  # of the bristles: σ₁ / σ₀ [s]
 
     def stiction(self, f: Any) -> Any:
-        """It gives way to any force: see `Friction`."""
+        """0: any force bends the bristles; see `Friction`."""
         return 0.0 * f
 
     def relaxation(self, speed: Any) -> Any:
@@ -124,8 +124,8 @@ class Stribeck(Friction):
 
     def gamma(self, speed: Any) -> Any:
         """γ(v) (...), the level without its viscous part, by f."""
-        part = speed / self.speed
-        return 1 + (self.ratio - 1) * exp(-part * part)
+        relative = speed / self.speed
+        return 1 + (self.ratio - 1) * exp(-relative * relative)
 
     def steepness(self, f: Any) -> Any:
         """See `Friction`: √(2/e) at v_s/√2 is that of the Gaussian."""

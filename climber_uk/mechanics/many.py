@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 
-def part(of: Any, index: Any) -> Any:
+def indexed(of: Any, index: Any) -> Any:
     """`of` with `[index]` of every array in it; goes into tuples and dataclasses.
 
     What holds no array comes back as the object that it is.
@@ -16,13 +16,13 @@ def part(of: Any, index: Any) -> Any:
     if isinstance(of, np.ndarray):
         return of[index]
     if isinstance(of, tuple):
-        parts = (part(each, index) for each in of)
-        return type(of)(*parts) if hasattr(of, "_fields") else tuple(parts)
+        elements = (indexed(each, index) for each in of)
+        return type(of)(*elements) if hasattr(of, "_fields") else tuple(elements)
     if dataclasses.is_dataclass(of) and not isinstance(of, type):
         changed = {}
         for field in dataclasses.fields(of):
             value = getattr(of, field.name)
-            picked = part(value, index)
+            picked = indexed(value, index)
             if picked is not value:
                 changed[field.name] = picked
         return dataclasses.replace(of, **changed) if changed else of
@@ -40,7 +40,7 @@ def amended(condition: Any, regular: Any, exceptional: Callable[..., Any], *argu
     which = np.flatnonzero(condition)
     if not len(which):
         return regular
-    instead = exceptional(*(part(argument, which) for argument in arguments))
+    instead = exceptional(*(indexed(argument, which) for argument in arguments))
     whole = []
     for numbers, replaced in zip(regular, instead, strict=True):
         numbers = np.array(np.broadcast_to(numbers, condition.shape))

@@ -64,12 +64,12 @@ class Preview:
     def _pieces(self) -> tuple[list[int], list[list[list[float]]]]:
         """Times [ns], and coefficients (n-1, 3, 6) of 1, t … t⁵, t [s] since each."""
         h = np.diff(self.times)[:, None] * 1e-9
-        way = np.diff(self.pose, axis=0)
-        way[:, 2] = np.mod(way[:, 2] + np.pi, 2 * np.pi) - np.pi
+        step = np.diff(self.pose, axis=0)
+        step[:, 2] = np.mod(step[:, 2] + np.pi, 2 * np.pi) - np.pi
         v, v_end = self.velocity[:-1] * h, self.velocity[1:] * h
         a, a_end = self.acceleration[:-1] * h**2, self.acceleration[1:] * h**2
-        by_share = np.stack([self.pose[:-1], v, a / 2, *quintic(way, v, a, v_end, a_end)], axis=2)
-        return self.times.tolist(), (by_share / h[..., None] ** np.arange(6)).tolist()
+        by_u = np.stack([self.pose[:-1], v, a / 2, *quintic(step, v, a, v_end, a_end)], axis=2)
+        return self.times.tolist(), (by_u / h[..., None] ** np.arange(6)).tolist()
 
     def at(self, time: int) -> Reference | None:
         """Reference at `time` [ns]; None outside of the points."""
@@ -165,12 +165,12 @@ def joined(previews: Iterable[Preview]) -> Preview:
     )
 
 
-def quintic(way: Array, v: Array, a: Array, v_end: Array, a_end: Array) -> tuple[Array, ...]:
-    """Coefficients of u³, u⁴, u⁵ of a Hermite piece, u from 0 to 1, that goes a `way`.
+def quintic(step: Array, v: Array, a: Array, v_end: Array, a_end: Array) -> tuple[Array, ...]:
+    """Coefficients of u³, u⁴, u⁵ of a Hermite piece, u from 0 to 1, that goes a `step`.
 
     Velocities and accelerations at both ends, (...), are by u.
     """
-    p_left, v_left, a_left = way - v - a / 2, v_end - v - a, a_end - a  # without these three
+    p_left, v_left, a_left = step - v - a / 2, v_end - v - a, a_end - a  # without these three
     return (
         10 * p_left - 4 * v_left + a_left / 2,
         -15 * p_left + 7 * v_left - a_left,

@@ -50,11 +50,6 @@ class Reference:
         """Forward acceleration v̇_d (...) [m/s²]."""
         return along(self.heading, self.acceleration)
 
-    @cached_property
-    def forward_jerk(self) -> Array:
-        """Second derivative of the forward speed, v̈_d = p⃛·t + ω² v_d (...) [m/s³]."""
-        return along(self.heading, self.jerk) + self.yaw_rate**2 * self.speed
-
 
 def tracking_error(pose: Array, reference: Reference) -> tuple[Array, Array, Array]:
     """Errors along the track [m], across it [m] and of the heading [rad], each (...).

@@ -16,7 +16,7 @@ from climber_uk.mechanics.elementary import Derivatives
 
 DEGREE = 4
 # cells of s are halved until none turns by more, and ρ is not much higher than in the next
-TURN, CONTRAST, HALVINGS = 0.15, 1.25, 24  # [rad], ratio
+LARGEST_CELL_TURN, CONTRAST, HALVINGS = 0.15, 1.25, 24  # [rad], ratio
 FINEST = 2.0**-12  # of the spacing of knots, to which cells are halved for the contrast
 STEEPER = 1.2  # times as fast as foreseen that speed may change, before cells are halved for it
 MOST_CELLS = 800_000  # about 8000 sharp corners
@@ -89,34 +89,34 @@ def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: Spee
 def _cells(
     curve: Any, period: float | None, length: float, most: float, limits: SpeedLimits, least: float
 ) -> tuple[Array, Array]:
-    """Sizes (n,) of cells small enough to tell where it is how slow, and the ρ (n,) in each."""
+    """Sizes (n,) of cells in which ρ varies little, and the ρ (n,) needed in each."""
     edges = np.unique(np.clip(curve.t, 0.0, length))
     start, size = edges[:-1], np.diff(edges)
     _check_number(start)
-    turning, needed = _look(curve, start, size, limits)
+    curvature, needed = _look(curve, start, size, limits)
     mode: Any = "edge" if period is None else "wrap"
     for number in range(2 * HALVINGS):
         foreseen = _foreseen(start + size / 2, needed, period, most)
         beside = np.pad(foreseen, 1, mode)
         contrast = np.maximum(beside[:-2], beside[2:]) / foreseen
-        turns = turning * size > TURN
-        if number >= HALVINGS and turns.any():
+        is_bent = curvature * size > LARGEST_CELL_TURN
+        if number >= HALVINGS and is_bent.any():
             break
         next_to = np.pad(size, 1, mode)
-        wide = turns | ((contrast > CONTRAST) & (size > least))
+        wide = is_bent | ((contrast > CONTRAST) & (size > least))
         wide |= size > 2.1 * np.minimum(next_to[:-2], next_to[2:])
         if not wide.any():
             wide = _beside_steep(size, foreseen, most, mode)
         if not wide.any() or number == 2 * HALVINGS - 1:
             return size, foreseen
         parts = 1 + wide
-        start, size, turns = (np.repeat(x, parts) for x in (start, size / parts, turns))
-        turning, needed = np.repeat(turning, parts), np.repeat(needed, parts)
+        start, size, is_bent = (np.repeat(x, parts) for x in (start, size / parts, is_bent))
+        curvature, needed = np.repeat(curvature, parts), np.repeat(needed, parts)
         _check_number(start)
         second = np.flatnonzero(np.repeat(wide, parts))[1::2]
         start[second] += size[second]
-        turning[turns], needed[turns] = _look(curve, start[turns], size[turns], limits)
-    x, y = curve(start[np.argmax(turning)])
+        curvature[is_bent], needed[is_bent] = _look(curve, start[is_bent], size[is_bent], limits)
+    x, y = curve(start[np.argmax(curvature)])
     raise ValueError(f"the path turns on the spot at ({x:.4g}, {y:.4g}) m: leave points out there")
 
 
@@ -155,15 +155,15 @@ def _look(curve: Any, start: Array, size: Array, limits: SpeedLimits) -> tuple[A
     s = start[:, None] + size[:, None] * WITHIN
     p_1, p_2 = np.moveaxis(curve(s, 1), -1, 0), np.moveaxis(curve(s, 2), -1, 0)
     square = p_1[0] ** 2 + p_1[1] ** 2
-    turning = (np.abs(p_1[0] * p_2[1] - p_1[1] * p_2[0]) / square).max(axis=1)
+    curvature = (np.abs(p_1[0] * p_2[1] - p_1[1] * p_2[0]) / square).max(axis=1)
     bend = np.hypot(*p_2).max(axis=1)
     needed = np.maximum(
-        turning * (MARGIN * limits.rate / limits.yaw_rate),
+        curvature * (MARGIN * limits.rate / limits.yaw_rate),
         np.sqrt(bend * (2**0.5 * limits.rate**2 / limits.acceleration)),
     )
     # beside a reversal |p'| is a little above 1, and more so between the places looked at
     excess = np.maximum(np.sqrt(square.max(axis=1)) - 1.0, 0.0)
-    return turning, np.maximum(needed, 1.0 + 1.25 * excess)
+    return curvature, np.maximum(needed, 1.0 + 1.25 * excess)
 
 
 def _foreseen(middle: Array, needed: Array, period: float | None, most: float) -> Array:

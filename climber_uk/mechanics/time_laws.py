@@ -114,17 +114,17 @@ class RestToRest(TimeLaw):
             rests = (shape.reversals + shape.length * np.arange(laps)[:, None]).ravel()
             is_within = (rests > 1e-9 * shape.length) & (rests < span - 1e-9 * shape.length)
             places = np.insert(places, 1, rests[is_within])
-        ways = np.diff(places)
-        times = ways / np.minimum(self.rate, ways / self.ramp_time) + self.ramp_time
+        distances = np.diff(places)
+        times = distances / np.minimum(self.rate, distances / self.ramp_time) + self.ramp_time
         return places, np.concatenate([[0.0], np.cumsum(times)])
 
     def _along(self, since: Array, places: Array, times: Array) -> Derivatives:
         """s and its derivatives at `since` (...) of a run, from rest to rest on each leg."""
         leg = np.clip(np.searchsorted(times, since, "right") - 1, 0, len(times) - 2)
-        way, since = places[leg + 1] - places[leg], since - times[leg]
-        rate = np.minimum(self.rate, way / self.ramp_time)
+        distance, since = places[leg + 1] - places[leg], since - times[leg]
+        rate = np.minimum(self.rate, distance / self.ramp_time)
         faster = smooth_start(since, self.ramp_time)
-        slower = smooth_start(since - way / rate, self.ramp_time)
+        slower = smooth_start(since - distance / rate, self.ramp_time)
         s, s_1, s_2, s_3 = (rate * (up - down) for up, down in zip(faster, slower, strict=True))
         return places[leg] + s, s_1, s_2, s_3
 

@@ -106,10 +106,10 @@ def _columns(
 
 def _named(where: str, names: list[str]) -> _Columns:
     """Columns of a header; `where` is what an error calls it."""
-    found = [_name(name) for name in names]
-    if found.count("x") != 1 or found.count("y") != 1:
+    plain = [_name(name) for name in names]
+    if plain.count("x") != 1 or plain.count("y") != 1:
         raise ValueError(f"{where}: want one column x and one y, found {', '.join(names)}")
-    x, y = found.index("x"), found.index("y")
+    x, y = plain.index("x"), plain.index("y")
     for name in names[x], names[y]:
         unit = UNIT.search(name)
         if unit and unit[1].strip().lower() not in ("m", "metre", "meter", "metres", "meters"):

@@ -29,12 +29,12 @@ class Layouts(Generic[Found]):
 
     def __init__(self, kind: type, find: Callable[[Layout], Found]) -> None:
         self.kind, self.find = kind, find
-        # by size: what was found, and the bytes that those messages have in common, with their ends
+        # by size: their contents, and the bytes that those messages have in common, with their ends
         self._known: dict[int, tuple[Found, list[tuple[int, int, bytes]]]] = {}
         self._left = MOST_LAYOUTS  # to be looked for
 
     def of(self, data: bytes) -> Found | None:
-        """What was found for messages with the strings and lengths of `data`; None: deserialise."""
+        """Contents of messages with the strings and lengths of `data`; None: deserialise."""
         known = self._known.get(len(data))
         if known is not None and all(data[i:j] == fixed for i, j, fixed in known[1]):
             return known[0]
@@ -43,11 +43,11 @@ class Layouts(Generic[Found]):
         self._left -= 1
         try:
             layout = laid_out(data, self.kind)
-            found = self.find(layout)
+            contents = self.find(layout)
         except (ValueError, LookupError):
             return None
-        self._known[len(data)] = found, [(i, j, data[i:j]) for i, j in layout.spans]
-        return found
+        self._known[len(data)] = contents, [(i, j, data[i:j]) for i, j in layout.spans]
+        return contents
 
     def deserialized(self, data: bytes) -> Any:
         """The message, by rclpy; `ValueError` if it is none."""
@@ -66,19 +66,19 @@ class NumberReader:
     def __init__(self, kind: type, numbers: Sequence[str], strings: Sequence[str] = ()) -> None:
         self._numbers, self._strings = numbers, strings
         self._of_message = attrgetter(*numbers, *strings)
-        self._layouts = Layouts(kind, self._found)
+        self._layouts = Layouts(kind, self._contents)
 
     def __call__(self, data: bytes) -> tuple[Any, ...]:
         """Numbers, then strings, in the order of their paths; `ValueError` if it is no message."""
-        found = self._layouts.of(data)
-        if found is None:
+        contents = self._layouts.of(data)
+        if contents is None:
             fields: tuple[Any, ...] = self._of_message(self._layouts.deserialized(data))
             return fields
-        row, texts = found
+        row, texts = contents
         numbers: tuple[Any, ...] = np.frombuffer(data, row).tolist()[0]
         return numbers + texts
 
-    def _found(self, layout: Layout) -> tuple[Any, tuple[str | list[str], ...]]:
+    def _contents(self, layout: Layout) -> tuple[Any, tuple[str | list[str], ...]]:
         """Numbers as one type, and the strings; `KeyError` if there is no such path."""
         return layout.chosen(self._numbers), tuple(_texts(layout, at) for at in self._strings)
 

@@ -161,7 +161,7 @@ def check_size(**vectors: "Array | Sequence[Sequence[float]]") -> None:
 
 def heading_of(x: float, y: float, z: float, w: float) -> float:
     """Heading in [-π, π] [rad]; `ValueError` unless it is a unit quaternion (nearly) about z."""
-    heading, norm, tilted, is_unit, is_planar = turn_about_z(x, y, z, w)
+    heading, norm, tilted, is_unit, is_planar = rotation_about_z(x, y, z, w)
     if not (is_unit and is_planar):
         raise ValueError(
             f"orientation ({x}, {y}, {z}, {w}) must be a unit turn about z: "
@@ -171,7 +171,7 @@ def heading_of(x: float, y: float, z: float, w: float) -> float:
     return float(heading)
 
 
-def turn_about_z(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any, Any, Any]:
+def rotation_about_z(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any, Any, Any]:
     """Heading of a quaternion, or of many (n,); its norm, its tilt, and whether both are fit."""
     norm, tilted = sqrt(x * x + y * y + z * z + w * w), sqrt(x * x + y * y)
     is_unit, is_planar = abs(norm - 1) <= NORM_TOLERANCE, tilted < MOST_TILT * norm

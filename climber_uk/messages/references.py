@@ -40,10 +40,10 @@ class PreviewReader:
 
     def __call__(self, data: bytes, odom_frame: str) -> Preview:
         """Preview in `odom_frame`; `ValueError` if it is unfit."""
-        found = self._layouts.of(data)
-        if found is None:
+        contents = self._layouts.of(data)
+        if contents is None:
             return preview(self._layouts.deserialized(data), odom_frame)
-        frame, stamp, points = found
+        frame, stamp, points = contents
         ((sec, nanosec),) = np.frombuffer(data, stamp).tolist()
         number, row, begin, stride = points
         rows = np.ndarray(number, row, data, begin, stride).tolist()

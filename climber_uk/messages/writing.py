@@ -8,14 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from builtin_interfaces.msg import Duration, Time
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import (
     PoseStamped,
     Quaternion,
-    Transform,
     TransformStamped,
-    Twist,
     Vector3,
     Vector3Stamped,
     WrenchStamped,
@@ -104,20 +102,6 @@ def reference_numbers(reference: "Reference", time: float) -> tuple[float, ...]:
     rotation = 0.0, 0.0, math.sin(heading / 2), math.cos(heading / 2)
     twists = *reference.velocity.tolist(), *reference.acceleration.tolist()
     return x, y, *rotation, *twists, *divmod(round(time * SECOND), SECOND)
-
-
-def reference_point(reference: "Reference", time: float) -> MultiDOFJointTrajectoryPoint:
-    """Point of a trajectory message: a reference `time` [s] after the trajectory's start."""
-    x, y, *rotation, v_x, v_y, v_yaw, a_x, a_y, a_yaw, sec, nanosec = reference_numbers(
-        reference, time
-    )
-    turned = Quaternion(**dict(zip("xyzw", rotation, strict=True)))
-    point = MultiDOFJointTrajectoryPoint()
-    point.transforms = [Transform(translation=Vector3(x=x, y=y), rotation=turned)]
-    point.velocities = [Twist(linear=Vector3(x=v_x, y=v_y), angular=Vector3(z=v_yaw))]
-    point.accelerations = [Twist(linear=Vector3(x=a_x, y=a_y), angular=Vector3(z=a_yaw))]
-    point.time_from_start = Duration(sec=int(sec), nanosec=int(nanosec))
-    return point
 
 
 def reference(

@@ -79,9 +79,9 @@ class TrajectoryPublisher(ClimberNode):
 
     def summary(self) -> str:
         """Extremes of the trajectory, for the log."""
-        found = summary(self.planned)
-        self.parameters.remarks += found.remarks
-        return f"{self.parameters.read(TrajectoryParameters).shape}, {found}"
+        described = summary(self.planned)
+        self.parameters.remarks += described.remarks
+        return f"{self.parameters.read(TrajectoryParameters).shape}, {described}"
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/start: start from the beginning, at the next odometry."""

@@ -18,13 +18,7 @@ from climber_uk.messages.topics import CLOCK, CONTROLLER, PARAMETERS
 from climber_uk.parameters.parameter_file import read_argument, read_file
 from climber_uk.replay.recorded_controller import TOPICS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
-from climber_uk.replay.torque_comparison import (
-    Comparison,
-    compare,
-    summary,
-    table,
-    write_csv,
-)
+from climber_uk.replay.torque_comparison import Comparison, compare, summary, table, write_csv
 from climber_uk.report.outputs import output, printable
 from climber_uk.report.plotting import plt, saved
 from climber_uk.system.command_line import Parser, between

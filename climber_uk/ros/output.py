@@ -11,7 +11,7 @@ from climber_uk.messages.reading import STAMP
 
 
 class Output:
-    """Publishes messages that differ in a stamp and a few numbers only, while somebody listens.
+    """Publishes messages that differ in a stamp and a few numbers, while there is a subscription.
 
     `numbers` are their paths in `message`, which is what all of them have in common.
     """
@@ -28,7 +28,7 @@ class Output:
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody subscribes it."""
+        """Whether there is a subscription."""
         return bool(self.publisher.get_subscription_count())
 
     def publish(self, stamp: int, *numbers: Any) -> None:

@@ -20,12 +20,8 @@ LOOK_PERIOD = 0.1  # [s] of the wall clock, between two looks for the node `wait
 LOOKS = 10  # in a row that must find it: other publishers have to find it, too
 MAX_LAG = 0.1  # [s] behind its pace that simulated time makes up for
 TICK = SECOND // 100  # [ns] of simulated time between two messages on /clock, at least
-SHARED = (
-    "simulated_time",
-    "control_period",
-    "real_time_factor",
-    "wait_for",
-)  # options of all or none
+# options of all or none
+SHARED = "simulated_time", "control_period", "real_time_factor", "wait_for"
 
 
 class Simulated(Protocol):

@@ -47,11 +47,11 @@ def solve_friction_impulses(
             changed = max(changed, float(np.abs(change).max()))
         if changed <= enough:
             break
-    holds = [
+    sticks = [
         bool(impulse @ impulse < (1 - 1e-9) * cone.limit**2)
         for impulse, cone in zip(impulses, cones, strict=True)
     ]
-    return velocity, holds
+    return velocity, sticks
 
 
 def impulse_against(sliding: Array, yielding: Array, limit: float) -> Array:

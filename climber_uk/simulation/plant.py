@@ -49,29 +49,29 @@ class Plant:
         `push` (3,) acts on the centre of mass, in the wall's frame [N, N, N m]. Raises `FellOff`
         where the climber comes off its wall, `NotFinite` where the state is not finite.
         """
-        given = Inputs.of(self.climber, torques, push)
+        inputs = Inputs.of(self.climber, torques, push)
         try:
-            end = self._advance(state, given, steps)
+            end = self._advance(state, inputs, steps)
         except (ValueError, ArithmeticError, RuntimeWarning) as error:  # numpy warns, or raises
             raise NotFinite(f"{error} in {steps} steps from {state}") from None
         if not math.isfinite(sum(end.pose.tolist()) + sum(end.velocity.tolist())):
             raise NotFinite(f"{end} after {steps} steps from {state}")
         return end
 
-    def _advance(self, state: State, given: Inputs, steps: int) -> State:
+    def _advance(self, state: State, inputs: Inputs, steps: int) -> State:
         y = np.concatenate([state.pose, state.velocity])
         if self._is_plain:
             step, attached = self._rolling.exact_step, self._is_attached_everywhere
             for _ in range(steps):
                 if not attached:
                     self._check_attached_at(y)
-                y = step(y, given)
+                y = step(y, inputs)
             return State(y[:3], y[3:])
         more = PlantState.of(state)
         y, slip = np.concatenate([y, more.deflection]), more.slip
         for _ in range(steps):
             self._check_attached(y)
-            y, slip = self._step(y, slip, given)
+            y, slip = self._step(y, slip, inputs)
         return PlantState(y[:3], y[3:6], y[6:], slip)
 
     def wheel_rates(self, state: State) -> Array:
@@ -96,13 +96,13 @@ class Plant:
 
     def margins(self, state: State, torques: Array, push: Array = NO_PUSH) -> tuple[float, float]:
         """Slip and tip margin (§7) under wheel torques (2,) [N m] and a push (3,) [N, N, N m]."""
-        climber, given = self.climber, Inputs.of(self.climber, torques, push)
+        climber, inputs = self.climber, Inputs.of(self.climber, torques, push)
         y = np.concatenate([state.pose, state.velocity])
         into = self._body.into_wall(y)
-        lateral = self._body.lateral(y, given, climber.mass)
+        lateral = self._body.lateral(y, inputs, climber.mass)
         s_x, s_y = self.wall.along(climber.inclination, float(y[1]))
         return (
-            float(self.contact.slip_margin(climber, into, given.force, lateral)),
+            float(self.contact.slip_margin(climber, into, inputs.force, lateral)),
             float(self.contact.tip_margin(climber, into, GRAVITY * math.hypot(s_x, s_y))),
         )
 
@@ -129,38 +129,38 @@ class Plant:
     def _load(self, y: Array) -> float:
         return float(self.contact.wheel_load(self.climber, self._body.into_wall(y)))
 
-    def _step(self, y: Array, slip: Array, given: Inputs) -> tuple[Array, Array]:
+    def _step(self, y: Array, slip: Array, inputs: Inputs) -> tuple[Array, Array]:
         """(y, rims' slip) after a step, implicit if a contact may change in it."""
-        end = None if slip.any() else self._regular_step(y, given)
+        end = None if slip.any() else self._regular_step(y, inputs)
         if end is not None:
             return end, slip
-        return self._sliding.advance(y, slip, given, self._load(y))
+        return self._sliding.advance(y, slip, inputs, self._load(y))
 
-    def _regular_step(self, y: Array, given: Inputs) -> Array | None:
+    def _regular_step(self, y: Array, inputs: Inputs) -> Array | None:
         """y after a step in which no contact changes between sticking and slipping; else None."""
-        load, moment = self._load(y), given.moment + given.push_moment
+        load, moment = self._load(y), inputs.moment + inputs.push_moment
         resistance = float(self.contact.locomotion.turning_resistance(load))
-        share = float(np.sign(y[5]))  # of the resistance, against the yaw rate or the moment
-        if share == 0 and resistance > 0:
+        direction = float(np.sign(y[5]))  # of the resistance, against the yaw rate or the moment
+        if direction == 0 and resistance > 0:
             if abs(moment) > resistance:
                 return None
-            share = moment / resistance
-        resisted = given._replace(push_moment=given.push_moment - resistance * share)
-        if not self._wheels_hold(y, given, resisted):
+            direction = moment / resistance
+        resisted = inputs._replace(push_moment=inputs.push_moment - resistance * direction)
+        if not self._wheels_stick(y, inputs, resisted):
             return None
         end = self._rolling.step(y, resisted)
-        if end is None or (resistance > 0 and y[5] != 0 and end[5] * share <= 0):
+        if end is None or (resistance > 0 and y[5] != 0 and end[5] * direction <= 0):
             return None
-        return end if self._wheels_hold(end, given, resisted) else None
+        return end if self._wheels_stick(end, inputs, resisted) else None
 
-    def _wheels_hold(self, y: Array, given: Inputs, resisted: Inputs) -> bool:
+    def _wheels_stick(self, y: Array, inputs: Inputs, resisted: Inputs) -> bool:
         """Whether no wheel slips at y; `resisted` are the inputs with the tracks' resistance."""
         if not self.slip:
             return True
         if abs(State(y[:3], y[3:6]).side_slip) > SIDEWAYS * (1 + abs(forward_speed(y))):
             return False
         rates = self._rolling.accelerations(y, resisted)
-        return self._sliding.wheels_hold(y, given, rates, self._load(y))
+        return self._sliding.wheels_stick(y, inputs, rates, self._load(y))
 
     @cached_property
     def _is_attached_everywhere(self) -> bool:

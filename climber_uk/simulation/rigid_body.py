@@ -57,21 +57,21 @@ class RigidBody:
         weight = self.climber.mass * GRAVITY
         return weight * s_x, weight * s_y
 
-    def outside(self, height: float, given: Inputs) -> tuple[float, float]:
+    def outside(self, height: float, inputs: Inputs) -> tuple[float, float]:
         """Weight and push along the wall (x, y) [N], at y = `height` [m]."""
         w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
-        return given.push_x + w_x, given.push_y + w_y
+        return inputs.push_x + w_x, inputs.push_y + w_y
 
-    def push(self, y: Array, given: Inputs) -> float:
+    def push(self, y: Array, inputs: Inputs) -> float:
         """Force along the climber, without friction [N]."""
         _, height, heading, *_ = y.tolist()
-        f_x, f_y = self.outside(height, given)
-        return float(given.force + f_x * math.cos(heading) + f_y * math.sin(heading))
+        f_x, f_y = self.outside(height, inputs)
+        return float(inputs.force + f_x * math.cos(heading) + f_y * math.sin(heading))
 
-    def lateral(self, y: Array, given: Inputs, mass: float) -> float:
+    def lateral(self, y: Array, inputs: Inputs, mass: float) -> float:
         """Lateral reaction, to the left, that keeps `mass` [kg] from slipping sideways [N]."""
         _, height, heading, *_ = y.tolist()
-        f_x, f_y = self.outside(height, given)
+        f_x, f_y = self.outside(height, inputs)
         return (
             mass * forward_speed(y) * float(y[5])
             + f_x * math.sin(heading)
@@ -82,17 +82,17 @@ class RigidBody:
         """g_n into the wall, with the centripetal part of a curved wall [m/s²]."""
         return float(self.wall.into(self.climber.inclination, float(y[1]), float(y[4])))
 
-    def runge_kutta(self, y: Array, given: Inputs, direction: float | None, h: float) -> Array:
+    def runge_kutta(self, y: Array, inputs: Inputs, direction: float | None, h: float) -> Array:
         """y after `h` [s], by the classic fourth-order method; `direction` as in `derivative`."""
-        k1 = self.derivative(y, given, direction)
-        k2 = self.derivative(y + h / 2 * k1, given, direction)
-        k3 = self.derivative(y + h / 2 * k2, given, direction)
-        k4 = self.derivative(y + h * k3, given, direction)
+        k1 = self.derivative(y, inputs, direction)
+        k2 = self.derivative(y + h / 2 * k1, inputs, direction)
+        k3 = self.derivative(y + h / 2 * k2, inputs, direction)
+        k4 = self.derivative(y + h * k3, inputs, direction)
         end = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        end[3:6] = self.derivative(end, given, direction)[:3]
+        end[3:6] = self.derivative(end, inputs, direction)[:3]
         return end
 
-    def derivative(self, y: Array, given: Inputs, direction: float | None) -> Array:
+    def derivative(self, y: Array, inputs: Inputs, direction: float | None) -> Array:
         """(q̇, v̇) of (30), both (3,), and the bristles' rates (3,) if there are any.
 
         A = [sinθ -cosθ 0] has unit length and M weighs x and y alike, so that M^(-1/2) B⁺ = Aᵀ.
@@ -102,11 +102,11 @@ class RigidBody:
         climber = self.climber
         _, height, heading, v_x, v_y, yaw_rate, *deflection = y.tolist()
         cosine, sine = math.cos(heading), math.sin(heading)
-        force, moment = given.force, given.moment + given.push_moment
+        force, moment = inputs.force, inputs.moment + inputs.push_moment
         bending = [0.0] * len(deflection)
         if direction == 0:
-            held = [0.0, 0.0, yaw_rate, 0.0, 0.0, moment / climber.yaw_inertia]
-            return np.array(held + bending)
+            at_rest = [0.0, 0.0, yaw_rate, 0.0, 0.0, moment / climber.yaw_inertia]
+            return np.array(at_rest + bending)
 
         A_v = sine * v_x - cosine * v_y
         x_dot, y_dot = v_x - sine * A_v, v_y + cosine * A_v
@@ -120,7 +120,7 @@ class RigidBody:
 
         # as `outside`, without the call: this is where the plant spends its time
         w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
-        f_x, f_y = given.push_x + w_x, given.push_y + w_y
+        f_x, f_y = inputs.push_x + w_x, inputs.push_y + w_y
         a_x = (force * cosine + f_x) / climber.mass
         a_y = (force * sine + f_y) / climber.mass
         b_minus_A_a = -yaw_rate * speed - (sine * a_x - cosine * a_y)
@@ -139,17 +139,17 @@ class RigidBody:
         alone, and for both the ellipse between them.
         """
         radius, law, f = self.contact.grip.seal_radius, self.contact.friction, self.friction
-        around = radius * omega
-        speed = math.hypot(v, around)
+        rim_speed = radius * omega
+        speed = math.hypot(v, rim_speed)
         if (bristles := self.bristles) is not None and not self.has_settled(speed):
             relaxation = bristles.relaxation(speed)
-            ahead, aside, turned = deflection
-            ahead_1, turned_1 = v - relaxation * ahead, around - relaxation * turned
-            moment = radius * bristles.force(f, around, turned, turned_1)
-            rates = [ahead_1, -relaxation * aside, turned_1]
+            ahead, aside, around = deflection
+            ahead_1, around_1 = v - relaxation * ahead, rim_speed - relaxation * around
+            moment = radius * bristles.force(f, rim_speed, around, around_1)
+            rates = [ahead_1, -relaxation * aside, around_1]
             return bristles.force(f, v, ahead, ahead_1), moment, rates
-        share = law.level(f, speed) / speed if speed > 0 else 0.0
-        return share * v, share * around * radius, [0.0] * len(deflection)
+        drag = law.level(f, speed) / speed if speed > 0 else 0.0
+        return drag * v, drag * rim_speed * radius, [0.0] * len(deflection)
 
     def has_settled(self, speed: float) -> bool:
         """Whether bristles are, within a step, where they end up at a sliding `speed` [m/s]."""

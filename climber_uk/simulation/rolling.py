@@ -32,35 +32,35 @@ class NoSlipStepper:
         """Whether the friction law has stiction."""
         return bool(self.body.contact.friction.stiction(1.0) > 0)
 
-    def step(self, y: Array, given: Inputs) -> Array | None:
+    def step(self, y: Array, inputs: Inputs) -> Array | None:
         """y after a step; None if a ring comes to rest or starts, or friction is too stiff."""
         if not self.sticks:
-            return self._in_parts(y, given)
+            return self._in_parts(y, inputs)
         if self.body.contact.grip.seal_radius == 0:
-            return self.exact_step(y, given) if self.is_soft else None
+            return self.exact_step(y, inputs) if self.is_soft else None
         rests = not y[3:6].any()
-        if rests and self._ring_sticks(y, given):
+        if rests and self._ring_sticks(y, inputs):
             return y
         if rests or self._creeps(y):
             return None
-        end = self._in_parts(y, given)
+        end = self._in_parts(y, inputs)
         return None if end is None or self._creeps(end) else end
 
-    def accelerations(self, y: Array, given: Inputs) -> tuple[float, float]:
+    def accelerations(self, y: Array, inputs: Inputs) -> tuple[float, float]:
         """Forward acceleration v̇ [m/s²] and yaw acceleration ω̇ [rad/s²] at y."""
         radius = self.body.contact.grip.seal_radius
         if self.sticks and radius > 0 and not y[3:6].any():
             return 0.0, 0.0
-        direction = self._direction(y, given) if self.sticks and radius == 0 else None
-        *_, v_x_1, v_y_1, omega_1 = self.body.derivative(y, given, direction)[:6].tolist()
+        direction = self._direction(y, inputs) if self.sticks and radius == 0 else None
+        *_, v_x_1, v_y_1, omega_1 = self.body.derivative(y, inputs, direction)[:6].tolist()
         return v_x_1 * math.cos(y[2]) + v_y_1 * math.sin(y[2]), omega_1
 
     # A seal without radius
 
-    def exact_step(self, y: Array, given: Inputs) -> Array:
+    def exact_step(self, y: Array, inputs: Inputs) -> Array:
         """y after a step, in which a seal without radius may stick and slide."""
         for _ in range(self._steep_parts):
-            y = self._exact_part(y, given, self.body.step / self._steep_parts)
+            y = self._exact_part(y, inputs, self.body.step / self._steep_parts)
         return y
 
     @cached_property
@@ -75,54 +75,54 @@ class NoSlipStepper:
         """Whether `MAX_PARTS` are enough for a seal without radius."""
         return self._steep_parts <= MAX_PARTS
 
-    def _exact_part(self, y: Array, given: Inputs, left_over: float) -> Array:
+    def _exact_part(self, y: Array, inputs: Inputs, left_over: float) -> Array:
         """y after `left_over` [s], with each change between sticking and sliding located."""
-        direction = self._direction(y, given)
+        direction = self._direction(y, inputs)
         for _ in range(MAX_CHANGES_IN_A_STEP):
-            end = self.body.runge_kutta(y, given, direction, left_over)
-            if self._margin(end, given, direction) >= 0:
+            end = self.body.runge_kutta(y, inputs, direction, left_over)
+            if self._margin(end, inputs, direction) >= 0:
                 return end
-            y, until = self._until_change(y, given, direction, left_over)
+            y, until = self._until_change(y, inputs, direction, left_over)
             left_over -= until
             gave_way = direction == 0
-            push = self.body.push(y, given)
-            direction = float(np.sign(push)) if gave_way else self._direction(y, given)
-        return self.body.runge_kutta(y, given, direction, left_over)
+            push = self.body.push(y, inputs)
+            direction = float(np.sign(push)) if gave_way else self._direction(y, inputs)
+        return self.body.runge_kutta(y, inputs, direction, left_over)
 
-    def _direction(self, y: Array, given: Inputs) -> float:
+    def _direction(self, y: Array, inputs: Inputs) -> float:
         """Direction in which the seal slides: 1 forwards, -1 backwards, 0 where it sticks."""
         speed = forward_speed(y)
         if speed != 0:
             return 1.0 if speed > 0 else -1.0
-        push = self.body.push(y, given)
+        push = self.body.push(y, inputs)
         return 0.0 if abs(push) <= self.body.stiction else float(np.sign(push))
 
-    def _margin(self, y: Array, given: Inputs, direction: float) -> float:
+    def _margin(self, y: Array, inputs: Inputs, direction: float) -> float:
         """Below 0 once sliding in `direction` has ended [m/s] or, for 0, sticking has [N]."""
         if direction == 0:
-            return self.body.stiction - abs(self.body.push(y, given))
+            return self.body.stiction - abs(self.body.push(y, inputs))
         return direction * forward_speed(y)
 
     def _until_change(
-        self, y: Array, given: Inputs, direction: float, step: float
+        self, y: Array, inputs: Inputs, direction: float, step: float
     ) -> tuple[Array, float]:
         """y at the instant within `step` [s] at which `_margin` reaches 0, and that instant [s]."""
 
         def margin(duration: float) -> float:
-            end = self.body.runge_kutta(y, given, direction, duration)
-            return self._margin(end, given, direction)
+            end = self.body.runge_kutta(y, inputs, direction, duration)
+            return self._margin(end, inputs, direction)
 
         until = _zero(margin, 0.0, step) if margin(0.0) > 0 else 0.0
-        changed = self.body.runge_kutta(y, given, direction, until)
+        changed = self.body.runge_kutta(y, inputs, direction, until)
         changed[3:5] = 0.0  # not merely small: at rest is what friction can hold
         return changed, until
 
     # A ring, or friction without an edge
 
-    def _ring_sticks(self, y: Array, given: Inputs) -> bool:
+    def _ring_sticks(self, y: Array, inputs: Inputs) -> bool:
         """Whether stiction of a ring holds the climber against force and moment."""
-        around = (given.moment + given.push_moment) / self.body.contact.grip.seal_radius
-        return math.hypot(self.body.push(y, given), around) <= self.body.stiction
+        around = (inputs.moment + inputs.push_moment) / self.body.contact.grip.seal_radius
+        return math.hypot(self.body.push(y, inputs), around) <= self.body.stiction
 
     def _sliding_speed(self, y: Array) -> float:
         return math.hypot(forward_speed(y), self.body.contact.grip.seal_radius * float(y[5]))
@@ -138,7 +138,7 @@ class NoSlipStepper:
         fastest = self.body.stiction * self.body.step
         return fastest > STIFF * self._lightest * self._sliding_speed(y)
 
-    def _in_parts(self, y: Array, given: Inputs) -> Array | None:
+    def _in_parts(self, y: Array, inputs: Inputs) -> Array | None:
         """y after a step, in as many parts as friction is stiff; None if it is too stiff."""
         body, bristles = self.body, self.body.bristles
         rate = body.contact.friction.steepness(body.friction) / self._lightest
@@ -150,7 +150,7 @@ class NoSlipStepper:
         if parts > MAX_PARTS:
             return None
         for _ in range(parts):
-            y = body.runge_kutta(y, given, None, body.step / parts)
+            y = body.runge_kutta(y, inputs, None, body.step / parts)
         speed = self._sliding_speed(y)
         if bristles is not None and body.has_settled(speed):
             around = body.contact.grip.seal_radius * float(y[5])

@@ -1,4 +1,4 @@
-"""Odometry as a robot's sensors tell it: late, noisy, biased, or counted by its wheels.
+"""Odometry as a robot's sensors measure it: late, noisy, biased, or counted by its wheels.
 
 A new kind of odometry is one class, an `OdometrySource`, and one entry in `SOURCES`, or an entry
 point `climber_uk.odometry_sources` of another package.
@@ -21,7 +21,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
 Measure = Callable[[State, State, Array], State]
-"""What is measured of a state, of that as the wheels tell it, and of their angles (2,) [rad].
+"""What is measured of a state, of that by its wheels, and of their angles (2,) [rad].
 
 It is called once each period; angles are those of the right and the left wheel.
 """
@@ -103,7 +103,7 @@ class Sensors:
 
     @cached_property
     def is_ideal(self) -> bool:
-        """Whether they tell what is measured as it is: nothing that `corrupted` adds is set."""
+        """Whether odometry has no error: nothing that `corrupted` adds is set."""
         return not any(np.any(getattr(self, field.name)) for field in self.errors())
 
     @classmethod
@@ -157,7 +157,7 @@ class Odometer:
         return self._on_its_way[0]
 
     def measure(self, state: State, wheels: State, angles: Array) -> None:
-        """Take a new measurement; `wheels` is the state as they tell it, and their `angles`."""
+        """Take a new measurement; `wheels` is the state by them, and their `angles`."""
         number, _ = self._on_its_way[-1]
         measured = self._measure(state, wheels, angles)
         self._on_its_way.append((number + 1, self._measured(measured)))
@@ -191,12 +191,12 @@ class DeadReckoning:
             angles = resolution * np.floor(angles / resolution)
         right, left = (climber.wheel_radius * (angles - self.counted)).tolist()
         self.counted = angles
-        way, turn = (right + left) / 2, (right - left) / (2 * climber.half_track)
+        distance, angle = (right + left) / 2, (right - left) / (2 * climber.half_track)
         x, y, heading = self.pose.tolist()
-        middle = heading + turn / 2
+        middle = heading + angle / 2
         self.pose = np.array(
-            [x + way * math.cos(middle), y + way * math.sin(middle), heading + turn]
+            [x + distance * math.cos(middle), y + distance * math.sin(middle), heading + angle]
         )
         if resolution > 0:
-            return State.rolling(self.pose, way / self.period, turn / self.period)
+            return State.rolling(self.pose, distance / self.period, angle / self.period)
         return State.rolling(self.pose, float(wheels.forward_speed), float(wheels.yaw_rate))

@@ -19,7 +19,7 @@ from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import RigidBody, forward_speed
 
 PARTS = 8  # of a step
-STUCK = 1e-10  # [m/s] of sliding that the iteration may leave where friction holds
+STUCK = 1e-10  # [m/s] of sliding that the iteration may leave where a contact sticks
 
 
 class ContactStepper:
@@ -53,31 +53,31 @@ class ContactStepper:
         climber = self.body.climber
         return climber.yaw_inertia - 2 * self.rim * climber.half_track**2 * self.slip
 
-    def wheels_hold(
-        self, y: Array, given: Inputs, accelerations: tuple[float, float], load: float
+    def wheels_stick(
+        self, y: Array, inputs: Inputs, accelerations: tuple[float, float], load: float
     ) -> bool:
         """Whether wheels that share `load` [N] can go on rolling, with v̇ [m/s²] and ω̇ [rad/s²]."""
         d, (v_1, omega_1) = self.body.climber.half_track, accelerations
         most = self.body.contact.grip.wheel_friction_coefficient * load / 2
-        right = (given.force + given.moment / d) / 2 - self.rim * (v_1 + d * omega_1)
-        left = (given.force - given.moment / d) / 2 - self.rim * (v_1 - d * omega_1)
+        right = (inputs.force + inputs.moment / d) / 2 - self.rim * (v_1 + d * omega_1)
+        left = (inputs.force - inputs.moment / d) / 2 - self.rim * (v_1 - d * omega_1)
         if max(abs(right), abs(left)) > most:
             return False
         sideways = math.sqrt(most**2 - right**2) + math.sqrt(most**2 - left**2)
-        return abs(self.body.lateral(y, given, self.mass)) <= sideways
+        return abs(self.body.lateral(y, inputs, self.mass)) <= sideways
 
-    def advance(self, y: Array, slip: Array, given: Inputs, load: float) -> tuple[Array, Array]:
+    def advance(self, y: Array, slip: Array, inputs: Inputs, load: float) -> tuple[Array, Array]:
         """(y, slip (2,) of the rims [m/s]) after a step, with `load` [N] on the wheels."""
         caught = False
         for _ in range(PARTS):
             before = y
-            y, slip, caught = self._implicit_step(y, slip, given, load, self.body.step / PARTS)
+            y, slip, caught = self._implicit_step(y, slip, inputs, load, self.body.step / PARTS)
             if caught and (y == before).all():
                 break  # at rest, and nothing will change that in this step
         return self._rolling_on(y, slip) if caught else (y, slip)
 
     def _implicit_step(
-        self, y: Array, slip: Array, given: Inputs, load: float, h: float
+        self, y: Array, slip: Array, inputs: Inputs, load: float, h: float
     ) -> tuple[Array, Array, bool]:
         """(y, slip of the rims) after `h` [s], and whether no wheel slips any more."""
         d = self.body.climber.half_track
@@ -88,24 +88,25 @@ class ContactStepper:
         u = v_y * cosine - v_x * sine if self.slip else 0.0
         sliding = np.array([v, u, self.body.contact.grip.seal_radius * omega])
 
-        f_x, f_y = self.body.outside(height, given)
-        pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, given.push_moment])
+        f_x, f_y = self.body.outside(height, inputs)
+        pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, inputs.push_moment])
         against, drag = self._smooth_friction(sliding, np.array(deflection), h)
         masses = np.array([self.mass, self.mass, self.yaw_inertia])
         free = masses * [v, u, omega] + h * (pull - against)
         if self.slip:
-            right, left = (given.force + given.moment / d) / 2, (given.force - given.moment / d) / 2
+            yaw_force = inputs.moment / d
+            forces = np.array([inputs.force + yaw_force, inputs.force - yaw_force]) / 2
             rims = slip + np.array([rolls + d * omega, rolls - d * omega])
-            free = np.concatenate([free, self.rim * rims + h * np.array([right, left])])
+            free = np.concatenate([free, self.rim * rims + h * forces])
             masses = np.concatenate([masses + h * drag, [self.rim, self.rim]])
             lightness = 1 / masses
         else:
-            free += h * np.array([given.force, 0.0, given.moment])
+            free += h * np.array([inputs.force, 0.0, inputs.moment])
             lightness = 1 / (masses + h * drag)
             free[1] = lightness[1] = 0.0
         cones = self._cones(load, float(np.linalg.norm(sliding)), h)
-        found, holds = solve_friction_impulses(free * lightness, lightness, cones)
-        v, u, omega = self._velocities(found[:3], holds)
+        velocities, sticks = solve_friction_impulses(free * lightness, lightness, cones)
+        v, u, omega = self._velocities(velocities[:3], sticks)
 
         deflection_1 = self._deflected(
             sliding, np.array([v, u, omega * self._radius]), np.array(deflection), h
@@ -119,8 +120,8 @@ class ContactStepper:
         if not self.slip:
             return end, slip, False
         rolls = forward_speed(end)
-        caught = max(abs(s) for cone in cones[:2] for s in cone.rows @ found) < STUCK
-        return end, found[3:] - [rolls + d * omega, rolls - d * omega], caught
+        caught = max(abs(s) for cone in cones[:2] for s in cone.rows @ velocities) < STUCK
+        return end, velocities[3:] - [rolls + d * omega, rolls - d * omega], caught
 
     @property
     def _radius(self) -> float:
@@ -154,10 +155,10 @@ class ContactStepper:
         cones.append(Cone(np.eye(1, n, 2), h * resistance))
         return cones
 
-    def _velocities(self, found: Array, holds: list[bool]) -> tuple[float, float, float]:
-        """(v, u, ω) of `found` (n,), exactly 0 where a contact sticks."""
-        v, u, omega = found.tolist()
-        seal_sticks, yaw_sticks = holds[-2:]
+    def _velocities(self, velocities: Array, sticks: list[bool]) -> tuple[float, float, float]:
+        """(v, u, ω) of `velocities` (n,), exactly 0 where a contact sticks."""
+        v, u, omega = velocities.tolist()
+        seal_sticks, yaw_sticks = sticks[-2:]
         if seal_sticks and math.hypot(v, u, self._radius * omega) < STUCK:
             v, u, omega = 0.0, 0.0, 0.0 if self._radius > 0 else omega
         return v, u, 0.0 if yaw_sticks and abs(omega) < STUCK else omega
@@ -177,8 +178,8 @@ class ContactStepper:
             return lever * there, lever**2 * drag
         if law.stiction(1.0) > 0:
             return np.zeros(3), lever**2 * self._drag
-        share = law.level(f, speed) / speed if speed > 0 else law.steepness(f)
-        return np.zeros(3), lever**2 * share
+        slope = law.level(f, speed) / speed if speed > 0 else law.steepness(f)
+        return np.zeros(3), lever**2 * slope
 
     def _deflected(self, before: Array, after: Array, deflection: Array, h: float) -> Array:
         """Bristles after `h`, in which they slid at `before` (3,), and at last `after` (3,)."""

@@ -15,7 +15,7 @@ from climber_uk.control.timing import Timing
 from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
-from climber_uk.mechanics.many import part
+from climber_uk.mechanics.many import indexed
 from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
@@ -76,13 +76,13 @@ def alone(case, i, duration):
     timing = Timing(transport_delay=0.005 * delay)
     settings = Settings(law, timing=timing, pacing=Pacing(catch_up=0.0))
     link = Link(step=0.005 / steps, delay=0.005 * delay)
-    state = State.moving(Motion(*(float(number) for number in part(start, i))))
+    state = State.moving(Motion(*(float(number) for number in indexed(start, i))))
     controller = Controller(settings, Safety(max_jump=1e9))
     return simulate(trajectory, state, duration, controller, as_floats(true, i), link)
 
 
 def as_floats(of, i):
-    one = part(of, i)
+    one = indexed(of, i)
     changed = {k: float(v) for k, v in asdict(one).items() if isinstance(v, np.floating)}
     return replace(one, **changed)
 
@@ -114,7 +114,7 @@ def test_each_of_many_is_what_it_is_alone(name):
 def noisy(seeds):
     sensors = Sensors(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2)
     law = ControlLaw(BUILT, SLOW)
-    start = part(ON_EIGHT, np.arange(len(seeds)))
+    start = indexed(ON_EIGHT, np.arange(len(seeds)))
     return Loops(start, BUILT, law, sensors=sensors, seeds=seeds)
 
 
@@ -122,7 +122,7 @@ def test_a_seed_gives_the_same_noise_whatever_the_block_and_its_place_in_it():
     course, seeds = BatchRun(EIGHT, 0.5), np.array([5, 6, 7, 8])
     whole, blocks = (noisy(seeds).run(course, block=block) for block in (4, 1))
     np.testing.assert_allclose(whole.rms, blocks.rms, rtol=1e-12)
-    same = replace(noisy(seeds), start=part(ON_EIGHT, np.zeros(4, int)), seeds=np.full(4, 3))
+    same = replace(noisy(seeds), start=indexed(ON_EIGHT, np.zeros(4, int)), seeds=np.full(4, 3))
     outcome = same.run(course)
     np.testing.assert_allclose(outcome.rms, outcome.rms[0], rtol=1e-12)
 

@@ -5,7 +5,7 @@ import pytest
 
 from climber_uk.closed_loop.unicycle import UnicycleModel, advanced
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.many import part
+from climber_uk.mechanics.many import indexed
 from climber_uk.mechanics.quantities import Motion, State, Wrench
 from climber_uk.simulation.plant import Plant
 
@@ -36,7 +36,7 @@ def wheels(random, motion):
 def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest):
     random, body, step = np.random.default_rng(7), UnicycleModel.of(PAPER), 0.0025
     plant, motion = Plant(PAPER, step), many_starts(12, fastest)
-    states = [State.moving(floats(part(motion, i))) for i in range(12)]
+    states = [State.moving(floats(indexed(motion, i))) for i in range(12)]
     alone = [state.motion for state in states]
     changes = 0
     for _ in range(100):
@@ -51,7 +51,7 @@ def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest):
             for _ in range(2):
                 alone[i] = advanced(body, alone[i], Wrench(*PAPER.wrench(*pair.tolist())), step)
             expected = states[i].motion
-            np.testing.assert_allclose(floats(part(motion, i)), expected, atol=1e-9)
+            np.testing.assert_allclose(floats(indexed(motion, i)), expected, atol=1e-9)
             np.testing.assert_allclose(alone[i], expected, atol=1e-9)
     assert changes > 50  # it was about sticking and sliding, too
 

@@ -56,7 +56,7 @@ def test_the_closed_form_is_the_udwadia_kalaba_force(time, offset, turned, v, di
         np.testing.assert_allclose(command.constraint_force, expected, atol=1e-12 * scale)
         torques = climber.wheel_torques(expected[0], expected[2])
         np.testing.assert_allclose(command.torques, torques, atol=1e-12 * scale)
-        np.testing.assert_allclose(command.missing, 0, atol=1e-12 * scale)
+        np.testing.assert_allclose(command.lost, 0, atol=1e-12 * scale)
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
     if many:
         held = np.repeat(held[:, None], 3, axis=1)
     of = ControlInput(at.motion, Torques(*held), Wrench(drive, turn), PERIOD)
-    for wheels in law.command(of, PAPER.at(0.0).target).wheels, law.holding(of, 5.0):
+    for wheels in law.command(of, PAPER.at(0.0).target).wheels, law.braking(of, 5.0):
         bounds = climber.torque_bounds(at)
         for torque, before, (low, high) in zip(wheels, held, bounds, strict=True):
             assert np.all(np.abs(torque) <= limit)
@@ -164,7 +164,7 @@ def test_a_control_law_of_forces_has_prediction_disturbance_and_limits_around_it
         climber.mass * at.speed * at.yaw_rate + climber.weight_along_wall * at.cosine
     )
     assert np.abs(command.torques).max() <= 0.3
-    assert np.abs(command.missing).max() > 0.1
+    assert np.abs(command.lost).max() > 0.1
 
 
 def test_what_the_limits_take_away_is_told():
@@ -173,8 +173,8 @@ def test_what_the_limits_take_away_is_told():
         law = ControlLaw(Climber(max_wheel_torque=limit), Guidance(), ControlOptions())
         command = law.command(situation(START), reference.target)
         assert np.abs(command.torques).max() <= limit
-        assert bool(np.abs(command.missing).max() > 1e-9) is is_cut
-        demanded = law.climber.force_and_moment(command.torques) + command.missing
+        assert bool(np.abs(command.lost).max() > 1e-9) is is_cut
+        demanded = np.add(law.climber.force_and_moment(command.torques), command.lost)
         force = command.constraint_force
         np.testing.assert_allclose(demanded, [force[0], force[2]], atol=1e-9)
 
@@ -206,7 +206,7 @@ def test_holding_torques_keep_the_climber_where_it_is():
     law, plant = ControlLaw(climber, Guidance(), ControlOptions()), Plant(climber, 0.0025)
     state = State.rolling(np.array([0.0, 0.0, 1.0]), 0.3, 0.4)
     for _ in range(1000):
-        torques = law.holding(situation(state), 5.0)
+        torques = law.braking(situation(state), 5.0)
         state = plant.advance(state, np.array(torques), steps=2)
     np.testing.assert_allclose(state.velocity, 0, atol=1e-6)
 
@@ -223,6 +223,7 @@ def test_one_call_serves_many_climbers(constraints, limit):
     held, disturbance = random.normal(size=(2, n)), 10 * random.normal(size=(2, n))
     many = ControlInput(motion, Torques(*held), Wrench(*disturbance), PERIOD)
     together = law.command(many, reference.target)
+    lost = np.broadcast_to(np.transpose(together.lost), (n, 2))
     for i in range(n):
         one = ControlInput(
             Motion(*(float(number[i]) for number in motion)),
@@ -231,7 +232,9 @@ def test_one_call_serves_many_climbers(constraints, limit):
             PERIOD,
         )
         alone = law.command(one, reference.target)
-        for name in ("torques", "constraint_force", "missing"):
-            expected = getattr(alone, name)
-            got = getattr(together, name)[i]
+        for got, expected in (
+            (together.torques[i], alone.torques),
+            (together.constraint_force[i], alone.constraint_force),
+            (lost[i], alone.lost),
+        ):
             np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * 100)

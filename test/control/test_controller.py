@@ -10,11 +10,11 @@ from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.model import Observer
+from climber_uk.control.model import DisturbanceEstimate, Observer
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import State, Wrench
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -213,7 +213,7 @@ def test_a_single_wrong_odometry_never_reaches_the_wheels(loop):
 
 
 def test_a_fault_forgets_what_was_learnt(loop):
-    loop.controller.estimator.disturbance = Wrench(5.0, 1.0)
+    loop.controller.estimator.learnt = DisturbanceEstimate(5.0, 1.0)
     loop.tell(moved=(1.0, 0.0, 0.0))
     np.testing.assert_array_equal(loop.controller.estimator.disturbance, 0)
 

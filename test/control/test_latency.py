@@ -14,8 +14,8 @@ from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.timing import (
-    FASTEST,
-    LONGEST,
+    FASTEST_CHANGE,
+    LONGEST_DELAY,
     Latency,
     Oscillation,
     Sample,
@@ -124,7 +124,7 @@ def test_a_delay_is_found_from_a_swing_and_changes_no_faster_than_it_may():
         latency.learn(Sample((float(now), 0.0), (float(error), 0.0), time), (0.0, 0.0))
         delays.append(latency.delay)
     assert delays[-1] == pytest.approx(delay, rel=0.01)
-    assert np.abs(np.diff(delays)).max() <= FASTEST * time * (1 + 1e-9)
+    assert np.abs(np.diff(delays)).max() <= FASTEST_CHANGE * time * (1 + 1e-9)
 
 
 def test_a_delay_stays_within_its_bounds():
@@ -133,6 +133,6 @@ def test_a_delay_stays_within_its_bounds():
         for step in range(2000):
             swing = (-1.0) ** step
             sample = Sample((swing, swing), (-sign * swing, -sign * swing), 0.005)
-            latency.learn(sample, (0.0, 0.0), told=0.01)
-        assert latency.delay == (LONGEST if sign > 0 else -0.01)
+            latency.learn(sample, (0.0, 0.0), configured_delay=0.01)
+        assert latency.delay == (LONGEST_DELAY if sign > 0 else -0.01)
         assert latency.is_far_off is (sign > 0)

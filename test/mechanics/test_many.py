@@ -3,19 +3,19 @@ from dataclasses import replace
 import numpy as np
 
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.many import amended, chosen, part
+from climber_uk.mechanics.many import amended, chosen, indexed
 from climber_uk.mechanics.quantities import Wrench
 
 MANY = replace(Climber(), mass=np.array([1.0, 2.0, 3.0]))
 
 
 def test_a_part_of_many_has_the_numbers_of_those_and_shares_the_rest():
-    some = part((MANY, Wrench(np.array([4.0, 5.0, 6.0]), 7.0)), np.array([2, 0]))
+    some = indexed((MANY, Wrench(np.array([4.0, 5.0, 6.0]), 7.0)), np.array([2, 0]))
     np.testing.assert_array_equal(some[0].mass, [3, 1])
     np.testing.assert_array_equal(some[1].force, [6, 4])
     assert some[0].yaw_inertia == MANY.yaw_inertia
     assert some[1].moment == 7.0
-    assert part(Climber(), 0) == Climber()
+    assert indexed(Climber(), 0) == Climber()
 
 
 def test_only_the_exceptional_ones_are_computed_anew():

@@ -54,7 +54,6 @@ def test_every_derivative_is_the_difference_of_the_one_below(shape, law, reverse
         (before.velocity, after.velocity, here.acceleration),
         (before.acceleration[:, :2], after.acceleration[:, :2], here.jerk),
         (before.speed, after.speed, here.forward_acceleration),
-        (before.forward_acceleration, after.forward_acceleration, here.forward_jerk),
     ):
         difference = (high - low) / (2 * h)
         assert np.abs(difference - rate).max() <= 1e-6 * max(1.0, np.abs(rate).max())

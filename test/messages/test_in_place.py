@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
+from reference_points import reference_point
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import FluidPressure, JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
@@ -247,7 +248,7 @@ def test_a_reference_is_written_in_place_as_rclpy_writes_it(data, number):
             points.append((Reference(pose, velocity, acceleration, np.zeros(3)), 0.05 * i))
         rows = [writing.reference_numbers(*point) for point in points]
         expected = writing.reference(
-            [writing.reference_point(*point) for point in points], start, "odom", "base_link"
+            [reference_point(*point) for point in points], start, "odom", "base_link"
         )
         written = deserialize_message(write(rows, start), MultiDOFJointTrajectory)
         assert written == expected

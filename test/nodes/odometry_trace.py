@@ -11,6 +11,7 @@ import rclpy
 from rclpy.clock import ClockType
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
+from reference_points import reference_point
 from sensor_msgs.msg import JointState
 
 import climber_uk
@@ -69,7 +70,7 @@ def main():
         rclpy.spin_once(node, timeout_sec=0.1)
     start = SECOND
     times = [0.05 * i for i in range(40)]
-    points = [writing.reference_point(trajectory.at(time), time) for time in times]
+    points = [reference_point(trajectory.at(time), time) for time in times]
     node.on_reference(serialize_message(writing.reference(points, start, *FRAMES)))
     for stamp in range(start, start + 3 * PERIOD, PERIOD):
         node.get_clock().set_ros_time_override(

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
+from reference_points import reference_point
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 from test_uk_torque_controller import CIRCLE, Loop
@@ -187,7 +188,7 @@ def good_odometry(now):
 
 def good_reference(now):
     times = [0.25 * number for number in range(6)]
-    points = [writing.reference_point(CIRCLE.at(time), time) for time in times]
+    points = [reference_point(CIRCLE.at(time), time) for time in times]
     return writing.reference(points, now - SECOND // 4, "odom", "base_link")
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
+from reference_points import reference_point
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
@@ -40,7 +41,7 @@ class Told:
         stamp, (odom, base) = self.stamp, FRAMES
         rest = np.zeros(3)
         ahead = Reference(np.array([1.1, 2.0, 0.0]), rest, rest, np.zeros(2))
-        points = [writing.reference_point(ahead, time) for time in (0.0, 1.0)]
+        points = [reference_point(ahead, time) for time in (0.0, 1.0)]
         state = State.rolling(np.array([1.0, 2.0, 0.0]), 0.1, 0.0)
         return {
             "reference": writing.reference(points, stamp, odom, base),

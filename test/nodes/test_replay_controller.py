@@ -7,6 +7,7 @@ from mcap.reader import make_reader
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from reference_points import reference_point
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import SetBool
@@ -47,7 +48,7 @@ class Lockstep:
         of_controller = f"{NAME}/constraint_force"  # which the recorder knows from nobody else
         world.wait(lambda: world.node.count_subscribers(of_controller), "the recorder")
         world.wait(self.is_recorded, "recorded odometry")
-        points = [writing.reference_point(CIRCLE.at(time), time) for time in np.arange(0, 5, 0.05)]
+        points = [reference_point(CIRCLE.at(time), time) for time in np.arange(0, 5, 0.05)]
         reference.publish(writing.reference(points, SECOND, "odom", "base_link"))
 
     def is_recorded(self):

@@ -9,6 +9,7 @@ from lifecycle_msgs.srv import ChangeState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from reference_points import reference_point
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
@@ -46,7 +47,7 @@ class Loop:
 
     def plan(self, seconds=60.0):
         times = np.arange(0.0, seconds, 0.25)
-        points = [writing.reference_point(CIRCLE.at(time), time) for time in times]
+        points = [reference_point(CIRCLE.at(time), time) for time in times]
         self.reference.publish(writing.reference(points, self.begin, "odom", "base_link"))
 
     def tell(self, spoil=lambda message: None, age=0):
@@ -188,7 +189,7 @@ def test_a_reference_without_accelerations_is_refused_and_the_last_one_kept(worl
     loop = Loop(world, "odometry_timeout:=1.0")
     loop.plan()
     loop.follows()
-    points = [writing.reference_point(CIRCLE.at(time), time) for time in (0.0, 1.0)]
+    points = [reference_point(CIRCLE.at(time), time) for time in (0.0, 1.0)]
     message = writing.reference(points, loop.begin, "odom", "base_link")
     message.points[1].accelerations = []
     loop.reference.publish(message)
@@ -210,9 +211,9 @@ def test_a_reference_that_moves_sideways_is_refused_with_numbers_and_the_last_on
     loop.plan()
     loop.follows()
     point = CIRCLE.at(1.0)
-    points = [writing.reference_point(CIRCLE.at(time), time) for time in (0.0, 1.0, 2.0)]
+    points = [reference_point(CIRCLE.at(time), time) for time in (0.0, 1.0, 2.0)]
     turned = replace(point, pose=point.pose + np.array([0.0, 0.0, 1.0]))
-    points[1] = writing.reference_point(turned, 1.0)
+    points[1] = reference_point(turned, 1.0)
     loop.reference.publish(writing.reference(points, loop.begin, "odom", "base_link"))
     world.wait(lambda: "reference: refused" in world.log(NAME), "word of the refusal")
     assert "point 2 moves sideways" in world.log(NAME)

@@ -77,7 +77,8 @@ def test_torques_and_lateral_reaction_make_up_the_whole_constraint_force():
     times, y = near_the_path(50, 0.1)
     state = State(y[:, :3], y[:, 3:])
     Qc = CONSISTENT.constraint_force(times, state)
-    driven = CONSISTENT.climber.wheel_force(state.heading, CONSISTENT.torques(times, state))
+    torques = CONSISTENT.torques(times, state)
+    driven = State.rolling(state.pose, *CONSISTENT.climber.force_and_moment(torques)).velocity
     left_over = Qc - driven
     forward = left_over[:, 0] * np.cos(state.heading) + left_over[:, 1] * np.sin(state.heading)
     np.testing.assert_allclose(forward, 0, atol=1e-9)

@@ -79,7 +79,8 @@ def test_its_derivative_is_that_of_the_generic_equations():
         row, _ = no_slip(State(q, v))
         q_1 = velocity_correction(M, row[None], np.zeros(1), v)
         _, b = no_slip(State(q, q_1))
-        Q = PAPER.applied_force(q[2], 1.0) + PAPER.wheel_force(q[2], torques)
+        driven = State.rolling(q, *PAPER.force_and_moment(torques)).velocity
+        Q = PAPER.applied_force(q[2], 1.0) + driven
         v_1 = constrained_acceleration(M, Q, row[None], np.array([b]))
         np.testing.assert_allclose(got, np.concatenate([q_1, v_1]), rtol=1e-12, atol=1e-12)
 

@@ -5,10 +5,6 @@ import numpy as np
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.report.metrics.metric import GAP, NAN, Case, Metric, deviation, largest, percentile
 
-STAMPED = (
-    0.5  # of the torques have stamps of odometry, at least, where these tell what was answered
-)
-
 
 def periods(case: Case) -> Array:
     """Times between stamps of odometry (n - 1,) [s]."""
