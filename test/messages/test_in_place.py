@@ -231,7 +231,7 @@ def test_a_reference_of_very_many_points_is_not_laid_out():
 def test_a_reference_of_very_many_points_is_written_all_the_same():
     point = Reference(np.ones(3), np.ones(3), np.ones(3), np.zeros(3)), 0.5
     written = ReferenceWriter("odom", "base")([writing.reference_numbers(*point)] * 1400, 7)
-    expected = writing.reference([writing.reference_point(*point)] * 1400, 7, "odom", "base")
+    expected = writing.reference([reference_point(*point)] * 1400, 7, "odom", "base")
     assert deserialize_message(written, MultiDOFJointTrajectory) == expected
 
 
