@@ -17,18 +17,29 @@ import sys
 import sysconfig
 import tempfile
 import time
+import timeit
+from copy import deepcopy
+from functools import partial
 from pathlib import Path
 from statistics import median
 
+import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Transform, Twist
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
+from climber_uk.mechanics.quantities import State
+from climber_uk.messages import writing
+from climber_uk.messages.in_place import NumberReader
+from climber_uk.messages.reading import ODOMETRY
+from climber_uk.messages.references import PreviewReader
 from climber_uk.ros.transport import use_udp
 
 HERE = Path(__file__)
@@ -142,6 +153,28 @@ def ours(kind: str, seconds: float) -> list[float]:
     return [steps / passed, *(1e6 * part / steps for part in reversed(used))]
 
 
+def reading() -> None:
+    """Print what it costs to read a message, by rclpy and in place."""
+    point = MultiDOFJointTrajectoryPoint(
+        transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()]
+    )
+    points = [deepcopy(point) for _ in range(26)]
+    for number, each in enumerate(points):
+        each.time_from_start.nanosec = number
+    trajectory = writing.reference(points, 0, "odom", "base_link")
+    odometry = writing.odometry(State(np.zeros(3), np.zeros(3)), 0, "odom", "base_link")
+    read, preview = NumberReader(Odometry, *ODOMETRY), PreviewReader()
+    whole = {Odometry: odometry, MultiDOFJointTrajectory: trajectory}
+    in_place = {Odometry: read, MultiDOFJointTrajectory: lambda data: preview(data, "odom")}
+    for kind, message in whole.items():
+        data, other = serialize_message(message), in_place[kind]
+        typed, ours = (
+            1e6 * min(timeit.repeat(run, number=200, repeat=9)) / 200
+            for run in (partial(deserialize_message, data, kind), partial(other, data))
+        )
+        print(f"{kind.__name__:24} deserialised {typed:7.1f}   in place {ours:7.1f}")
+
+
 def build(directory: str) -> str:
     """The shared library of pingpong.c."""
     library, root = f"{directory}/pingpong.so", Path(sysconfig.get_path("data"))
@@ -182,11 +215,14 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=5.0, help="of each run (default: 5)")
     parser.add_argument("--rounds", type=int, default=3, help="(default: 3)")
     parser.add_argument("--no-c", action="store_true", help="without gcc")
+    parser.add_argument("--reading", action="store_true", help="only what it costs to read them")
     parser.add_argument("--end", help=argparse.SUPPRESS)
     parser.add_argument("--leads", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.end:
         end(options.end, options.leads, options.seconds)
+    elif options.reading:
+        reading()
     else:
         compare(options.rounds, options.seconds, not options.no_c)
 

@@ -109,7 +109,15 @@ def described(
     ]
     seen = viewers(time, namespace, config, prefix) if on["rviz"] else []
     recorder = ExecuteProcess(
-        cmd=["ros2", "bag", "record", "--all", "--storage", "mcap", *qos(namespace)],
+        cmd=[
+            "ros2",
+            "bag",
+            "record",
+            "--all",
+            "--storage",
+            "mcap",
+            *(qos(namespace) if on["sim"] else []),
+        ],
         name="recorder",
         output="screen",
         prefix=prefix,
@@ -119,7 +127,10 @@ def described(
 
 
 def qos(namespace: str) -> list[str]:
-    """Options of `ros2 bag record` that let more messages wait than it does by itself."""
+    """Options of `ros2 bag record` that let more messages of our simulator wait.
+
+    Of a driver it has to find out by itself what QoS it offers: asked for more, it gets nothing.
+    """
     file = SHARE / "config" / "rosbag2_qos.yaml"
     if namespace:
         text = re.sub(r"^/(?!clock)", f"/{namespace}/", file.read_text(), flags=re.MULTILINE)

@@ -184,6 +184,13 @@ def test_a_recorder_lets_messages_of_the_loop_wait(launch, word, under):
 
 
 @without_launch
+def test_a_recorder_of_a_driver_finds_out_itself_what_the_driver_offers(launch):
+    """It would get nothing of a topic that is published as best effort."""
+    recorder, _ = start(launch, "record:=true", "sim:=false")
+    assert recorder.named["cmd"] == ["ros2", "bag", "record", "--all", "--storage", "mcap"]
+
+
+@without_launch
 def test_a_simulation_that_is_recorded_waits_for_the_recorder(launch):
     found, _ = nodes(launch, "record:=true", "use_sim_time:=1")
     (config, given) = found[PLANT]["parameters"]

@@ -71,7 +71,6 @@ class ReferenceWriter:
             transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()]
         )
         # of many points, the first two tell where the others are
-        # of many points, the first two tell where the others are
         _, layout = serialized(writing.reference([point] * min(number, 2), 0, *self.frames))
         _, stamp, (_, row, begin, (stride,)) = _points(layout)
         whole = serialize_message(writing.reference([point] * number, 0, *self.frames))
