@@ -17,7 +17,7 @@ from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Tracked
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
@@ -105,26 +105,26 @@ class Ear:
 
     controlling: Controlling
     stamps: list[int] = field(default_factory=list)  # [ns]
-    states: list[State] = field(default_factory=list)
+    motions: list[Motion] = field(default_factory=list)
     torques: list[Array] = field(default_factory=list)
 
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
         """See `Controlling`."""
         return self.controlling.on_reference(now, preview)
 
-    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+    def on_odometry(self, now: int, stamp: int, motion: Motion) -> Answer | None:
         """See `Controlling`."""
-        answer = self.controlling.on_odometry(now, stamp, state)
+        answer = self.controlling.on_odometry(now, stamp, motion)
         self.stamps.append(stamp)
-        self.states.append(state)
+        self.motions.append(motion)
         self.torques.append(np.zeros(2) if answer is None else answer.torques)
         return answer
 
     def motion(self, pressure: float) -> RecordedMotion:
         """What a bag would tell of it; `pressure` [Pa]."""
         time = np.array(self.stamps) / SECOND
-        poses = np.array([state.pose for state in self.states])
-        rates = [[state.forward_speed, state.yaw_rate] for state in self.states]
+        poses = np.array([motion[:3] for motion in self.motions])
+        rates = [[motion.speed, motion.yaw_rate] for motion in self.motions]
         return RecordedMotion(
             time=time,
             pose=np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]),

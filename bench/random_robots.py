@@ -25,7 +25,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.friction import Stribeck
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import NO_TORQUES, Motion, State, Torques
 from climber_uk.mechanics.shapes import SineWave
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
@@ -97,13 +97,14 @@ class Trying:
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
         """Leave it be."""
 
-    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+    def on_odometry(self, now: int, stamp: int, motion: Motion) -> Answer | None:
         """Answer with the trial's torques, once it has begun."""
+        state = State.moving(motion)
         self.heard.append(Arrival(writing.odometry(state, stamp, "odom", "base_link"), now, now, 0))
         if len(self.heard) == AT_FIRST:
             self.trial = Trial(BUILT, Bounds(), self.heard, self.period, False)
         torques = self.trial.torques(stamp, now, state) if self.trial else np.zeros(2)
-        return Answer(stamp, np.zeros(2) if torques is None else torques, None)
+        return Answer(stamp, NO_TORQUES if torques is None else Torques(*torques.tolist()), None)
 
 
 def told(of: Robot) -> float:

@@ -15,7 +15,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import arctan, cos, sin
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import Motion, State, Torques
 from climber_uk.mechanics.reference import Reference, tracking_error
 
 IDEAL = Link()
@@ -50,19 +50,20 @@ class Kanayama:
         self.preview = preview
         return None
 
-    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+    def on_odometry(self, now: int, stamp: int, motion: Motion) -> Answer | None:
         """Answer an odometry."""
         reference = self.preview.at(stamp) if self.preview else None
         if reference is None:
             return None
-        gains, heading = self.gains, state.heading
-        x, y, turned = reference.pose - state.pose
-        ahead = x * cos(heading) + y * sin(heading)
-        beside = y * cos(heading) - x * sin(heading)
-        v = reference.speed * cos(float(turned)) + gains.along * ahead
-        steer = gains.across * beside + gains.heading * sin(float(turned))
-        omega = reference.yaw_rate + reference.speed * steer
-        return Answer(stamp, self.climber.wheel_rates(State.rolling(state.pose, v, omega)), None)
+        gains, cosine, sine = self.gains, motion.cosine, motion.sine
+        x, y, turned = (reference.pose - [motion.x, motion.y, motion.heading]).tolist()
+        ahead, beside = x * cosine + y * sine, y * cosine - x * sine
+        v = float(reference.speed) * cos(turned) + gains.along * ahead
+        steer = gains.across * beside + gains.heading * sin(turned)
+        wanted = motion._replace(
+            speed=v, yaw_rate=float(reference.yaw_rate + reference.speed * steer)
+        )
+        return Answer(stamp, Torques(*self.climber.rim_rates(wanted)), None)
 
     def motors(self, state: State, rates: Array) -> Array:
         """Torques (2,) of the wheels' PI loops on their way to `rates` (2,) [rad/s]."""

@@ -15,7 +15,7 @@ from climber_uk.control.controller import Answer
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.mechanics.reference import tracking_error
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.motors import Motors
@@ -49,8 +49,8 @@ class Controlling(Protocol):
     def on_reference(self, now: int, preview: Preview) -> Answer | None:
         """Take a reference, at `now` [ns]."""
 
-    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
-        """Answer an odometry, at `now` [ns]; `stamp` [ns] is when `state` was measured."""
+    def on_odometry(self, now: int, stamp: int, motion: Motion) -> Answer | None:
+        """Answer an odometry, at `now` [ns]; `stamp` [ns] is when `motion` was measured."""
 
 
 def as_commanded(state: State, command: Array) -> Array:
@@ -102,7 +102,7 @@ def simulate(
     random = np.random.default_rng(seed)
     climber_at = climber if callable(climber) else lambda _: climber
     controlling.on_reference(0, sampled(trajectory, duration))
-    arriving: deque[tuple[int, int, State]] = deque()  # step of arrival, stamp, odometry
+    arriving: deque[tuple[int, int, Motion]] = deque()  # step of arrival, stamp, odometry
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
     rows, current = [], climber_at(0.0)
@@ -145,10 +145,7 @@ def sampled(trajectory: Trajectory, duration: float) -> Preview:
     return Preview(stamps, reference.pose, reference.velocity, reference.acceleration)
 
 
-def measured(state: State, link: Link, random: np.random.Generator) -> State:
-    """State as odometry measures it, with its errors."""
-    x, y, heading, _, _, speed, yaw_rate = link.sensors.corrupted(
-        state.motion, random.normal(size=5)
-    )
-    pose = np.array([x, y, heading])
-    return State.rolling(pose, speed, yaw_rate) if link.with_twist else State(pose, np.zeros(3))
+def measured(state: State, link: Link, random: np.random.Generator) -> Motion:
+    """Motion as odometry measures it, with its errors."""
+    motion = link.sensors.corrupted(state.motion, random.normal(size=5).tolist())
+    return motion if link.with_twist else motion._replace(speed=0.0, yaw_rate=0.0)

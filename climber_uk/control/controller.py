@@ -13,8 +13,6 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-
 from climber_uk.control.active_reference import ActiveReference
 from climber_uk.control.approach import Approach
 from climber_uk.control.constraint_set import ConstraintSet, blended
@@ -28,10 +26,10 @@ from climber_uk.control.safety import Calm, Mode, Safety, Trouble
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import LONGEST_STEP, Ages, Timing
 from climber_uk.control.twist import OPPOSED_IF_TOO_FAST, TwistCheck
-from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics import SECOND, Array, pack
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import Motion, State
+from climber_uk.mechanics.quantities import Motion, Torques
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
 CLOCK_STEP = round(0.2 * SECOND)  # [ns] back, from which time has started anew
@@ -44,8 +42,13 @@ class Answer(NamedTuple):
     """Torques for the odometry of `stamp`."""
 
     stamp: int  # [ns]
-    torques: Array  # (2,) right, left [N m]
+    wheels: Torques
     command: Command | None  # what they came from; None: safe output
+
+    @property
+    def torques(self) -> Array:
+        """Torques (2,) right, left [N m]."""
+        return pack(*self.wheels)
 
 
 class Settings(NamedTuple):
@@ -106,10 +109,9 @@ class Controller:
         self._law, self.estimator.climber = law, law.climber
 
     @property
-    def state(self) -> State | None:
-        """State at the last good odometry, as it is believed to be."""
-        motion = self.estimator.motion
-        return None if motion is None else State.moving(motion)
+    def motion(self) -> Motion | None:
+        """Motion at the last good odometry, as it is believed to be."""
+        return self.estimator.motion
 
     @property
     def stamp(self) -> int:
@@ -137,7 +139,7 @@ class Controller:
 
     # What comes in
 
-    def on_odometry(self, now: int, stamp: int, state: State) -> Answer | None:
+    def on_odometry(self, now: int, stamp: int, motion: Motion) -> Answer | None:
         """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
         self._look_at_clock(now)
         # a simulation publishes its first odometry right before its first /clock: how long there
@@ -158,7 +160,7 @@ class Controller:
             if self._stamp and abs(stamp - self._stamp) > round(timeout * SECOND):
                 self.estimator.reset()
                 self._watch_anew()
-            self._trouble = self._see(stamp, state.motion)
+            self._trouble = self._see(stamp, motion)
             self._stamp = stamp
         return self._answer(now)
 
@@ -298,7 +300,7 @@ class Controller:
             torques = self._safe_output.send(mode, self._stamp, age, estimator, law)
         else:
             torques = command.wheels
-        self.answer = Answer(self._stamp, np.array(torques), command)
+        self.answer = Answer(self._stamp, torques, command)
         return self.answer
 
     def _find_mode(self, now: int) -> Trouble:

@@ -3,9 +3,9 @@
 from climber_uk.control.control_law import ControlLaw, check_finite
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.safety import Mode, Safety
-from climber_uk.control.timing import LONGEST_STEP, NO_TORQUES
+from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.quantities import Torques
+from climber_uk.mechanics.quantities import NO_TORQUES, Torques
 
 BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
 PUSHED = 0.05  # [m/s] by which it may be faster than before; if it is, something pushes it:

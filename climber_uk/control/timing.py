@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 from climber_uk.control.model import Shares
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.quantities import Torques
+from climber_uk.mechanics.quantities import NO_TORQUES, Torques
 from climber_uk.parameters.declaration import parameter, parameters
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
 WINDOW = SECOND // 2  # [ns] in which one odometry at least is not late
-NO_TORQUES = Torques(0.0, 0.0)
 LONGEST_DELAY = 0.05  # [s] that is taken for a delay
 FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
 FASTEST_CHANGE = 0.05  # [s/s] by which it changes

@@ -80,6 +80,9 @@ class Torques(NamedTuple):
     left: Any
 
 
+NO_TORQUES = Torques(0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class State:
     """Pose and velocity of a climber, or of many (...), both in the wall's frame."""

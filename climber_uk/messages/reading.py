@@ -13,7 +13,7 @@ import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import arctan2, sqrt
-from climber_uk.mechanics.quantities import State, Torques
+from climber_uk.mechanics.quantities import Motion, State, Torques
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
@@ -50,6 +50,11 @@ class OdometryFields(NamedTuple):
     yaw_rate: float  # [rad/s]
     frame: str
     child_frame: str
+
+    @classmethod
+    def of(cls, message: "Odometry") -> "OdometryFields":
+        """Those of a message."""
+        return cls(*_odometry(message))
 
     @property
     def stamp(self) -> int:
@@ -90,40 +95,45 @@ JOINT_STATE = (*STAMP, "effort"), ("name",)
 _odometry, _joint_state = (attrgetter(*sum(paths, ())) for paths in (ODOMETRY, JOINT_STATE))
 
 
+def motion(message: "Odometry", odom_frame: str, base_frame: str) -> Motion:
+    """Motion of a message, as `motion_of`."""
+    return motion_of(OdometryFields.of(message), odom_frame, base_frame)
+
+
 def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
-    """State of a message, as `state_of`."""
-    return state_of(OdometryFields(*_odometry(message)), odom_frame, base_frame)
+    """State of a message in `odom_frame`; with its side slip, unlike its `motion`."""
+    fields = OdometryFields.of(message)
+    x, y, heading, cosine, sine, v_x, yaw_rate = motion_of(fields, odom_frame, base_frame)
+    velocity = v_x * cosine - fields.v_y * sine, v_x * sine + fields.v_y * cosine, yaw_rate
+    return State(np.array([x, y, heading]), np.array(velocity))
 
 
-def state_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> State:
-    """State in `odom_frame`, the wall's; the twist is rotated into it from `base_frame`."""
+def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motion:
+    """Motion of the climber in `odom_frame`, the wall's, from a twist in `base_frame`."""
     for name, frame, wanted in (
         ("frame_id", fields.frame, odom_frame),
         ("child_frame_id", fields.child_frame, base_frame),
     ):
         if frame != wanted:
             raise ValueError(f"{name}={frame!r} must be {wanted!r}")
-    heading = heading_of(fields.q_x, fields.q_y, fields.q_z, fields.q_w)
-    v_x, v_y, omega = fields.v_x, fields.v_y, fields.yaw_rate
-    cosine, sine = math.cos(heading), math.sin(heading)
-    pose = np.array([fields.x, fields.y, heading])
-    velocity = np.array([v_x * cosine - v_y * sine, v_x * sine + v_y * cosine, omega])
-    check_size(pose=pose, velocity=velocity)
-    return State(pose, velocity)
+    _, _, x, y, q_x, q_y, q_z, q_w, v_x, v_y, yaw_rate, _, _ = fields
+    heading = heading_of(q_x, q_y, q_z, q_w)
+    if not all(abs(number) <= LARGEST for number in (x, y, v_x, v_y, yaw_rate)):
+        check_size(position=[x, y], twist=[v_x, v_y, yaw_rate])
+    return Motion(x, y, heading, math.cos(heading), math.sin(heading), v_x, yaw_rate)
 
 
-def wheel_torques(fields: JointFields, left_joint: str, right_joint: str) -> Array:
-    """Torques (2,) (right, left) [N m]."""
+def wheel_torques(fields: JointFields, left_joint: str, right_joint: str) -> Torques:
+    """Torques [N m]."""
     names, efforts = list(fields.names), list(fields.efforts)
-    if sorted(names) != sorted([left_joint, right_joint]):
+    if names not in ([left_joint, right_joint], [right_joint, left_joint]):
         raise ValueError(f"names {names} must be {left_joint!r} and {right_joint!r}")
     if len(efforts) != 2:
         raise ValueError(f"{len(efforts)} efforts must be 2")
-    by_name = dict(zip(names, efforts, strict=True))
-    torques = np.array(Torques(right=by_name[right_joint], left=by_name[left_joint]))
-    if not np.isfinite(torques).all():
+    left, right = efforts if names[0] == left_joint else reversed(efforts)
+    if not (math.isfinite(left) and math.isfinite(right)):
         raise ValueError(f"efforts {efforts} must be finite")
-    return torques
+    return Torques(right, left)
 
 
 def pressure(message: "FluidPressure") -> float:
@@ -152,7 +162,7 @@ def parameters(message: "ParameterEvent") -> dict[str, bool | int | float | str]
     return {name: getattr(value, kinds[value.type]) for name, value in pairs if value.type in kinds}
 
 
-def check_size(**vectors: "Array | Sequence[Sequence[float]]") -> None:
+def check_size(**vectors: "Array | Sequence[float] | Sequence[Sequence[float]]") -> None:
     """Raise `ValueError` naming the vector that is not finite, or beyond ± `LARGEST`."""
     for name, vector in vectors.items():
         if not (np.abs(vector) <= LARGEST).all():

@@ -21,7 +21,7 @@ from geometry_msgs.msg import (
 from nav_msgs.msg import Odometry, Path
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState, TimeReference
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from climber_uk.mechanics import SECOND, Array
@@ -49,6 +49,7 @@ ODOMETRY = (
 EFFORT = ("effort",)
 JOINT_STATE = "position", "velocity", "effort"
 VECTOR = "vector.x", "vector.y", "vector.z"
+TIME_REFERENCE = "time_ref.sec", "time_ref.nanosec"
 WRENCH = "wrench.force.x", "wrench.force.y", "wrench.torque.z"
 
 
@@ -67,9 +68,9 @@ def odometry(state: State, stamp: int, odom_frame: str, base_frame: str) -> Odom
 
 def odometry_numbers(state: State) -> tuple[float, ...]:
     """Numbers of a state, for the paths of `ODOMETRY`."""
-    x, y, heading = state.pose.tolist()
-    yaw_rate = float(state.velocity[2])
-    speed, slip = float(state.forward_speed), float(state.side_slip)
+    x, y, heading, cosine, sine, speed, yaw_rate = state.motion
+    v_x, v_y, _ = state.velocity.tolist()
+    slip = v_y * cosine - v_x * sine
     return x, y, math.sin(heading / 2), math.cos(heading / 2), speed, slip, yaw_rate
 
 
@@ -111,13 +112,6 @@ def reference(
     message = MultiDOFJointTrajectory(joint_names=[base_frame], points=list(points))
     message.header.stamp = time(start)
     message.header.frame_id = odom_frame
-    return message
-
-
-def time_reference(reference: int, stamp: int, source: str) -> TimeReference:
-    """Time of the reference [ns] that is followed at `stamp` [ns]; `source` is the mode."""
-    message = TimeReference(time_ref=time(reference), source=source)
-    message.header.stamp = time(stamp)
     return message
 
 

@@ -136,7 +136,7 @@ class Markers(ClimberNode):
             TORQUES, stamp, lambda m: reading.wheel_torques(reading.JointFields.of(m), left, right)
         )
         if torques is not None:
-            for side, torque in zip((-1, 1), torques.tolist(), strict=True):
+            for side, torque in zip((-1, 1), torques, strict=True):
                 start = (0.0, side * options.half_track, ABOVE)
                 drawing.arrow(TORQUES, pose, start, (torque * options.torque_scale, 0.0), ORANGE)
         frames = names.odom_frame, names.base_frame

@@ -9,6 +9,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.adhesion import Alarm
+from climber_uk.mechanics.quantities import NO_TORQUES
 from climber_uk.messages import reading
 from climber_uk.messages.in_place import NumberReader
 from climber_uk.messages.topics import JOINTS, ODOMETRY, PLANT, PUSH, REFERENCE, TORQUES
@@ -123,18 +124,17 @@ class PlantSimulator(ClimberNode):
 
     def on_torques(self, serialized: bytes) -> None:
         """Let torques act from now on; in lock-step only if they answer the last odometry."""
-        names, stamp = self.names, None
-        torques: Array = np.zeros(2)
+        names, stamp, told = self.names, None, NO_TORQUES
         try:
             fields = reading.JointFields(*self.read_torques(serialized))
             stamp = fields.stamp
-            torques = reading.wheel_torques(fields, names.left_wheel_joint, names.right_wheel_joint)
+            told = reading.wheel_torques(fields, names.left_wheel_joint, names.right_wheel_joint)
             self.report(TORQUES, "")
         except ValueError as error:
             self.report(TORQUES, "refused, zero torque instead", str(error))
         limit = self.robot.plant.climber.max_wheel_torque
-        torques = np.clip(torques, -limit, limit)
-        self.waits = self.waits and not torques.any()
+        torques = np.array([min(max(torque, -limit), limit) for torque in told])
+        self.waits = self.waits and not any(told)
         if not self.options.simulated_time:
             self.commands.add(self.get_clock().now().nanoseconds, torques)
         elif stamp == self.asked and not self.answered:

@@ -3,8 +3,7 @@
 Inactive, it answers with its safe output: a climber on a wall needs torques at all times.
 """
 
-import math
-
+import numpy as np
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
@@ -18,9 +17,10 @@ from climber_uk.control.constraints import UDWADIA_KALABA
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
 from climber_uk.control.safety import Mode
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.reference import tracking_error
 from climber_uk.messages import reading, writing
 from climber_uk.messages.in_place import NumberReader
@@ -100,6 +100,7 @@ class UkTorqueController(ManagedNode):
         disturbance = self.publisher(WrenchStamped, "~/disturbance")
         self.disturbance = Output(disturbance, wrench, writing.WRENCH)
         self.reference_time = self.publisher(TimeReference, REFERENCE_TIME)
+        self.positions: dict[Mode, Output] = {}  # on this topic, which tells the mode
         self.parameter_values = self.publisher(ParameterEvent, private(PARAMETERS), LATCHED)
         self.publish_parameters()
         safety = self.controller.safety
@@ -167,11 +168,11 @@ class UkTorqueController(ManagedNode):
         """Answer an odometry with torques, or a bad one with the safe output."""
         try:
             fields = reading.OdometryFields(*self.read_odometry(serialized))
-            state = reading.state_of(fields, self.names.odom_frame, self.names.base_frame)
+            motion = reading.motion_of(fields, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
             self.publish(self.controller.on_bad_odometry(self.now(), str(error)))
             return
-        self.publish(self.controller.on_odometry(self.now(), fields.stamp, state))
+        self.publish(self.controller.on_odometry(self.now(), fields.stamp, motion))
 
     def on_reference(self, serialized: bytes) -> None:
         """Check and keep a reference; answer an odometry that waits for it."""
@@ -223,16 +224,19 @@ class UkTorqueController(ManagedNode):
         if answer is not None:
             self.publish_torques(answer)
         self.publish_position()
-        offset = controller.clock_offset
-        differ = "odometry's differs from this node's" if offset else ""
-        detail = f"by {offset:.3f} s; if that is latency, set transport_delay"
-        self.report("clock", differ, detail, is_fault=False)
-        if answer is not None:
-            state = controller.state
+        self.report_clock(controller.clock_offset)
+        if answer is not None and controller.motion is not None:
             if answer.command is not None:
-                self.publish_causes(answer.stamp, answer.command, state)
-            if state is not None:
-                self.add_margins(answer, state)
+                self.publish_causes(answer.stamp, answer.command, controller.motion)
+            self.add_margins(answer, controller.motion)
+
+    def report_clock(self, offset: float) -> None:
+        """Report an odometry's clock that is `offset` [s] behind, or that it is no more."""
+        if not offset:
+            self.report("clock", "")
+            return
+        detail = f"by {offset:.3f} s; if that is latency, set transport_delay"
+        self.report("clock", "odometry's differs from this node's", detail, is_fault=False)
 
     def publish_position(self) -> None:
         """Publish how far along the reference the climber is, which the planner waits for."""
@@ -240,25 +244,28 @@ class UkTorqueController(ManagedNode):
         position = controller.active.position(stamp)
         has_changed, self.last_mode = controller.mode is not self.last_mode, controller.mode
         if position is not None and (self.is_position_due(stamp) or has_changed):
-            self.reference_time.publish(
-                writing.time_reference(position, stamp, controller.mode.name.lower())
-            )
+            if controller.mode not in self.positions:
+                empty = TimeReference(source=controller.mode.name.lower())
+                output = Output(self.reference_time, empty, writing.TIME_REFERENCE)
+                self.positions[controller.mode] = output
+            self.positions[controller.mode].publish(stamp, *divmod(position, SECOND))
 
     def publish_torques(self, answer: Answer) -> None:
         """Publish torques with the stamp of the odometry that they answer."""
-        left, right = efforts = writing.left_right(answer.torques)
-        self.torques.publish(answer.stamp, efforts)
+        right, left = answer.wheels
+        self.torques.publish(answer.stamp, (left, right))
         if self.options.effort_commands:
             ordered = [left, right] if self.options.effort_order == "left_right" else [right, left]
             self.efforts.publish(Float64MultiArray(data=ordered))
 
-    def publish_causes(self, stamp: int, command: Command, state: State | None) -> None:
+    def publish_causes(self, stamp: int, command: Command, motion: Motion) -> None:
         """Publish constraint force, disturbance and tracking error behind an answer."""
         self.answers += 1
         self.saturations += not command.fits
         controller = self.controller
         if self.force.is_heard:
-            self.force.publish(stamp, *command.constraint_force)
+            force, moment = command.demanded
+            self.force.publish(stamp, force, command.lateral, moment)
         if self.is_due(stamp):
             force, moment = controller.estimator.disturbance
             self.disturbance.publish(stamp, force, 0.0, moment)
@@ -266,17 +273,18 @@ class UkTorqueController(ManagedNode):
             return
         active = controller.active
         desired = active.followed.at(active.progress.at(stamp)) if active.followed else None
-        if state is not None and desired is not None:
-            self.error.publish(stamp, *tracking_error(state.pose, desired))
+        if desired is not None:
+            pose = np.array([motion.x, motion.y, motion.heading])
+            self.error.publish(stamp, *tracking_error(pose, desired))
 
-    def add_margins(self, answer: Answer, state: State) -> None:
+    def add_margins(self, answer: Answer, motion: Motion) -> None:
         """Add the slip margin under an answer's torques, and the tip margin."""
         climber, attachment = self.controller.law.climber, self.attachment
-        drive, _ = climber.force_and_moment(answer.torques)
+        drive, _ = climber.wrench(*answer.wheels)
         if answer.command is not None:
-            lateral = float(answer.command.constraint_force[1])
+            lateral = answer.command.lateral
         else:
-            lateral = climber.weight_along_wall * math.cos(state.heading)
+            lateral = climber.weight_along_wall * motion.cosine
         into_wall = climber.gravity_into_wall
         along_wall = climber.weight_along_wall / climber.mass
         self.margins.take(

@@ -110,11 +110,11 @@ class Replay:
             self.apply_settings(answered)
             self.pass_time(answered)  # the node reads its clock right before it publishes
         try:
-            state = reading.state(message, self.names.odom_frame, self.names.base_frame)
+            motion = reading.motion(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
             self.record(self.controller.on_bad_odometry(self.clock, str(error)))
             return
-        self.record(self.controller.on_odometry(self.clock, stamp, state))
+        self.record(self.controller.on_odometry(self.clock, stamp, motion))
 
     def on_reference(self, _: int, message: Any) -> None:
         """Pass on a reference, unless the node refuses such a one."""

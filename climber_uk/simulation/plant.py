@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import GRAVITY, Climber
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, is_pulled_off
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import Plane, Wall
@@ -98,12 +98,11 @@ class Plant:
         """Slip and tip margin (§7) under wheel torques (2,) [N m] and a push (3,) [N, N, N m]."""
         climber, inputs = self.climber, Inputs.of(self.climber, torques, push)
         y = np.concatenate([state.pose, state.velocity])
-        into = self._body.into_wall(y)
+        into, along = self._body.gravity(y)
         lateral = self._body.lateral(y, inputs, climber.mass)
-        s_x, s_y = self.wall.along(climber.inclination, float(y[1]))
         return (
             float(self.contact.slip_margin(climber, into, inputs.force, lateral)),
-            float(self.contact.tip_margin(climber, into, GRAVITY * math.hypot(s_x, s_y))),
+            float(self.contact.tip_margin(climber, into, along)),
         )
 
     @cached_property

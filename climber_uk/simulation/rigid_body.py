@@ -47,15 +47,25 @@ class RigidBody:
         """See `Friction`."""
         return self.contact.friction.bristles
 
+    # a plane's are the same everywhere
     @cached_property
     def _weight_on_plane(self) -> tuple[float, float]:
         return self._weight(0.0)
+
+    @cached_property
+    def _gravity_on_plane(self) -> tuple[float, float]:
+        return self._gravity(0.0, 0.0)
 
     def _weight(self, height: float) -> tuple[float, float]:
         """Weight along the wall (x, y) [N], at y = `height` [m]."""
         s_x, s_y = self.wall.along(self.climber.inclination, height)
         weight = self.climber.mass * GRAVITY
         return weight * s_x, weight * s_y
+
+    def _gravity(self, height: float, y_speed: float) -> tuple[float, float]:
+        inclination = self.climber.inclination
+        into = self.wall.into(inclination, height, y_speed)
+        return float(into), GRAVITY * math.hypot(*self.wall.along(inclination, height))
 
     def outside(self, height: float, inputs: Inputs) -> tuple[float, float]:
         """Weight and push along the wall (x, y) [N], at y = `height` [m]."""
@@ -78,9 +88,14 @@ class RigidBody:
             - f_y * math.cos(heading)
         )
 
+    def gravity(self, y: Array) -> tuple[float, float]:
+        """g_n into the wall, with the centripetal part of a curved one, and g_t along it [m/s²]."""
+        return self._gravity_on_plane if self.wall.flat else self._gravity(float(y[1]), float(y[4]))
+
     def into_wall(self, y: Array) -> float:
-        """g_n into the wall, with the centripetal part of a curved wall [m/s²]."""
-        return float(self.wall.into(self.climber.inclination, float(y[1]), float(y[4])))
+        """g_n [m/s²], see `gravity`."""
+        into, _ = self.gravity(y)
+        return into
 
     def runge_kutta(self, y: Array, inputs: Inputs, direction: float | None, h: float) -> Array:
         """y after `h` [s], by the classic fourth-order method; `direction` as in `derivative`."""

@@ -61,7 +61,7 @@ class Climb:
             told = odometry(self.time, self.state)
             answer = None
             if told is not None:
-                answer = self.controller.on_odometry(now, now - round(clock * SECOND), told)
+                answer = self.controller.on_odometry(now, now - round(clock * SECOND), told.motion)
             answer = answer or self.controller.look(now)
             if answer is not None:
                 self.torques = answer.torques

@@ -239,7 +239,7 @@ def test_a_reference_that_nobody_follows_is_kept_in_part_only(steps, with_odomet
         active.take(newer)
         if with_odometry:
             now = SECOND + shift
-            climb.controller.on_odometry(now, now, climb.state)
+            climb.controller.on_odometry(now, now, climb.state.motion)
     assert len(active.preview.times) <= 5000
 
 

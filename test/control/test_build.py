@@ -33,7 +33,7 @@ def driven(file, duration, **common):
     torques, disturbances = [], []
     for period in range(round(duration / options.control_period)):
         stamp = SECOND + round(period * options.control_period * SECOND)
-        answer = controller.on_odometry(stamp, stamp, robot.odometer.latest()[1])
+        answer = controller.on_odometry(stamp, stamp, robot.odometer.latest()[1].motion)
         torques.append(answer.torques)
         disturbances.append(controller.estimator.disturbance)
         for _ in range(options.steps):

@@ -50,7 +50,7 @@ class Loop:
             at = self.now if stamp is None else stamp
             state = self.state(at)
             state = State(state.pose + np.array(moved), state.velocity)
-            self.answer = self.controller.on_odometry(self.now, at, state)
+            self.answer = self.controller.on_odometry(self.now, at, state.motion)
         return self.controller.mode
 
     def look(self, after=PERIOD):
@@ -79,7 +79,7 @@ def test_it_follows_odometry_and_answers_with_its_stamp(loop):
 
 def test_the_same_odometry_again_gets_the_same_answer(loop):
     before = loop.answer
-    assert loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now)) is before
+    assert loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now).motion) is before
 
 
 def test_odometry_waits_for_a_reference_then_is_safe_then_is_answered():
@@ -96,7 +96,7 @@ def test_odometry_waits_for_a_reference_then_is_safe_then_is_answered():
 def test_a_clock_that_stands_still_waits_for_the_reference_for_ever():
     loop = Loop()
     for _ in range(100):
-        assert loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now)) is None
+        assert loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now).motion) is None
     loop.plan()
     assert loop.answer.command is not None
 
@@ -254,7 +254,7 @@ def test_a_clock_that_comes_right_after_the_first_odometry_is_in_time():
         loop.controller.look(0)
     assert loop.controller.mode is Mode.NO_CLOCK
     # a safe output would be an answer, with which lock-step would go on
-    assert loop.controller.on_odometry(0, loop.now, loop.state(loop.now)) is None
+    assert loop.controller.on_odometry(0, loop.now, loop.state(loop.now).motion) is None
 
 
 def test_hold_carries_the_weight_brakes_and_lets_the_brake_go_when_it_must_have_stopped():
@@ -352,7 +352,7 @@ def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source
         if kind == "odometry":
             shift, pose, velocity = details
             answer = loop.controller.on_odometry(
-                loop.now, loop.now + shift // 10, State(pose, velocity)
+                loop.now, loop.now + shift // 10, State(pose, velocity).motion
             )
         elif kind == "reference":
             shift, pose, velocity = details
@@ -365,7 +365,7 @@ def test_whatever_happens_torques_are_finite_and_within_the_limit(events, source
             )
             answer = loop.controller.on_reference(loop.now, moved)
         elif kind == "good":
-            answer = loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now))
+            answer = loop.controller.on_odometry(loop.now, loop.now, loop.state(loop.now).motion)
         elif kind == "look":
             answer = loop.controller.look(loop.now)
         elif kind == "bad":
@@ -396,7 +396,7 @@ def faster(loop, factor, times=1, moved=(0.0, 0.0, 0.0)):
         loop.now += PERIOD
         state = loop.state(loop.now)
         told = State(state.pose + np.array(moved), factor * state.velocity)
-        loop.answer = loop.controller.on_odometry(loop.now, loop.now, told)
+        loop.answer = loop.controller.on_odometry(loop.now, loop.now, told.motion)
         modes.append(loop.controller.mode)
     return modes
 
@@ -422,7 +422,7 @@ def test_a_twist_is_compared_from_the_rest_after_a_fault_on(loop):
     begin = loop.now
     while loop.controller.mode is Mode.TWIST_WRONG:
         loop.now += PERIOD
-        loop.answer = loop.controller.on_odometry(loop.now, loop.now, still)
+        loop.answer = loop.controller.on_odometry(loop.now, loop.now, still.motion)
         assert loop.now - begin < SECOND
     moved = still.pose - loop.state(loop.now).pose
     assert Mode.TWIST_WRONG not in faster(loop, 0.4, 60, moved * [1, 1, 0])

@@ -251,10 +251,10 @@ def test_gains_change_without_a_jump_of_the_torque():
         ours = controller(constraints=before)
         ours.on_reference(SECOND, sampled(PAPER, 1.0))
         offset = State(START.pose + np.array([-0.05, 0.05, 0.1]), START.velocity)
-        old = ours.on_odometry(SECOND, SECOND, offset).torques
+        old = ours.on_odometry(SECOND, SECOND, offset.motion).torques
         change(ours)
         stamp = SECOND + 5_000_000
-        expected = State.moving(ours.estimator.expected_at(stamp))
+        expected = ours.estimator.expected_at(stamp)
         return np.abs(ours.on_odometry(stamp, stamp, expected).torques - old).max()
 
     def replace_at_once(ours):

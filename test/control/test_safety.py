@@ -59,7 +59,7 @@ def controller(now=SECOND, **safety):
     controller.on_reference(now, sampled(CIRCLE, 10.0))
     start = CIRCLE.at(0.0)
     state = State(start.pose, start.velocity)
-    controller.on_odometry(now, SECOND, state)
+    controller.on_odometry(now, SECOND, state.motion)
     assert controller.mode is Mode.FOLLOWING
     return controller, state
 
@@ -75,7 +75,7 @@ def controller(now=SECOND, **safety):
 def test_a_fault_forgets_what_was_learnt_of_disturbances(fault, mode):
     following, state = controller()
     faster = State(state.pose, 1.02 * state.velocity)
-    following.on_odometry(SECOND, SECOND + 5 * MILLISECOND, faster)
+    following.on_odometry(SECOND, SECOND + 5 * MILLISECOND, faster.motion)
     assert any(following.estimator.disturbance[:2])
     fault(following)
     assert following.mode is mode
@@ -89,5 +89,5 @@ def test_odometry_is_overtaken_within_its_timeout_and_beyond_it_time_has_started
     """Without a clock, by which it would be refused."""
     following, state = controller(now=0, odometry_timeout=0.1)
     moved = State(state.pose + 0.01, state.velocity)
-    following.on_odometry(0, SECOND - older * MILLISECOND, moved)
-    assert (following.state.pose[0] == state.pose[0]) == is_ignored
+    following.on_odometry(0, SECOND - older * MILLISECOND, moved.motion)
+    assert (following.motion.x == state.pose[0]) == is_ignored
