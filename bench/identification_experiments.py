@@ -93,7 +93,6 @@ SCENARIOS = {
         State(np.array([0.0, 3.0, np.pi / 4]), np.zeros(3)),
         16.0,
         Contact(locomotion=Tracked(scrub_friction_coefficient=0.8, length=0.44)),
-        slip=True,
         period=0.01,
     ),
 }

@@ -192,7 +192,9 @@ def paper_margins() -> Figure:
     now = Trajectory(Ellipse(), ConstantRate()).at(time)
     drive = 5 * now.forward_acceleration + PAPER.seal_friction + 49.05 * np.sin(now.heading)
     lateral = 5 * now.speed * now.yaw_rate + 49.05 * np.cos(now.heading)
-    margin = Contact().slip_margin(PAPER, 0.0, drive, lateral)
+    yaw_force = 0.33 * now.acceleration[:, 2] / PAPER.half_track
+    forces = (drive + yaw_force) / 2, (drive - yaw_force) / 2
+    margin = Contact().slip_margin(PAPER, 0.0, forces, lateral, -49.05 * np.cos(now.heading))
     share = float(np.mean(margin < 1))
     print(f"paper's ellipse: slip margin below 1 for {share:.1%} of a lap")
     print(f"  lowest {margin.min():.3f}")

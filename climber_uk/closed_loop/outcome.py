@@ -64,7 +64,9 @@ class Tally:
         for torque in wheels:
             np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
         lateral = climber.lateral_reaction(motion)
-        margin = self.contact.slip_margin(climber, self._into, climber.wrench(*wheels)[0], lateral)
+        forces = wheels.right / climber.wheel_radius, wheels.left / climber.wheel_radius
+        across = -climber.weight_along_wall * motion.cosine
+        margin = self.contact.slip_margin(climber, self._into, forces, lateral, across)
         np.minimum(self.slip, margin, out=self.slip, where=on)
 
     def _update_fallen(self, time: float, climber: Climber) -> None:

@@ -1,8 +1,9 @@
 """Adhesion to the wall, and the margins to slipping, tipping and falling off (§7).
 
-    slip margin = μ_w N_w / |traction demanded|     tip margin = (F_a + m g_n) l/2 / (m g_t h)
+    slip margin = min over R, L of μ_w N / |traction demanded|
+    tip margin = (F_a + m g_n) l/2 / (m g_t h)
 
-F_a is the adhesion, N_w the load on the wheels, g_n and g_t gravity into the wall and along it. A
+F_a is the adhesion, N the load on a wheel, g_n and g_t gravity into the wall and along it. A
 new kind of adhesion is one class, an `Adhesion`, and one entry in `ADHESION`, or an entry point
 `climber_uk.adhesion` of another package. Everything broadcasts.
 """
@@ -125,7 +126,7 @@ class Grip:
     wheel_inertia: float = parameter(
         2e-5,
         "kg m²",
-        "of a wheel about its axle; mass and yaw inertia contain it",
+        "of the wheels of a side about their axles; mass and yaw inertia contain it",
         above=0,
         plausible=(1e-8, 1),
     )
@@ -172,13 +173,30 @@ class Attachment:
             seal_load = (1 - climber.wheel_load_share) * self.adhesion.force(climber)
         return clipped(self.normal_force(climber, into_wall) - seal_load, 0.0, float("inf"))
 
-    def slip_margin(self, climber: Climber, into_wall: Any, drive: Any, lateral: Any) -> Any:
-        """μ_w N_w / √(drive² + lateral²) (...): below 1 the wheels slip; at most `MAX_MARGIN`.
+    def wheel_loads(self, climber: Climber, load: Any, across: Any) -> tuple[Any, Any]:
+        """Loads N_R, N_L (...) [N] of the sides, `load` together.
 
-        `drive` and `lateral` (...) [N] are what the wheels pass on, along and across the climber.
+        `across` (...) [N] is what pulls the centre of mass to the left, which is h above the wall.
         """
-        traction = self.grip.wheel_friction_coefficient * self.wheel_load(climber, into_wall)
-        return _margin(traction, sqrt(drive * drive + lateral * lateral))
+        shifted = across * self.grip.centre_height / (2 * climber.half_track)
+        right, left = load / 2 - shifted, load / 2 + shifted
+        return clipped(right, 0.0, load), clipped(left, 0.0, load)
+
+    def slip_margin(
+        self, climber: Climber, into_wall: Any, forces: tuple[Any, Any], lateral: Any, across: Any
+    ) -> Any:
+        """Least μ_w N / √(F² + L²) of a wheel (...): below 1 it slips; at most `MAX_MARGIN`.
+
+        `forces` (...) [N] are what the right and the left wheel pass on along the climber,
+        `lateral` (...) [N] both across it, each by its load; `across` as for `wheel_loads`.
+        """
+        load, friction = self.wheel_load(climber, into_wall), self.grip.wheel_friction_coefficient
+        margins = []
+        for side, force in zip(self.wheel_loads(climber, load, across), forces, strict=True):
+            share = lateral * side / select(load > 0, load, 1.0)
+            margins.append(_margin(friction * side, sqrt(force * force + share * share)))
+        right, left = margins
+        return select(right < left, right, left)
 
     def tip_margin(self, climber: Climber, into_wall: Any, along_wall: Any) -> Any:
         """Holding moment by tipping moment about the lower edge (...): below 1 the climber tips.

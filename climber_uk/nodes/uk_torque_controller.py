@@ -280,15 +280,14 @@ class UkTorqueController(ManagedNode):
     def add_margins(self, answer: Answer, motion: Motion) -> None:
         """Add the slip margin under an answer's torques, and the tip margin."""
         climber, attachment = self.controller.law.climber, self.attachment
-        drive, _ = climber.wrench(*answer.wheels)
-        if answer.command is not None:
-            lateral = answer.command.lateral
-        else:
-            lateral = climber.weight_along_wall * motion.cosine
+        right, left = answer.wheels
+        forces = right / climber.wheel_radius, left / climber.wheel_radius
+        across = -climber.weight_along_wall * motion.cosine
+        lateral = -across if answer.command is None else answer.command.lateral
         into_wall = climber.gravity_into_wall
         along_wall = climber.weight_along_wall / climber.mass
         self.margins.take(
-            attachment.slip_margin(climber, into_wall, drive, lateral),
+            attachment.slip_margin(climber, into_wall, forces, lateral, across),
             attachment.tip_margin(climber, into_wall, along_wall),
             attachment.wheel_load(climber, into_wall),
             answer.stamp,

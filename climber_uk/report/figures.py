@@ -7,6 +7,7 @@ from io import BytesIO
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from climber_uk.bags.connection import one_line
@@ -16,6 +17,7 @@ from climber_uk.bags.time_series import TimeSeries
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 from climber_uk.messages import topics
+from climber_uk.report.grip import draw_grip, grip_asked
 from climber_uk.report.plotting import plt
 
 Curves = tuple[Array, Array]  # times (n,) [s] and values (n, k)
@@ -51,6 +53,9 @@ def _figures(runs: Runs) -> Iterable[tuple[str, Figure]]:
         drawn = [(of, curves(run)) for of, run in runs]
         if any(np.isfinite(values).any() for _, (_, values) in drawn):
             yield name, _curves(title, labels, drawn)
+    asked = [(name, grip_asked(run)) for name, run in runs]
+    if any(len(shares) for _, shares in asked):
+        yield "grip", _grip(asked)
     if any(run.modes for _, run in runs):
         yield "modes", _modes(runs)
 
@@ -78,6 +83,20 @@ def _path(runs: Runs) -> Figure:
     for marker, meaning in (("o", "start"), ("s", "end")):
         axes.plot([], [], marker, color="0.4", label=meaning)
     axes.set(xlabel="x [m]", ylabel="y [m]", title="Path on the wall")
+    axes.set_aspect("equal", adjustable="datalim")
+    _legend(axes)
+    return figure
+
+
+def _grip(asked: Sequence[tuple[str, Array]]) -> Figure:
+    figure, axes = plt.subplots(figsize=(WIDTH, 4.5), layout="constrained")
+    axes.add_patch(Circle((0, 0), 1.0, facecolor="0.95", edgecolor="tab:red", zorder=1))
+    for label, shares in asked:
+        draw_grip(axes, label if len(asked) > 1 else "", shares)
+    axes.set(xlabel="across", ylabel="along the climber")
+    axes.set_title(
+        "What is asked of each wheel, as a share of its grip: outside the circle it slips"
+    )
     axes.set_aspect("equal", adjustable="datalim")
     _legend(axes)
     return figure

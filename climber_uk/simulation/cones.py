@@ -3,7 +3,8 @@
     ν⁺ = ν + M⁻¹ Σ Hᵢᵀ λᵢ,   |λᵢ| <= Lᵢ,   λᵢ = -Lᵢ sᵢ/|sᵢ| where sᵢ = Hᵢ ν⁺ is not 0
 
 ν⁺ minimises ½ (ν⁺ - ν)ᵀ M (ν⁺ - ν) + Σ Lᵢ |sᵢ|: it is unique, and has no more energy than ν. It is
-found contact by contact until nothing changes (block Gauss-Seidel), each contact exactly.
+found contact by contact until nothing changes (block Gauss-Seidel), each contact exactly. Many
+contacts on one body hinder each other there, so that these are left to Newton's method.
 """
 
 from typing import NamedTuple
@@ -14,6 +15,18 @@ from climber_uk.mechanics import Array
 
 MAX_SWEEPS = 5000  # a few suffice, unless contacts only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
+FEW = 4  # contacts, for which sweeps alone are faster
+NEAR = (
+    1e-2,
+    1e-4,
+    1e-6,
+    1e-8,
+    1e-10,
+    1e-12,
+)  # [m/s] of sliding, below which friction is taken for viscous
+STICKING = 100.0  # times the smallest of these
+MAX_STEPS = 60  # of Newton's method, with each of these
+ROUNDING = 1e-14  # of the minimised function
 SMALLEST = 1e-90  # [N s] of an impulse, below which it counts as 0: its cube still is a number
 
 
@@ -31,6 +44,8 @@ def solve_friction_impulses(
 
     And for each cone whether its contact sticks.
     """
+    if len(cones) > FEW and lightness.all():
+        return _by_newton(velocity, 1 / lightness, cones)
     velocity = velocity.copy()
     impulses: list[Array] = [np.zeros(len(cone.rows)) for cone in cones]
     per_impulse = [lightness[:, None] * cone.rows.T for cone in cones]  # M⁻¹ Hᵀ
@@ -52,6 +67,39 @@ def solve_friction_impulses(
         for impulse, cone in zip(impulses, cones, strict=True)
     ]
     return velocity, sticks
+
+
+def _by_newton(velocity: Array, masses: Array, cones: list[Cone]) -> tuple[Array, list[bool]]:
+    """The same, with √(s² + ε²) in the place of |s| and an ε that shrinks: see `NEAR`."""
+    limits = np.array([cone.limit for cone in cones])
+    lengths = [len(cone.rows) for cone in cones]
+    rows = np.concatenate([cone.rows for cone in cones])
+    owner = np.repeat(range(len(cones)), lengths)  # of each row
+
+    def sliding(of: Array, near: float) -> tuple[Array, Array, float]:
+        s, change = rows @ of, of - velocity
+        size = np.sqrt(np.bincount(owner, s * s) + near**2)
+        return s, size, float(change * masses @ change / 2 + limits @ size)
+
+    found = velocity
+    for near in NEAR:
+        s, size, height = sliding(found, near)
+        for _ in range(MAX_STEPS):
+            pull = (limits / size)[owner]  # impulse per sliding
+            slope = masses * (found - velocity) + rows.T @ (pull * s)
+            turned = np.zeros((len(cones), len(velocity)))
+            np.add.at(turned, owner, s[:, None] * rows)
+            curvature = np.diag(masses) + rows.T @ (pull[:, None] * rows)
+            curvature -= turned.T @ ((limits / size**3)[:, None] * turned)
+            step = 2 * np.linalg.solve(curvature, slope)
+            lower = np.inf
+            while lower > height + ROUNDING * abs(height) and np.abs(step).max() > UNCHANGED / 2:
+                step /= 2
+                s, size, lower = sliding(found - step, near)
+            found, height = found - step, lower
+            if np.abs(step).max() <= UNCHANGED + near / 1e6:
+                break
+    return found, (size < STICKING * NEAR[-1]).tolist()
 
 
 def impulse_against(sliding: Array, yielding: Array, limit: float) -> Array:

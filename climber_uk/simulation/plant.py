@@ -100,8 +100,11 @@ class Plant:
         y = np.concatenate([state.pose, state.velocity])
         into, along = self._body.gravity(y)
         lateral = self._body.lateral(y, inputs, climber.mass)
+        yaw_force = inputs.moment / climber.half_track
+        forces = (inputs.force + yaw_force) / 2, (inputs.force - yaw_force) / 2
+        across = self._body.across(y, inputs)
         return (
-            float(self.contact.slip_margin(climber, into, inputs.force, lateral)),
+            float(self.contact.slip_margin(climber, into, forces, lateral, across)),
             float(self.contact.tip_margin(climber, into, along)),
         )
 
@@ -130,7 +133,8 @@ class Plant:
 
     def _step(self, y: Array, slip: Array, inputs: Inputs) -> tuple[Array, Array]:
         """(y, rims' slip) after a step, implicit if a contact may change in it."""
-        end = None if slip.any() else self._regular_step(y, inputs)
+        is_regular = not (slip.any() or (self.slip and self._sliding.scrubs))
+        end = self._regular_step(y, inputs) if is_regular else None
         if end is not None:
             return end, slip
         return self._sliding.advance(y, slip, inputs, self._load(y))

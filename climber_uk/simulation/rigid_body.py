@@ -80,13 +80,13 @@ class RigidBody:
 
     def lateral(self, y: Array, inputs: Inputs, mass: float) -> float:
         """Lateral reaction, to the left, that keeps `mass` [kg] from slipping sideways [N]."""
+        return mass * forward_speed(y) * float(y[5]) - self.across(y, inputs)
+
+    def across(self, y: Array, inputs: Inputs) -> float:
+        """What of weight and push pulls to the left [N]."""
         _, height, heading, *_ = y.tolist()
         f_x, f_y = self.outside(height, inputs)
-        return (
-            mass * forward_speed(y) * float(y[5])
-            + f_x * math.sin(heading)
-            - f_y * math.cos(heading)
-        )
+        return float(f_y * math.cos(heading) - f_x * math.sin(heading))
 
     def gravity(self, y: Array) -> tuple[float, float]:
         """g_n into the wall, with the centripetal part of a curved one, and g_t along it [m/s²]."""

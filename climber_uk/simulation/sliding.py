@@ -18,7 +18,7 @@ from climber_uk.simulation.cones import Cone, solve_friction_impulses
 from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import RigidBody, forward_speed
 
-PARTS = 8  # of a step
+PARTS, PARTS_SCRUBBING = 8, 2  # of a step; where wheels scrub, the motion is smooth
 STUCK = 1e-10  # [m/s] of sliding that the iteration may leave where a contact sticks
 
 
@@ -58,20 +58,24 @@ class ContactStepper:
     ) -> bool:
         """Whether wheels that share `load` [N] can go on rolling, with v̇ [m/s²] and ω̇ [rad/s²]."""
         d, (v_1, omega_1) = self.body.climber.half_track, accelerations
-        most = self.body.contact.grip.wheel_friction_coefficient * load / 2
+        contact, across = self.body.contact, self.body.across(y, inputs)
         right = (inputs.force + inputs.moment / d) / 2 - self.rim * (v_1 + d * omega_1)
         left = (inputs.force - inputs.moment / d) / 2 - self.rim * (v_1 - d * omega_1)
-        if max(abs(right), abs(left)) > most:
-            return False
-        sideways = math.sqrt(most**2 - right**2) + math.sqrt(most**2 - left**2)
+        sideways = 0.0
+        loads = contact.wheel_loads(self.body.climber, load, across)
+        for side, force in zip(loads, (right, left), strict=True):
+            most = contact.grip.wheel_friction_coefficient * side
+            if abs(force) > most:
+                return False
+            sideways += math.sqrt(most**2 - force**2)
         return abs(self.body.lateral(y, inputs, self.mass)) <= sideways
 
     def advance(self, y: Array, slip: Array, inputs: Inputs, load: float) -> tuple[Array, Array]:
         """(y, slip (2,) of the rims [m/s]) after a step, with `load` [N] on the wheels."""
-        caught = False
-        for _ in range(PARTS):
+        caught, parts = False, PARTS_SCRUBBING if self.scrubs else PARTS
+        for _ in range(parts):
             before = y
-            y, slip, caught = self._implicit_step(y, slip, inputs, load, self.body.step / PARTS)
+            y, slip, caught = self._implicit_step(y, slip, inputs, load, self.body.step / parts)
             if caught and (y == before).all():
                 break  # at rest, and nothing will change that in this step
         return self._rolling_on(y, slip) if caught else (y, slip)
@@ -104,7 +108,8 @@ class ContactStepper:
             free += h * np.array([inputs.force, 0.0, inputs.moment])
             lightness = 1 / (masses + h * drag)
             free[1] = lightness[1] = 0.0
-        cones = self._cones(load, float(np.linalg.norm(sliding)), h)
+        cones = self._wheel_cones(h * load, h * pull, lightness) if self.slip else []
+        cones += self._other_cones(load, float(np.linalg.norm(sliding)), h)
         velocities, sticks = solve_friction_impulses(free * lightness, lightness, cones)
         v, u, omega = self._velocities(velocities[:3], sticks)
 
@@ -120,7 +125,10 @@ class ContactStepper:
         if not self.slip:
             return end, slip, False
         rolls = forward_speed(end)
-        caught = max(abs(s) for cone in cones[:2] for s in cone.rows @ velocities) < STUCK
+        feet = 2 * len(self.body.contact.locomotion.footholds)
+        caught = max(abs(s) for cone in cones[:feet] for s in cone.rows @ velocities) < STUCK
+        if caught and rolls == omega == 0:
+            return end, np.zeros(2), True
         return end, velocities[3:] - [rolls + d * omega, rolls - d * omega], caught
 
     @property
@@ -132,17 +140,10 @@ class ContactStepper:
         """Part of friction with an edge that goes with the speed [N s/m]."""
         return float(self.body.contact.friction.drag(self.body.friction))
 
-    def _cones(self, load: float, sliding: float, h: float) -> list[Cone]:
-        """Cones of the wheels, if they may slip, of the seal, and of the tracks' scrubbing."""
-        contact, d = self.body.contact, self.body.climber.half_track
-        cones, n = [], 5 if self.slip else 3
-        if self.slip:
-            most = h * contact.grip.wheel_friction_coefficient * load / 2
-            for side, rim in ((d, 3), (-d, 4)):
-                rows = np.zeros((2, n))
-                rows[0, [0, 2, rim]] = 1.0, side, -1.0
-                rows[1, 1] = 1.0
-                cones.append(Cone(rows, most))
+    def _other_cones(self, load: float, sliding: float, h: float) -> list[Cone]:
+        """Cones of the seal, and of what scrubs while wheels do not slip."""
+        contact, n = self.body.contact, 5 if self.slip else 3
+        cones = []
         if contact.friction.stiction(1.0) > 0:
             rows = np.eye(3, n)
             rows[2, 2] = self._radius
@@ -151,14 +152,49 @@ class ContactStepper:
             cones.append(Cone(rows, h * level))
         else:
             cones.append(Cone(np.eye(1, n), 0.0))
-        resistance = float(contact.locomotion.turning_resistance(load))
+        scrubs_here = self.slip and self.scrubs  # then the wheels' cones have it
+        resistance = 0.0 if scrubs_here else float(contact.locomotion.turning_resistance(load))
         cones.append(Cone(np.eye(1, n, 2), h * resistance))
+        return cones
+
+    @property
+    def scrubs(self) -> bool:
+        """Whether wheels stand ahead of or behind the axle."""
+        return any(self.body.contact.locomotion.footholds)
+
+    def _wheel_cones(self, load: float, pull: Array, lightness: Array) -> list[Cone]:
+        """Cones of the wheels under `load` [N s]; a side's wheels share one rim.
+
+        `pull` (3,) [N s] acts on the centre of mass: forward, to the left, about the vertical.
+        """
+        contact, climber = self.body.contact, self.body.climber
+        ahead, cones, d = contact.locomotion.footholds, list[Cone](), climber.half_track
+        along_pull, across_pull, _ = pull.tolist()
+        # what pulls forward loads what stands ahead
+        pitch = along_pull * contact.grip.centre_height / 2 / (sum(x * x for x in ahead) or 1.0)
+        sides = contact.wheel_loads(climber, load, across_pull)
+        along = contact.grip.wheel_friction_coefficient
+        across = 1.0  # friction to a side, as a share of that along
+        if self.scrubs and along > 0:
+            across = contact.locomotion.scrub_friction_coefficient / along
+        for side, rim, side_load in ((d, 3, sides[0]), (-d, 4, sides[1])):
+            for x in ahead:
+                foot_load = max(0.0, side_load / len(ahead) + pitch * x)
+                rows = np.zeros((2, 5))
+                rows[0, [0, 2, rim]] = 1.0, side, -1.0
+                rows[1, [1, 2]] = across, across * x
+                if x != 0:
+                    _, axes = np.linalg.eigh(rows * lightness @ rows.T)
+                    rows = axes.T @ rows
+                cones.append(Cone(rows, along * foot_load))
         return cones
 
     def _velocities(self, velocities: Array, sticks: list[bool]) -> tuple[float, float, float]:
         """(v, u, ω) of `velocities` (n,), exactly 0 where a contact sticks."""
         v, u, omega = velocities.tolist()
-        seal_sticks, yaw_sticks = sticks[-2:]
+        *wheels_stick, seal_sticks, yaw_sticks = sticks
+        if self.slip and self.scrubs:
+            yaw_sticks = all(wheels_stick)
         if seal_sticks and math.hypot(v, u, self._radius * omega) < STUCK:
             v, u, omega = 0.0, 0.0, 0.0 if self._radius > 0 else omega
         return v, u, 0.0 if yaw_sticks and abs(omega) < STUCK else omega

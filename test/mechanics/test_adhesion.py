@@ -69,9 +69,20 @@ def test_without_lag_the_pressure_is_the_pumps():
 
 
 def test_the_slip_margin_is_that_by_hand():
-    # 0.8 · 79.5 N / √(30² + 40²) N
-    assert HELD.slip_margin(PAPER, 0.0, 30.0, -40.0) == pytest.approx(1.272)
-    assert HELD.slip_margin(PAPER, 0.0, 0.0, 0.0) == MAX_MARGIN
+    # 0.8 · 39.75 N / √(15² + 20²) N of each wheel
+    assert HELD.slip_margin(PAPER, 0.0, (15.0, 15.0), -40.0, 0.0) == pytest.approx(1.272)
+    assert HELD.slip_margin(PAPER, 0.0, (0.0, 0.0), 0.0, 0.0) == MAX_MARGIN
+
+
+def test_it_is_that_of_the_wheel_that_is_asked_for_more_or_bears_less():
+    # 0.8 · 39.75 N / 60 N, however both add up
+    for forces in ((60.0, -60.0), (-5.0, 60.0)):
+        assert HELD.slip_margin(PAPER, 0.0, forces, 0.0, 0.0) == pytest.approx(0.53)
+    # weight to the right: 49.05 N · 0.05 m / 0.6 m go from the left wheel to the right one
+    right, left = HELD.wheel_loads(PAPER, 79.5, -49.05)
+    assert (right, left) == pytest.approx((39.75 + 4.0875, 39.75 - 4.0875))
+    assert HELD.slip_margin(PAPER, 0.0, (20.0, 20.0), 0.0, -49.05) == pytest.approx(0.04 * left)
+    assert HELD.wheel_loads(PAPER, 6.0, 49.05) == (0.0, 6.0)  # none pulls at the wall
 
 
 def test_the_tip_margin_is_that_by_hand_and_one_at_the_critical_pressure():
@@ -85,7 +96,7 @@ def test_the_tip_margin_is_that_by_hand_and_one_at_the_critical_pressure():
 
 def test_a_margin_of_nothing_held_is_below_one():
     loose = replace(PAPER, suction_pressure=0.0)
-    assert HELD.slip_margin(loose, 0.0, 1.0, 0.0) == 0
+    assert HELD.slip_margin(loose, 0.0, (1.0, 1.0), 0.0, 0.0) == 0
     assert HELD.tip_margin(loose, -GRAVITY, 1.0) < 0
     assert (
         HELD.tip_margin(loose, -GRAVITY, 0.0) == -MAX_MARGIN
@@ -99,12 +110,14 @@ def test_a_margin_of_nothing_held_is_below_one():
 
 def test_margins_of_many_are_those_of_each():
     random = np.random.default_rng(1)
-    into, drive, lateral = random.normal(size=(3, 4, 5)) * 50
-    slip, tip = HELD.slip_margin(PAPER, into, drive, lateral), HELD.tip_margin(PAPER, into, drive)
+    into, right, left, lateral, across = many = random.normal(size=(5, 4, 5)) * 50
+    slip = HELD.slip_margin(PAPER, into, (right, left), lateral, across)
+    tip = HELD.tip_margin(PAPER, into, right)
     for i in np.ndindex(4, 5):
-        alone = float(into[i]), float(drive[i]), float(lateral[i])
-        assert slip[i] == pytest.approx(HELD.slip_margin(PAPER, *alone))
-        assert tip[i] == pytest.approx(HELD.tip_margin(PAPER, alone[0], alone[1]))
+        into, right, left, lateral, across = many[:, *i].tolist()
+        alone = HELD.slip_margin(PAPER, into, (right, left), lateral, across)
+        assert slip[i] == pytest.approx(alone)
+        assert tip[i] == pytest.approx(HELD.tip_margin(PAPER, into, right))
 
 
 @pytest.mark.parametrize("name", ADHESION)

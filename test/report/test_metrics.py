@@ -11,7 +11,10 @@ from climber_uk.bags.events import is_fault
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.topics import Topics
 from climber_uk.control.safety import Mode
+from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import GRAVITY, Climber
+from climber_uk.report.figures import draw
+from climber_uk.report.grip import grip_asked
 from climber_uk.report.metrics import GROUPS, METRICS, Case, evaluate
 from climber_uk.report.page import page
 from climber_uk.report.tables import Column, text
@@ -165,6 +168,26 @@ def test_margins_are_the_lowest_and_the_share_below_one(tmp_path):
     made.add_vectors("uk_torque_controller/margins", [[0.1, 1, 10]])  # an estimate
     got = metrics_of(made, tmp_path)
     same(got, lowest_slip_margin=0.5, slip_share=25.0, lowest_tip_margin=6, lowest_wheel_load=80)
+
+
+def test_the_grip_that_is_asked_of_each_wheel_is_that_by_hand(tmp_path):
+    """The norm of the share is 1 over the slip margin, without which nothing is drawn."""
+    made = Made(torques=lambda time, _: np.tile([0.4, -0.2], (len(time), 1)))
+    made.add_odometry()
+    made.add_torques()
+    made.add_forces(np.tile([7.0, 20.0, 1.0], (400, 1)))
+    made.add_parameters(**vars(Climber()))
+    (run,), _ = read_runs(made.write(tmp_path / "bare"), Topics())
+    assert not len(grip_asked(run))
+    made.add_vectors("plant_simulator/margins", np.tile([1.0, 7.0, 79.5], (400, 1)).tolist())
+    (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    asked, held = grip_asked(run), Attachment()
+    assert asked.shape == (400, 2, 2)
+    for (right, left), heading in zip(asked[::50], made.pose[::50, 2], strict=True):
+        across, forces = -49.05 * np.cos(heading), (0.4 / 0.027, -0.2 / 0.027)
+        margin = held.slip_margin(Climber(), 0.0, forces, 20.0, across)
+        assert 1 / max(np.hypot(*right), np.hypot(*left)) == pytest.approx(margin, rel=1e-3)
+    assert "grip" in draw([("", run)])
 
 
 def test_latency_and_its_jitter_are_those_by_hand(tmp_path):

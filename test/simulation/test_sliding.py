@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 from climber_uk.mechanics.adhesion import Grip, Magnetic, NoAdhesion
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import Contact, Tracked, Wheeled
+from climber_uk.mechanics.contact import Contact, FourWheeled, Tracked, Wheeled
 from climber_uk.mechanics.friction import FRICTION
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.wall import Plane
@@ -81,7 +81,7 @@ def test_a_climber_without_traction_slides_down_sideways_and_a_dry_one_does_not(
     st.integers(0, 2**32 - 1),
     st.sampled_from(["coulomb", "viscous", "stribeck"]),
     st.sampled_from([0.0, 0.1]),
-    st.sampled_from([Wheeled(), Tracked()]),
+    st.sampled_from([Wheeled(), FourWheeled(), Tracked()]),
 )
 def test_a_part_of_a_step_takes_no_more_energy_than_the_motors_give(seed, law, radius, locomotion):
     random = np.random.default_rng(seed)
@@ -172,6 +172,90 @@ def test_turning_on_the_spot_a_ring_lets_the_climber_sink():
         state = plant.advance(state, np.zeros(2), steps=1)
     ratio = 49.05 / PAPER.seal_friction
     assert state.velocity[1] == pytest.approx(-0.3 * ratio / np.sqrt(1 - ratio**2), rel=0.05)
+
+
+BUILT = Climber(
+    suction_pressure=8000.0, wheel_load_share=0.8, seal_friction_coefficient=0.6
+)  # as config/climber.yaml
+SCRUBBING = [FourWheeled(), Tracked(scrub_friction_coefficient=0.8)]
+
+
+def turned(plant, seconds):
+    """A climber that is made to turn at 0.4 rad/s and drive at 0.2 m/s, at its end."""
+    state, climber = State(np.zeros(3), np.zeros(3)), plant.climber
+    for _ in range(round(seconds / plant.step)):
+        moment = 33.0 + 50.0 * (0.4 - state.yaw_rate)
+        drive = 57.6 + 200.0 * (0.2 - state.forward_speed) + 49.05 * np.sin(state.heading)
+        state = plant.advance(state, climber.wheel_torques(drive, moment), steps=1)
+    return state, climber.wheel_torques(drive, moment)
+
+
+@pytest.mark.parametrize("locomotion", SCRUBBING)
+def test_what_scrubs_sags_on_a_wall_while_it_turns_and_not_on_a_floor(locomotion):
+    contact = Contact(locomotion=locomotion)
+    slips = [
+        abs(turned(Plant(climber, 0.0025, contact, slip=True), 0.5)[0].side_slip)
+        for climber in (BUILT, replace(BUILT, inclination=0.0))
+    ]
+    assert slips[0] > 0.02 > 0.004 > slips[1]
+
+
+@pytest.mark.parametrize("locomotion", SCRUBBING)
+def test_its_sag_is_that_of_the_equations_of_sliding_wheels(locomotion):
+    """Five equations of smooth motion, in which every wheel slides, integrated apart."""
+    plant = Plant(BUILT, 0.0025, Contact(locomotion=locomotion), slip=True)
+    start, torques = turned(plant, 0.5)
+    end = plant.advance(start, torques, steps=40)
+    climber, rows = BUILT, []
+    for side, rim in ((0.3, 3), (-0.3, 4)):
+        for x in locomotion.footholds:
+            rows += [(side, rim, x)]
+
+    def rates(_, y):
+        v, u, omega, *rims, heading = y
+        pull = -49.05 * np.array([np.sin(heading), np.cos(heading)])
+        seal = climber.seal_friction * np.array([v, u]) / np.hypot(v, u)
+        force = np.array([*(pull - seal), 0.0])
+        at_rims = torques / 0.027
+        for side, rim, x in rows:
+            lever = 0.05 * pull[1] / 0.6 * (-1 if side > 0 else 1)
+            pitch = 0.05 * pull[0] * x / 2 / sum(f * f for f in locomotion.footholds)
+            load = (384.0 / 2 + lever) / len(locomotion.footholds) + pitch
+            s = np.array([v + side * omega - rims[rim - 3], u + x * omega])
+            f = -0.8 * load * s / np.hypot(*s)
+            force += [f[0], f[1], side * f[0] + x * f[1]]
+            at_rims[rim - 3] -= f[0]
+        mass, inertia = 5 - 2 * RIM, 0.33 - 2 * RIM * 0.09
+        turning = omega * np.array([u, -v])
+        return [*(force[:2] / mass + turning), force[2] / inertia, *(at_rims / RIM), omega]
+
+    d = 0.3 * start.yaw_rate * np.array([1, -1])
+    rims = start.slip + start.forward_speed + d
+    y = [start.forward_speed, start.side_slip, start.yaw_rate, *rims, start.heading]
+    v, u, omega, *_ = solve_ivp(rates, (0, 0.1), y, "LSODA", rtol=1e-9, atol=1e-12).y[:, -1]
+    assert end.forward_speed == pytest.approx(v, rel=0.01)
+    assert end.side_slip == pytest.approx(u, rel=0.03)
+    assert end.yaw_rate == pytest.approx(omega, rel=0.01)
+
+
+@pytest.mark.parametrize("locomotion", SCRUBBING)
+def test_at_rest_it_holds_until_the_torques_beat_its_scrubbing(locomotion):
+    contact = Contact(locomotion=locomotion, adhesion=Magnetic(400.0))
+    plant, start = Plant(BUILT, 0.0025, contact, slip=True), State(np.zeros(3), np.zeros(3))
+    resistance = locomotion.turning_resistance(400.0)
+    for part, turns in ((0.5, False), (1.1, True)):
+        end = plant.advance(start, BUILT.wheel_torques(0.0, part * resistance), steps=40)
+        assert bool(end.velocity.any()) == turns
+
+
+def test_a_wheel_slips_where_its_own_margin_is_below_1():
+    weak = replace(BUILT, suction_pressure=5000.0)
+    plant, start = Plant(weak, 0.0025, slip=True), State(np.zeros(3), np.zeros(3))
+    for torque, slips in ((2.4, False), (2.9, True)):
+        torques = np.array([torque, -torque])
+        margin, _ = plant.margins(start, torques)
+        assert (margin < 1) == slips
+        assert plant.advance(start, torques, steps=1).slip.any() == slips
 
 
 UPRIGHT = State(np.array([0.0, 6.0, np.pi / 2]), np.zeros(3))
