@@ -64,9 +64,10 @@ def runs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper_bags(runs):
+    """The whole, and its first 8 s again."""
     bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
-    for bag in bags:
-        demo(runs, bag.parent, "paper.yaml")
+    for bag, how_long in zip(bags, [[], ["--duration", "8"]], strict=True):
+        demo(runs, bag.parent, "paper.yaml", *how_long)
         hold_up_the_recorder(runs)
         finished(runs)
     return bags
@@ -98,7 +99,7 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
     }.items():
         first, second = (by_stamp(bag, topic, content) for bag in bags)
         common = sorted(first.keys() & second.keys())
-        assert len(common) >= 4000
+        assert len(common) >= 1600
         assert all(first[stamp] == second[stamp] for stamp in common)
 
 
@@ -122,7 +123,7 @@ def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_ba
         for modes in numbers["modes"].values():
             assert modes[-1][1] == "following"
     file = CONFIG / "paper.yaml"
-    assert not replay(paper_bags[0], "--params", file, "--fail-above", "1e-9")["changed"]
+    assert not replay(paper_bags[1], "--params", file, "--fail-above", "1e-9")["changed"]
 
 
 def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_learnt(
@@ -131,11 +132,11 @@ def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_le
     """By hand: r Δf / 2 a wheel, Δf = (1 - k) Δμ P S; the observer finds it with 100/s."""
     more, observer = "seal_friction_coefficient:=0.9", "observer.bandwidth:=0.0"
     by_hand = 0.027 / 2 * 0.47 * 0.1 * 2500 * 0.06
-    numbers = replay(paper_bags[0], "-p", more, "-p", observer)
+    numbers = replay(paper_bags[1], "-p", more, "-p", observer)
     assert numbers["changed"]["seal_friction_coefficient"] == [0.8, 0.9]
     wheels = numbers["wheels"]
     assert wheels["difference, RMS [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
-    wheels = replay(paper_bags[0], "-p", more)["wheels"]
+    wheels = replay(paper_bags[1], "-p", more)["wheels"]
     assert wheels["difference, largest [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
     assert wheels["largest at [s]"] == [0.0, 0.0]
     assert max(wheels["difference, RMS [N m]"]) < by_hand / 20

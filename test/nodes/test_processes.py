@@ -79,8 +79,11 @@ def gone(world, pids):
     world.wait(lambda: not any(map(parent_of, pids)), "end of all processes")
 
 
-@pytest.mark.parametrize("by_another", [False, True], ids=["alone", "under make"])
-@pytest.mark.parametrize("end", [interrupt_twice, close_the_terminal, kill])
+@pytest.mark.parametrize(
+    ("end", "by_another"),
+    [(kill, False), (kill, True), (interrupt_twice, True), (close_the_terminal, False)],
+    ids=["kill-alone", "kill-under make", "interrupt_twice-under make", "close_the_terminal-alone"],
+)
 def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(
     world, start, tmp_path, end, by_another
 ):
