@@ -75,6 +75,12 @@ def start(world):
         process.stdout.close()
 
 
+def is_under_way(process):
+    """Wait for its progress."""
+    while (said := process.stdout.read(1)) != "×":
+        assert said
+
+
 def gone(world, pids):
     world.wait(lambda: not any(map(parent_of, pids)), "end of all processes")
 
@@ -89,7 +95,7 @@ def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(
 ):
     command = [executable("run_demo"), *DEMO, tmp_path / "run"]
     process = start(*PARENT, *command, "--with-parent") if by_another else start(*command)
-    world.wait(lambda: process.stdout.read(1) == "×", "progress")
+    is_under_way(process)
     family = descendants(process.pid)
     assert len(family) == 4 + by_another
     end(process)
@@ -113,7 +119,7 @@ def test_a_demo_does_not_wait_long_for_a_node_that_does_not_end_once_it_is_told_
     world, start, tmp_path
 ):
     process = start(executable("run_demo"), *DEMO, tmp_path / "run")
-    world.wait(lambda: process.stdout.read(1) == "×", "progress")
+    is_under_way(process)
     family = descendants(process.pid)
     for pid in family:
         os.kill(pid, signal.SIGSTOP)
