@@ -47,9 +47,9 @@ lint: $(SET_UP)
 	$(BIN)/ruff check
 	$(BIN)/mypy
 
-# Three processes for two cores, as tests of nodes mostly wait; each has a ROS domain for each test.
-# They begin with a third of the tests each, in their order; whichever is ready first helps another.
-TESTS := -m pytest --numprocesses 3 --dist worksteal
+# Four processes for two cores, as tests of nodes often wait; each has a ROS domain for each test.
+# They begin with a quarter of the tests each, in their order; one that is ready helps another.
+TESTS := -m pytest --numprocesses 4 --dist worksteal
 # Of many hundred processes each would compile the package again
 KEEPING_BYTECODE := env -u PYTHONDONTWRITEBYTECODE
 

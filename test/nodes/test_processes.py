@@ -109,7 +109,7 @@ def test_a_demo_that_is_ended_before_it_began_leaves_nothing(world, start, tmp_p
     process = start(executable("run_demo"), *DEMO, tmp_path / "run")
     world.wait(lambda: len(family := descendants(process.pid)) == 4 and family, "the nodes")
     family = descendants(process.pid)
-    interrupt_twice(process)
+    process.terminate()
     assert process.communicate(timeout=TIMEOUT)[0].splitlines()[-1] == "run_demo: interrupted"
     gone(world, family)
     assert not (tmp_path / "run").exists()
