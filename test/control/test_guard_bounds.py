@@ -107,3 +107,87 @@ def test_friction_that_lets_go_is_forgiven_for_a_moment_after_rest_only():
         assert climb.periods_until(Mode.TOO_FAST, speed=within) == 11  # the second after 0.182 s
         climb.finds(speed=rest)
         assert climb.periods_until(Mode.TOO_FAST, speed=beyond) == 2
+
+
+LARGEST = 4.0 / CLIMBER.wheel_radius  # [N] of a wheel's torque
+UNCHECKED = {"speed_margin": 0.0, "yaw_rate_margin": 0.0, "stall_time": 0.0, "max_disturbance": 0.0}
+
+
+def found_of_wheels(asked, acted, sines=(0.0, 0.0), speeds=(0.3, 0.3), periods=60):
+    """What is found where, in turns, these forces (right, left) [N] are asked for and these act.
+
+    In each period the climber comes to the next speed and heading (its sine), by whatever else it
+    takes beside its friction and weight, on both wheels alike.
+    """
+    guard = Guard(GuardOptions(**UNCHECKED), Suction())
+    mass, inertia, friction, weight = CLIMBER.inertial
+    nothing, allowed = Rates(0.0, 0.0), Rates(9.0, 9.0)
+    speed, turn = speeds[-1], 0.0
+    for number in range(periods):
+        now = number % 2
+        right, left = acted[now]
+        before = Motion(0.0, 0.0, 0.0, 1.0, sines[now - 1], speed, turn)
+        speed = speeds[now]
+        turn += PERIOD * LEVER / inertia * (right - left)
+        after = Motion(0.0, 0.0, 0.0, 1.0, sines[now], speed, turn)
+        # by hand, (11): what drives, both wheels together
+        drive = mass * (speed - before.speed) / PERIOD + weight * sines[now]
+        drive += friction if speed > 0 else -friction
+        assert drive == pytest.approx(right + left)
+        torques = Torques(*(CLIMBER.wheel_radius * force for force in asked[now]))
+        observed = Observed(before, after, PERIOD, [(torques, PERIOD)], Wrench(0.0, 0.0), REACTION)
+        found = guard.watch(CLIMBER, observed, Expected(nothing, allowed, waits=False))
+        if found:
+            return found
+    return None
+
+
+HELD = CLIMBER.seal_friction / 2  # [N] of friction on each wheel
+
+
+def beside(*forces):
+    """Forces in turns, and what friction takes of each wheel."""
+    return [(HELD + right, HELD + left) for right, left in forces]
+
+
+@pytest.mark.parametrize("side", [0, 1], ids=["right", "left"])
+@pytest.mark.parametrize(("share", "answers"), [(0.33, True), (0.28, False)])
+def test_a_wheel_answers_that_does_a_third_of_what_is_asked(side, share, answers):
+    """By hand: (1 - s)² > 5 s² for s < 0.309."""
+    asked, acted = ([0.0, 0.0], [0.0, 0.0]), ([0.0, 0.0], [0.0, 0.0])
+    for turn, force in enumerate((30.0, -30.0)):
+        asked[turn][side] = force
+        acted[turn][side] = share * force
+    speeds = [0.3 + sign * 0.5 * share * 30.0 * PERIOD / 5 for sign in (1, -1)]
+    found = found_of_wheels(asked, beside(*acted), speeds=speeds)
+    assert found is None if answers else found[0] is Mode.DEAD_WHEEL
+    if found:
+        assert found[1].startswith(f"the {('right', 'left')[side]} one")
+
+
+@pytest.mark.parametrize(("of_largest", "is_known"), [(0.11, False), (0.13, True)])
+def test_a_wheel_that_does_nothing_is_found_where_enough_is_asked_of_it(of_largest, is_known):
+    force = of_largest * LARGEST
+    found = found_of_wheels([(force, 0.0), (-force, 0.0)], beside((0.0, 0.0), (0.0, 0.0)))
+    assert (found is not None) == is_known
+
+
+def test_a_wheel_that_leaves_the_weight_to_the_other_is_found():
+    """It turns so that the weight pulls up and down in turns."""
+    weight = CLIMBER.weight_along_wall * 0.9
+    asked = [(weight / 2, weight), (-weight / 2, -weight)]
+    acted = beside((0.0, weight), (0.0, -weight))
+    found = found_of_wheels(asked, acted, sines=(0.9, -0.9))
+    assert found[0] is Mode.DEAD_WHEEL
+    assert found[1].startswith("the right one")
+
+
+def test_a_wheel_that_leaves_friction_to_the_other_is_found():
+    """It goes forth and back in turns."""
+    friction, inertia = CLIMBER.seal_friction, 5 * 2 * 0.05 / PERIOD  # [N]
+    both = friction + inertia
+    acted = [(0.0, both), (0.0, -both)]
+    asked = [(25.0, both), (-25.0, -both)]
+    found = found_of_wheels(asked, acted, speeds=(0.05, -0.05))
+    assert found[0] is Mode.DEAD_WHEEL
+    assert found[1].startswith("the right one")
