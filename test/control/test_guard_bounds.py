@@ -5,6 +5,7 @@ import pytest
 from climber_uk.control.estimator import Observed
 from climber_uk.control.guard import Expected, Guard, GuardOptions, Rates
 from climber_uk.control.safety import Mode
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Suction
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
@@ -110,18 +111,20 @@ def test_friction_that_lets_go_is_forgiven_for_a_moment_after_rest_only():
 
 
 LARGEST = 4.0 / CLIMBER.wheel_radius  # [N] of a wheel's torque
-UNCHECKED = {"speed_margin": 0.0, "yaw_rate_margin": 0.0, "stall_time": 0.0, "max_disturbance": 0.0}
+UNCHECKED = {"yaw_rate_margin": 0.0, "stall_time": 0.0, "max_disturbance": 0.0}
 
 
-def found_of_wheels(asked, acted, sines=(0.0, 0.0), speeds=(0.3, 0.3), periods=60):
+def found_of_wheels(
+    asked, acted, sines=(0.0, 0.0), speeds=(0.3, 0.3), periods=60, fast_from=60, guard=None
+):
     """What is found where, in turns, these forces (right, left) [N] are asked for and these act.
 
     In each period the climber comes to the next speed and heading (its sine), by whatever else it
-    takes beside its friction and weight, on both wheels alike.
+    takes beside its friction and weight, on both wheels alike. From a period on it is too fast.
     """
-    guard = Guard(GuardOptions(**UNCHECKED), Suction())
+    guard = guard or Guard(GuardOptions(**UNCHECKED), Suction())
     mass, inertia, friction, weight = CLIMBER.inertial
-    nothing, allowed = Rates(0.0, 0.0), Rates(9.0, 9.0)
+    nothing = Rates(0.0, 0.0)
     speed, turn = speeds[-1], 0.0
     for number in range(periods):
         now = number % 2
@@ -136,6 +139,7 @@ def found_of_wheels(asked, acted, sines=(0.0, 0.0), speeds=(0.3, 0.3), periods=6
         assert drive == pytest.approx(right + left)
         torques = Torques(*(CLIMBER.wheel_radius * force for force in asked[now]))
         observed = Observed(before, after, PERIOD, [(torques, PERIOD)], Wrench(0.0, 0.0), REACTION)
+        allowed = Rates(9.0 if number < fast_from else 0.1, 9.0)
         found = guard.watch(CLIMBER, observed, Expected(nothing, allowed, waits=False))
         if found:
             return found
@@ -191,3 +195,59 @@ def test_a_wheel_that_leaves_friction_to_the_other_is_found():
     found = found_of_wheels(asked, acted, speeds=(0.05, -0.05))
     assert found[0] is Mode.DEAD_WHEEL
     assert found[1].startswith("the right one")
+
+
+STRONG, DEAD = [(60.0, 0.0), (-60.0, 0.0)], beside((0.0, 0.0), (0.0, 0.0))
+
+
+@pytest.mark.parametrize(("periods", "is_known"), [(7, False), (8, True)])
+def test_a_wheel_has_its_time_to_answer(periods, is_known):
+    assert (found_of_wheels(STRONG, DEAD, periods=periods) is not None) == is_known
+
+
+def test_what_a_wheel_did_before_a_rest_is_forgotten():
+    guard = Guard(GuardOptions(**UNCHECKED), Suction())
+    assert found_of_wheels(STRONG, DEAD, periods=7, guard=guard) is None
+    standing = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    rests = Observed(standing, standing, PERIOD, [], Wrench(0.0, 0.0), REACTION)
+    guard.watch(CLIMBER, rests, Expected(Rates(0.0, 0.0), Rates(9.0, 9.0), waits=False))
+    assert found_of_wheels([(0.0, 0.0)] * 2, DEAD, periods=12, guard=guard) is None
+    assert found_of_wheels(STRONG, DEAD, guard=guard) is not None
+
+
+def test_what_holds_the_whole_climber_is_no_dead_wheel():
+    assert found_of_wheels([(60.0, 60.0), (-60.0, -60.0)], DEAD) is None
+
+
+@pytest.mark.parametrize("fast_from", [20, 60])
+def test_less_proof_is_needed_where_it_is_too_fast_as_well(fast_from):
+    force = 0.06 * LARGEST
+    found = found_of_wheels([(force, 0.0), (-force, 0.0)], DEAD, fast_from=fast_from)
+    assert (found and found[0]) == (Mode.DEAD_WHEEL if fast_from < 60 else None)
+
+
+def rest_that_heals(mode, turn=0.0):
+    """Seconds of a turn in place [rad/s] until a fault is over; None: not within 10 s."""
+    guard = Guard(GuardOptions(), Suction())
+    guard.count(SECOND, (mode, "what"))
+    motion = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, turn)
+    for number in range(1, 501):
+        guard.rest(CLIMBER, motion, PERIOD)
+        if guard.fault is None:
+            return number * PERIOD
+    return None
+
+
+@pytest.mark.parametrize(
+    ("mode", "turn", "seconds"),
+    [
+        (Mode.TOO_FAST, 0.0, 0.52),
+        (Mode.DISTURBED, -0.066, 0.52),
+        (Mode.DISTURBED, 0.067, None),  # a wheel's rim is at 0.02 m/s
+        (Mode.STALLED, 0.0, 5.0),
+        (Mode.DEAD_WHEEL, 0.0, None),  # somebody has to look
+        (Mode.SIGN_WRONG, 0.0, None),
+    ],
+)
+def test_a_fault_is_over_after_a_rest_but_for_some(mode, turn, seconds):
+    assert rest_that_heals(mode, turn) == (seconds and pytest.approx(seconds, abs=0.021))
