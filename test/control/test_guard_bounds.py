@@ -6,12 +6,11 @@ from climber_uk.control.estimator import Observed
 from climber_uk.control.guard import Expected, Guard, GuardOptions, Rates
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.adhesion import Suction
+from climber_uk.mechanics.adhesion import NoAdhesion, Suction
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 
 CLIMBER = Climber(max_wheel_torque=4.0)
-EXPLAINED = 2500 * 0.06 + 5 * GRAVITY  # [N] suction and weight
 LEVER = 0.3  # [m]
 PERIOD = 0.02  # [s]
 REACTION = 0.02  # [s]
@@ -21,8 +20,8 @@ LET_GO = CLIMBER.seal_friction / 5 * (REACTION + 0.012)  # [m/s]
 class Watched:
     """A guard of a climber that always does the same."""
 
-    def __init__(self):
-        self.guard = Guard(GuardOptions(), Suction())
+    def __init__(self, adhesion=None):
+        self.guard = Guard(GuardOptions(), adhesion or Suction())
 
     def finds(self, speed=0.1, turn=0.0, torques=(0.0, 0.0), disturbance=(0.0, 0.0), **expected):
         """What it finds in the next period."""
@@ -75,14 +74,17 @@ def test_a_stall_that_was_interrupted_counts_from_the_beginning():
 
 
 @pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("drive", "turn"), [(1.0, 0.0), (0.0, LEVER)], ids=["drive", "turn"])
 @pytest.mark.parametrize(
-    "most", [(EXPLAINED, 0.0), (0.0, LEVER * EXPLAINED)], ids=["drive", "turn"]
+    ("adhesion", "explained"), [(Suction(), 2500 * 0.06 + 5 * GRAVITY), (NoAdhesion(), 5 * GRAVITY)]
 )
-def test_a_disturbance_is_explained_by_adhesion_and_weight_up_to_their_size(most, sign):
-    drive, turn = most
-    more, less = 1.001 * sign, 0.999 * sign
-    assert Watched().finds(disturbance=(more * drive, more * turn)) is Mode.DISTURBED
-    assert Watched().finds(disturbance=(less * drive, less * turn)) is None
+def test_a_disturbance_is_explained_by_adhesion_and_weight_up_to_their_size(
+    adhesion, explained, drive, turn, sign
+):
+    more, less = 1.001 * sign * explained, 0.999 * sign * explained
+    climb = Watched(adhesion)
+    assert climb.finds(disturbance=(more * drive, more * turn)) is Mode.DISTURBED
+    assert climb.finds(disturbance=(less * drive, less * turn)) is None
 
 
 @pytest.mark.parametrize(
