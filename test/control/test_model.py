@@ -126,6 +126,55 @@ def test_an_observer_of_slow_or_late_odometry_is_slower(period, delay, poles):
     assert Observer().shares(period, delay) == pytest.approx((2 * new, new**2))
 
 
+def test_errors_of_the_observer_decay_with_both_poles_at_one_place_though_the_force_grows():
+    """With z = exp(-K T): (1 - z B)² e = 0, where B takes the error of a period before.
+
+    Learnt is the force of the next period.
+    """
+    h, rubs_nothing, observer = 0.005, Climber(seal_friction_coefficient=0.0, **FLOOR), Observer()
+    seen, learnt = State.rolling(np.zeros(3), 1.0, 0.3).motion, NOTHING
+    errors, true = [], Wrench(8.0, 1.0)
+    for _ in range(40):
+        expected = after(rubs_nothing, seen, STILL, learnt, h)
+        measured = after(rubs_nothing, seen, STILL, true, h)
+        shares = observer.shares(h, delay=0.0)
+        seen, learnt = observer.corrected(rubs_nothing, learnt, expected, measured, h, shares)
+        true = Wrench(true.force + 20.0 * h, true.moment - 3.0 * h)
+        errors.append((learnt.force - true.force, learnt.moment - true.moment))
+    decays = np.poly([np.exp(-14.0 * h)] * 2)
+    for of_one in np.array(errors).T:
+        np.testing.assert_allclose(np.convolve(of_one, decays, mode="valid"), 0, atol=1e-9)
+        assert abs(of_one[0]) > 0.5
+
+
+@pytest.mark.parametrize(("speed", "rate"), [(0.9e-3, 0.0), (1.1e-3, 6.0), (-1.1e-3, 6.0)])
+def test_a_force_that_grew_is_not_expected_to_at_rest(speed, rate):
+    expected = State.rolling(np.zeros(3), speed, 0.0).motion
+    learnt = DisturbanceEstimate(force_rate=6.0, moment_rate=2.0)
+    _, found = Observer().corrected(CLIMBER, learnt, expected, expected, 0.005, (0.1, 0.01))
+    assert (found.force_rate, found.moment_rate) == (rate, 2.0)
+
+
+def test_what_is_as_expected_changes_nothing_that_was_learnt():
+    rolling = State.rolling(np.zeros(3), 1.0, 0.0).motion
+    learnt = DisturbanceEstimate(9.0, 1.0, 0.0, 0.0, 3.0)
+    for source in ("odometry", "pose"):
+        observer = Observer(velocity_source=source)
+        _, found = observer.corrected(CLIMBER, learnt, rolling, rolling, 0.005, (0.1, 0.01), 1.0)
+        assert found == learnt
+    assert learnt._replace(force_rate=7.0, moment_rate=2.0).without_rates == learnt
+
+
+@pytest.mark.parametrize("source", ["odometry", "pose"])
+def test_an_observer_that_is_off_forgets_in_a_fifth_of_a_second(source):
+    observer = Observer(bandwidth=0.0, velocity_source=source)
+    rolling = State.rolling(np.zeros(3), 1.0, 0.0).motion
+    learnt = DisturbanceEstimate(9.0, 1.0, friction=3.0)
+    _, found = observer.corrected(CLIMBER, learnt, rolling, rolling, 0.2, (0.0, 0.0))
+    left = np.exp(-1)
+    assert found == pytest.approx((9.0 * left, left, 0.0, 0.0, 3.0 * left))
+
+
 def test_what_friction_holds_teaches_nothing():
     believed = Climber(seal_friction_coefficient=1.2)
     start = State(np.array([0.0, 0.0, np.pi / 2]), np.zeros(3))
