@@ -10,6 +10,8 @@ from contextlib import suppress
 
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+# more would only wait for each other, in each of many processes
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 with suppress(ImportError):
     import rclpy  # noqa: F401

@@ -112,8 +112,7 @@ def simulate(
         now = SECOND + round(step * link.step * SECOND)
         if step % every == 0:
             state = robot.state
-            error = np.array(tracking_error(state.pose, trajectory.at(step * link.step)))
-            rows.append([step * link.step, *state.pose, *state.velocity, *error, *robot.torques])
+            rows.append([step * link.step, *state.pose, *state.velocity, *robot.torques])
             if step > 0:
                 robot.measure()
             if random.random() >= link.loss:
@@ -133,8 +132,9 @@ def simulate(
         if current is not before:
             robot.take(link.parts(plant_of(current, link.step)))
         robot.advance(np.zeros(2) if acting is None else motors(robot.state, acting))
-    table = np.array(rows)
-    return Run(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], table[:, 10:12])
+    time, pose, velocity, torques = np.split(np.array(rows), (1, 4, 7), axis=1)
+    error = np.stack(tracking_error(pose, trajectory.at(time[:, 0])), axis=-1)
+    return Run(time[:, 0], pose, velocity, error, torques)
 
 
 def sampled(trajectory: Trajectory, duration: float) -> Preview:

@@ -7,6 +7,7 @@ found contact by contact until nothing changes (block Gauss-Seidel), each contac
 contacts on one body hinder each other there, so that these are left to Newton's method.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -50,16 +51,17 @@ def solve_friction_impulses(
     impulses: list[Array] = [np.zeros(len(cone.rows)) for cone in cones]
     per_impulse = [lightness[:, None] * cone.rows.T for cone in cones]  # M⁻¹ Hᵀ
     yielding = [(cone.rows**2) @ lightness for cone in cones]
+    moving = [np.where(W > 0, W, 1.0) for W in yielding]  # what cannot move does not slide
     enough = UNCHANGED * (1 + np.abs(velocity).max())
     for _ in range(MAX_SWEEPS):
         changed = 0.0
         for number, cone in enumerate(cones):
             without = cone.rows @ velocity - yielding[number] * impulses[number]
-            impulse = impulse_against(without, yielding[number], cone.limit)
+            impulse = impulse_against(without, moving[number], cone.limit)
             change = per_impulse[number] @ (impulse - impulses[number])
             velocity += change
             impulses[number] = impulse
-            changed = max(changed, float(np.abs(change).max()))
+            changed = max(changed, *map(abs, change.tolist()))
         if changed <= enough:
             break
     sticks = [
@@ -102,25 +104,24 @@ def _by_newton(velocity: Array, masses: Array, cones: list[Cone]) -> tuple[Array
     return found, (size < STICKING * NEAR[-1]).tolist()
 
 
-def impulse_against(sliding: Array, yielding: Array, limit: float) -> Array:
+def impulse_against(sliding: Array, W: Array, limit: float) -> Array:
     """Impulse λ (k,), |λ| <= `limit`, that stops a contact's `sliding` s (k,) or opposes the rest.
 
-    The rest is s + W λ with W = diag(yielding), and `yielding` (k,) is speed per impulse.
+    The rest is s + W λ, with the diagonal `W` (k,) of speed per impulse, > 0.
     λ = -s / (W + κ), with κ >= 0 such that |λ| is the limit, by Newton's method on 1/|λ|, which
     comes up to κ from below.
     """
     if limit < SMALLEST:
         return 0.0 * sliding
-    W = np.where(yielding > 0, yielding, 1.0)  # what cannot move does not slide
     kappa, impulse = 0.0, -sliding / W
-    size = float(np.linalg.norm(impulse))
+    size = math.sqrt(impulse @ impulse)
     if size <= limit:
         return impulse
     for _ in range(60):
         slope = float(impulse @ (impulse / (W + kappa)))
         kappa += size**2 / slope * (size - limit) / limit
         impulse = -sliding / (W + kappa)
-        size = float(np.linalg.norm(impulse))
+        size = math.sqrt(impulse @ impulse)
         if size <= limit * (1 + 1e-14):
             break
     return impulse * (limit / size)

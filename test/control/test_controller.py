@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from climbs import Climb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -426,3 +427,17 @@ def test_a_twist_is_compared_from_the_rest_after_a_fault_on(loop):
         assert loop.now - begin < SECOND
     moved = still.pose - loop.state(loop.now).pose
     assert Mode.TWIST_WRONG not in faster(loop, 0.4, 60, moved * [1, 1, 0])
+
+
+@pytest.mark.slow
+def test_the_whole_lap_of_climber_yaml_has_the_margin_that_its_file_tells():
+    climb = Climb().run(57.0)
+    margins = [
+        climb.plant.margins(state, torques)
+        for state, torques in zip(climb.states, climb.sent, strict=True)
+    ]
+    assert np.min(margins) > 2.8
+    assert climb.off_the_path() < 2e-3
+    assert climb.fastest(since=56.5) < 1e-9
+    place = climb.trajectory.at(57.0).pose
+    assert np.hypot(*(climb.state.pose - place)[:2]) < 5e-3

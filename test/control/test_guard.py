@@ -41,9 +41,16 @@ def dead(side, since):
     return motors
 
 
-@pytest.mark.parametrize("side", [0, 1], ids=["right", "left"])
-@pytest.mark.parametrize("scrubs", [False, True], ids=["two wheels", "scrubbing tracks"])
-@pytest.mark.parametrize("since", [1.0, 7.0, 13.0, 19.0])
+def deaths():
+    """When which motor dies, and on what; on tracks, which take long, in turns but for soak."""
+    for turn, since in enumerate((1.0, 7.0, 13.0, 19.0)):
+        for side, name in enumerate(("right", "left")):
+            yield pytest.param(since, False, side, id=f"{since}-two wheels-{name}")
+            marks = () if side == turn % 2 else pytest.mark.soak
+            yield pytest.param(since, True, side, id=f"{since}-tracks-{name}", marks=marks)
+
+
+@pytest.mark.parametrize(("since", "scrubs", "side"), deaths())
 def test_a_dead_motor_is_noticed_and_the_climber_comes_to_rest(side, scrubs, since):
     climb = deepcopy(healthy(scrubs, since))
     climb.run(3.0, motors=dead(side, since))

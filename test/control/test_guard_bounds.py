@@ -5,12 +5,12 @@ import pytest
 from climber_uk.control.estimator import Observed
 from climber_uk.control.guard import Expected, Guard, GuardOptions, Rates
 from climber_uk.control.safety import Mode
-from climber_uk.mechanics.adhesion import Suction
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.adhesion import NoAdhesion, Suction
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 
 CLIMBER = Climber(max_wheel_torque=4.0)
-EXPLAINED = 2500 * 0.06 + 5 * GRAVITY  # [N] suction and weight
 LEVER = 0.3  # [m]
 PERIOD = 0.02  # [s]
 REACTION = 0.02  # [s]
@@ -20,8 +20,8 @@ LET_GO = CLIMBER.seal_friction / 5 * (REACTION + 0.012)  # [m/s]
 class Watched:
     """A guard of a climber that always does the same."""
 
-    def __init__(self):
-        self.guard = Guard(GuardOptions(), Suction())
+    def __init__(self, adhesion=None):
+        self.guard = Guard(GuardOptions(), adhesion or Suction())
 
     def finds(self, speed=0.1, turn=0.0, torques=(0.0, 0.0), disturbance=(0.0, 0.0), **expected):
         """What it finds in the next period."""
@@ -74,14 +74,17 @@ def test_a_stall_that_was_interrupted_counts_from_the_beginning():
 
 
 @pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("drive", "turn"), [(1.0, 0.0), (0.0, LEVER)], ids=["drive", "turn"])
 @pytest.mark.parametrize(
-    "most", [(EXPLAINED, 0.0), (0.0, LEVER * EXPLAINED)], ids=["drive", "turn"]
+    ("adhesion", "explained"), [(Suction(), 2500 * 0.06 + 5 * GRAVITY), (NoAdhesion(), 5 * GRAVITY)]
 )
-def test_a_disturbance_is_explained_by_adhesion_and_weight_up_to_their_size(most, sign):
-    drive, turn = most
-    more, less = 1.001 * sign, 0.999 * sign
-    assert Watched().finds(disturbance=(more * drive, more * turn)) is Mode.DISTURBED
-    assert Watched().finds(disturbance=(less * drive, less * turn)) is None
+def test_a_disturbance_is_explained_by_adhesion_and_weight_up_to_their_size(
+    adhesion, explained, drive, turn, sign
+):
+    more, less = 1.001 * sign * explained, 0.999 * sign * explained
+    climb = Watched(adhesion)
+    assert climb.finds(disturbance=(more * drive, more * turn)) is Mode.DISTURBED
+    assert climb.finds(disturbance=(less * drive, less * turn)) is None
 
 
 @pytest.mark.parametrize(
@@ -107,3 +110,146 @@ def test_friction_that_lets_go_is_forgiven_for_a_moment_after_rest_only():
         assert climb.periods_until(Mode.TOO_FAST, speed=within) == 11  # the second after 0.182 s
         climb.finds(speed=rest)
         assert climb.periods_until(Mode.TOO_FAST, speed=beyond) == 2
+
+
+LARGEST = 4.0 / CLIMBER.wheel_radius  # [N] of a wheel's torque
+UNCHECKED = {"yaw_rate_margin": 0.0, "stall_time": 0.0, "max_disturbance": 0.0}
+
+
+def found_of_wheels(
+    asked, acted, sines=(0.0, 0.0), speeds=(0.3, 0.3), periods=60, fast_from=60, guard=None
+):
+    """What is found where, in turns, these forces (right, left) [N] are asked for and these act.
+
+    In each period the climber comes to the next speed and heading (its sine), by whatever else it
+    takes beside its friction and weight, on both wheels alike. From a period on it is too fast.
+    """
+    guard = guard or Guard(GuardOptions(**UNCHECKED), Suction())
+    mass, inertia, friction, weight = CLIMBER.inertial
+    nothing = Rates(0.0, 0.0)
+    speed, turn = speeds[-1], 0.0
+    for number in range(periods):
+        now = number % 2
+        right, left = acted[now]
+        before = Motion(0.0, 0.0, 0.0, 1.0, sines[now - 1], speed, turn)
+        speed = speeds[now]
+        turn += PERIOD * LEVER / inertia * (right - left)
+        after = Motion(0.0, 0.0, 0.0, 1.0, sines[now], speed, turn)
+        # by hand, (11): what drives, both wheels together
+        drive = mass * (speed - before.speed) / PERIOD + weight * sines[now]
+        drive += friction if speed > 0 else -friction
+        assert drive == pytest.approx(right + left)
+        torques = Torques(*(CLIMBER.wheel_radius * force for force in asked[now]))
+        observed = Observed(before, after, PERIOD, [(torques, PERIOD)], Wrench(0.0, 0.0), REACTION)
+        allowed = Rates(9.0 if number < fast_from else 0.1, 9.0)
+        found = guard.watch(CLIMBER, observed, Expected(nothing, allowed, waits=False))
+        if found:
+            return found
+    return None
+
+
+HELD = CLIMBER.seal_friction / 2  # [N] of friction on each wheel
+
+
+def beside(*forces):
+    """Forces in turns, and what friction takes of each wheel."""
+    return [(HELD + right, HELD + left) for right, left in forces]
+
+
+@pytest.mark.parametrize("side", [0, 1], ids=["right", "left"])
+@pytest.mark.parametrize(("share", "answers"), [(0.33, True), (0.28, False)])
+def test_a_wheel_answers_that_does_a_third_of_what_is_asked(side, share, answers):
+    """By hand: (1 - s)² > 5 s² for s < 0.309."""
+    asked, acted = ([0.0, 0.0], [0.0, 0.0]), ([0.0, 0.0], [0.0, 0.0])
+    for turn, force in enumerate((30.0, -30.0)):
+        asked[turn][side] = force
+        acted[turn][side] = share * force
+    speeds = [0.3 + sign * 0.5 * share * 30.0 * PERIOD / 5 for sign in (1, -1)]
+    found = found_of_wheels(asked, beside(*acted), speeds=speeds)
+    assert found is None if answers else found[0] is Mode.DEAD_WHEEL
+    if found:
+        assert found[1].startswith(f"the {('right', 'left')[side]} one")
+
+
+@pytest.mark.parametrize(("of_largest", "is_known"), [(0.11, False), (0.13, True)])
+def test_a_wheel_that_does_nothing_is_found_where_enough_is_asked_of_it(of_largest, is_known):
+    force = of_largest * LARGEST
+    found = found_of_wheels([(force, 0.0), (-force, 0.0)], beside((0.0, 0.0), (0.0, 0.0)))
+    assert (found is not None) == is_known
+
+
+def test_a_wheel_that_leaves_the_weight_to_the_other_is_found():
+    """It turns so that the weight pulls up and down in turns."""
+    weight = CLIMBER.weight_along_wall * 0.9
+    asked = [(weight / 2, weight), (-weight / 2, -weight)]
+    acted = beside((0.0, weight), (0.0, -weight))
+    found = found_of_wheels(asked, acted, sines=(0.9, -0.9))
+    assert found[0] is Mode.DEAD_WHEEL
+    assert found[1].startswith("the right one")
+
+
+def test_a_wheel_that_leaves_friction_to_the_other_is_found():
+    """It goes forth and back in turns."""
+    friction, inertia = CLIMBER.seal_friction, 5 * 2 * 0.05 / PERIOD  # [N]
+    both = friction + inertia
+    acted = [(0.0, both), (0.0, -both)]
+    asked = [(25.0, both), (-25.0, -both)]
+    found = found_of_wheels(asked, acted, speeds=(0.05, -0.05))
+    assert found[0] is Mode.DEAD_WHEEL
+    assert found[1].startswith("the right one")
+
+
+STRONG, DEAD = [(60.0, 0.0), (-60.0, 0.0)], beside((0.0, 0.0), (0.0, 0.0))
+
+
+@pytest.mark.parametrize(("periods", "is_known"), [(7, False), (8, True)])
+def test_a_wheel_has_its_time_to_answer(periods, is_known):
+    assert (found_of_wheels(STRONG, DEAD, periods=periods) is not None) == is_known
+
+
+def test_what_a_wheel_did_before_a_rest_is_forgotten():
+    guard = Guard(GuardOptions(**UNCHECKED), Suction())
+    assert found_of_wheels(STRONG, DEAD, periods=7, guard=guard) is None
+    standing = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    rests = Observed(standing, standing, PERIOD, [], Wrench(0.0, 0.0), REACTION)
+    guard.watch(CLIMBER, rests, Expected(Rates(0.0, 0.0), Rates(9.0, 9.0), waits=False))
+    assert found_of_wheels([(0.0, 0.0)] * 2, DEAD, periods=12, guard=guard) is None
+    assert found_of_wheels(STRONG, DEAD, guard=guard) is not None
+
+
+def test_what_holds_the_whole_climber_is_no_dead_wheel():
+    assert found_of_wheels([(60.0, 60.0), (-60.0, -60.0)], DEAD) is None
+
+
+@pytest.mark.parametrize("fast_from", [20, 60])
+def test_less_proof_is_needed_where_it_is_too_fast_as_well(fast_from):
+    force = 0.06 * LARGEST
+    found = found_of_wheels([(force, 0.0), (-force, 0.0)], DEAD, fast_from=fast_from)
+    assert (found and found[0]) == (Mode.DEAD_WHEEL if fast_from < 60 else None)
+
+
+def rest_that_heals(mode, turn=0.0):
+    """Seconds of a turn in place [rad/s] until a fault is over; None: not within 10 s."""
+    guard = Guard(GuardOptions(), Suction())
+    guard.count(SECOND, (mode, "what"))
+    motion = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, turn)
+    for number in range(1, 501):
+        guard.rest(CLIMBER, motion, PERIOD)
+        if guard.fault is None:
+            return number * PERIOD
+    return None
+
+
+@pytest.mark.parametrize(
+    ("mode", "turn", "seconds"),
+    [
+        (Mode.TOO_FAST, 0.0, 0.52),
+        (Mode.DISTURBED, -0.066, 0.52),
+        (Mode.DISTURBED, 0.067, None),  # a wheel's rim is at 0.02 m/s
+        (Mode.STALLED, 0.0, 5.0),
+        (Mode.DEAD_WHEEL, 0.0, None),  # somebody has to look
+        (Mode.SIGN_WRONG, 0.0, None),
+    ],
+)
+def test_a_fault_is_over_after_a_rest_but_for_some(mode, turn, seconds):
+    assert rest_that_heals(mode, turn) == (seconds and pytest.approx(seconds, abs=0.021))

@@ -1,14 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, predict
-from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import State, Torques, Wrench
 from climber_uk.simulation.plant import Plant
 
 CLIMBER = Climber()
+FLOOR = {"inclination": 0.0}
 STILL, NONE, NOTHING = Torques(0.0, 0.0), Wrench(0.0, 0.0), DisturbanceEstimate()
 
 
@@ -33,6 +36,41 @@ def test_the_model_rolls_as_the_plant_does(heading, v, omega, torques):
     np.testing.assert_allclose(got.velocity, expected.velocity, atol=4e3 * h**3)
 
 
+def test_heading_and_weight_are_those_of_the_middle():
+    """By hand: without friction, in 0.1 s at 2 rad/s, which grow by 2 rad/s²."""
+    slippery = replace(CLIMBER, seal_friction_coefficient=0.0)
+    start = State.rolling(np.zeros(3), 1.0, 2.0).motion
+    end = predict(slippery, start, 0.0, 2.0 * slippery.yaw_inertia, 0.1)
+    middle = 2.0 * 0.05 + 2.0 * 0.05**2 / 2
+    speed = 1.0 - GRAVITY * 0.1 * np.sin(middle)
+    way = 0.1 * (1.0 + speed) / 2
+    assert end.speed == pytest.approx(speed)
+    assert (end.x, end.y) == pytest.approx((way * np.cos(middle), way * np.sin(middle)))
+    assert (end.heading, end.yaw_rate) == pytest.approx((0.21, 2.2))
+
+
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_friction_beyond_the_models_brakes_as_well(speed):
+    climber = Climber(**FLOOR)
+    start = State.rolling(np.zeros(3), speed, 0.0).motion
+    end = predict(climber, start, 0.0, 0.0, 0.05, friction=10.0)
+    braking = (climber.seal_friction + 10.0) / climber.mass * 0.05
+    assert end.speed == pytest.approx(np.sign(speed) * (1.0 - braking))
+
+
+@pytest.mark.parametrize(
+    ("direction", "speed", "share"),
+    [
+        *((1, 0.3, 0.5), (-1, -0.3, 0.5), (1, 0.0, 0.5), (1, -0.9 * SLOW, 0.5)),
+        *((1, -1.1 * SLOW, 0.0), (-1, 1.1 * SLOW, 0.0), (0, 0.3, 0.0)),
+    ],
+)
+def test_half_of_a_change_is_friction_unless_it_slides_the_other_way(direction, speed, share):
+    force, friction = DisturbanceEstimate(5.0, friction=2.0).changed(CLIMBER, 8.0, direction, speed)
+    assert friction == pytest.approx(2.0 - share * direction * 8.0)
+    assert force - direction * friction == pytest.approx(5.0 + 8.0 - direction * 2.0)
+
+
 def test_at_rest_friction_holds_what_it_can_and_no_more():
     rest = State(np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)).motion
     assert after(CLIMBER, rest, STILL, NONE, 0.1).speed == 0
@@ -52,7 +90,6 @@ def learn(observer, true, believed, state, wheels, learnt=NOTHING, steps=200, h=
     return state, seen, learnt
 
 
-FLOOR = {"inclination": 0.0}
 SLIPPERY = Climber(seal_friction_coefficient=0.4, **FLOOR)
 
 
@@ -74,6 +111,68 @@ def test_without_a_twist_it_finds_friction_and_speeds_from_poses():
     assert found[0] == pytest.approx(less, abs=0.1)
     assert seen.speed == pytest.approx(state.forward_speed, abs=2e-3)
     assert seen.yaw_rate == pytest.approx(state.yaw_rate, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("period", "delay", "poles"),
+    [
+        (0.005, 0.0, 14.0),
+        (0.005, 0.02, 0.4 / 0.03),  # K (2 T + δ) is 0.4 at most
+        (0.05, 0.0, 4.0),
+    ],
+)
+def test_an_observer_of_slow_or_late_odometry_is_slower(period, delay, poles):
+    new = 1.0 - np.exp(-poles * period)
+    assert Observer().shares(period, delay) == pytest.approx((2 * new, new**2))
+
+
+def test_errors_of_the_observer_decay_with_both_poles_at_one_place_though_the_force_grows():
+    """With z = exp(-K T): (1 - z B)² e = 0, where B takes the error of a period before.
+
+    Learnt is the force of the next period.
+    """
+    h, rubs_nothing, observer = 0.005, Climber(seal_friction_coefficient=0.0, **FLOOR), Observer()
+    seen, learnt = State.rolling(np.zeros(3), 1.0, 0.3).motion, NOTHING
+    errors, true = [], Wrench(8.0, 1.0)
+    for _ in range(40):
+        expected = after(rubs_nothing, seen, STILL, learnt, h)
+        measured = after(rubs_nothing, seen, STILL, true, h)
+        shares = observer.shares(h, delay=0.0)
+        seen, learnt = observer.corrected(rubs_nothing, learnt, expected, measured, h, shares)
+        true = Wrench(true.force + 20.0 * h, true.moment - 3.0 * h)
+        errors.append((learnt.force - true.force, learnt.moment - true.moment))
+    decays = np.poly([np.exp(-14.0 * h)] * 2)
+    for of_one in np.array(errors).T:
+        np.testing.assert_allclose(np.convolve(of_one, decays, mode="valid"), 0, atol=1e-9)
+        assert abs(of_one[0]) > 0.5
+
+
+@pytest.mark.parametrize(("speed", "rate"), [(0.9e-3, 0.0), (1.1e-3, 6.0), (-1.1e-3, 6.0)])
+def test_a_force_that_grew_is_not_expected_to_at_rest(speed, rate):
+    expected = State.rolling(np.zeros(3), speed, 0.0).motion
+    learnt = DisturbanceEstimate(force_rate=6.0, moment_rate=2.0)
+    _, found = Observer().corrected(CLIMBER, learnt, expected, expected, 0.005, (0.1, 0.01))
+    assert (found.force_rate, found.moment_rate) == (rate, 2.0)
+
+
+def test_what_is_as_expected_changes_nothing_that_was_learnt():
+    rolling = State.rolling(np.zeros(3), 1.0, 0.0).motion
+    learnt = DisturbanceEstimate(9.0, 1.0, 0.0, 0.0, 3.0)
+    for source in ("odometry", "pose"):
+        observer = Observer(velocity_source=source)
+        _, found = observer.corrected(CLIMBER, learnt, rolling, rolling, 0.005, (0.1, 0.01), 1.0)
+        assert found == learnt
+    assert learnt._replace(force_rate=7.0, moment_rate=2.0).without_rates == learnt
+
+
+@pytest.mark.parametrize("source", ["odometry", "pose"])
+def test_an_observer_that_is_off_forgets_in_a_fifth_of_a_second(source):
+    observer = Observer(bandwidth=0.0, velocity_source=source)
+    rolling = State.rolling(np.zeros(3), 1.0, 0.0).motion
+    learnt = DisturbanceEstimate(9.0, 1.0, friction=3.0)
+    _, found = observer.corrected(CLIMBER, learnt, rolling, rolling, 0.2, (0.0, 0.0))
+    left = np.exp(-1)
+    assert found == pytest.approx((9.0 * left, left, 0.0, 0.0, 3.0 * left))
 
 
 def test_what_friction_holds_teaches_nothing():

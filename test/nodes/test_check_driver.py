@@ -22,6 +22,7 @@ FAULTY = Path(__file__).parent / "faulty_driver.py"
 PARAMETERS = "--ros-args", "--params-file", str(CONFIG / "climber.yaml")
 # odometry may be late on a busy machine
 PATIENT = (*PARAMETERS, "-p", "odometry_timeout:=2.0")
+PACED = "simulated_time:=true", "real_time_factor:=2.0"  # it has to be found meanwhile
 WHEELS_SWAPPED = "left and right are swapped"
 # fault: what finds it, a word of what it says
 FAULTS = {
@@ -126,7 +127,7 @@ def test_the_plant_passes_all_checks(world, clock, parameters, skipped):
 
 
 def test_with_a_controller_in_lock_step_it_listens_and_refuses_to_move(world):
-    world.start_node("plant_simulator", "simulated_time:=true", config="climber.yaml")
+    world.start_node("plant_simulator", *PACED, config="climber.yaml")
     for node in ("uk_torque_controller", "trajectory_publisher"):
         world.start_node(node, "use_sim_time:=true", config="climber.yaml")
     odometry = world.listen(Odometry, "odom")

@@ -64,17 +64,32 @@ def runs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper_bags(runs):
+    """The whole, and its first 10 s again."""
     bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
-    for bag in bags:
-        demo(runs, bag.parent, "paper.yaml")
+    for bag, how_long in zip(bags, [[], ["--duration", "10"]], strict=True):
+        demo(runs, bag.parent, "paper.yaml", *how_long)
         hold_up_the_recorder(runs)
         finished(runs)
     return bags
 
 
+SMALL = {  # a third of the size of climber.yaml's lap, in a third of its time
+    "half_width: 1.5": "half_width: 0.5",
+    "half_height: 0.75": "half_height: 0.25",
+    "rate: 0.12": "rate: 0.36",
+    "ramp_time: 3.0": "ramp_time: 1.0",
+}
+
+
 @pytest.fixture(scope="module")
 def climber_bag(runs):
-    demo(runs, runs.directory / "climber", "climber.yaml")
+    text = (CONFIG / "climber.yaml").read_text()
+    for before, after in SMALL.items():
+        assert before in text
+        text = text.replace(before, after)
+    config = runs.directory / "small.yaml"
+    config.write_text(text)
+    demo(runs, runs.directory / "climber", config, "--duration", "20")
     finished(runs)
     return runs.directory / "climber" / "bag"
 
@@ -98,23 +113,21 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
     }.items():
         first, second = (by_stamp(bag, topic, content) for bag in bags)
         common = sorted(first.keys() & second.keys())
-        assert len(common) >= 4000
+        assert len(common) >= 2000
         assert all(first[stamp] == second[stamp] for stamp in common)
 
 
 def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     run = read_run(climber_bag)
-    assert (
-        run.margins.values[:, :2].min() > 2.8
-    )  # as its parameter file says of its wheels, at worst
+    assert run.margins.values[:, :2].min() > 2.8
     assert np.abs(run.error[:, 1]).max() < 2e-3
-    assert run.time[-1] > 56
+    assert run.time[-1] >= 20.0
     assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
 
 
 def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):
-    for bag, answers in ((paper_bags[0], 3990), (climber_bag, 11390)):
+    for bag, answers in ((paper_bags[0], 3990), (climber_bag, 3990)):
         numbers = replay(bag, "--fail-above", "1e-9")
         recorded = numbers["answers"]["recorded"] - 1  # one may be from before there was a clock
         assert numbers["answers"]["in both"] >= recorded >= answers
@@ -122,7 +135,7 @@ def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_ba
         for modes in numbers["modes"].values():
             assert modes[-1][1] == "following"
     file = CONFIG / "paper.yaml"
-    assert not replay(paper_bags[0], "--params", file, "--fail-above", "1e-9")["changed"]
+    assert not replay(paper_bags[1], "--params", file, "--fail-above", "1e-9")["changed"]
 
 
 def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_learnt(
@@ -131,11 +144,11 @@ def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_le
     """By hand: r Δf / 2 a wheel, Δf = (1 - k) Δμ P S; the observer finds it with 100/s."""
     more, observer = "seal_friction_coefficient:=0.9", "observer.bandwidth:=0.0"
     by_hand = 0.027 / 2 * 0.47 * 0.1 * 2500 * 0.06
-    numbers = replay(paper_bags[0], "-p", more, "-p", observer)
+    numbers = replay(paper_bags[1], "-p", more, "-p", observer)
     assert numbers["changed"]["seal_friction_coefficient"] == [0.8, 0.9]
     wheels = numbers["wheels"]
     assert wheels["difference, RMS [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
-    wheels = replay(paper_bags[0], "-p", more)["wheels"]
+    wheels = replay(paper_bags[1], "-p", more)["wheels"]
     assert wheels["difference, largest [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
     assert wheels["largest at [s]"] == [0.0, 0.0]
     assert max(wheels["difference, RMS [N m]"]) < by_hand / 20
@@ -176,9 +189,9 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
 
 
 def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_end(world, tmp_path):
-    """At 5 s the pump's pressure is lost, with 1 s to the volume: P = 8 kPa exp(5 - t)."""
+    """At 2 s the pump's pressure is lost, with 1 s to the volume: P = 8 kPa exp(2 - t)."""
     config = tmp_path / "lost.yaml"
-    lost = "initial_y: 3.0\n    pressure_loss_time: 5.0\n    suction:\n      pump_time: 1.0"
+    lost = "initial_y: 3.0\n    pressure_loss_time: 2.0\n    suction:\n      pump_time: 1.0"
     config.write_text((CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", lost))
     demo(world, tmp_path / "run", config, "--duration", "12")
     assert "fell off: tip margin" in finished(world)
@@ -195,19 +208,20 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
                 errors.append(status.name)
                 if "suction pressure too low" in status.message:
                     stopped.append(time)
-    # at 5 kPa, told every 0.1 s; by hand: 8 exp(5 - t) = 5
-    assert stopped[0] == pytest.approx(5.0 + np.log(8 / 5), abs=0.11)
+    # at 5 kPa, told every 0.1 s; by hand: 8 exp(2 - t) = 5
+    assert stopped[0] == pytest.approx(2.0 + np.log(8 / 5), abs=0.11)
     assert {"/uk_torque_controller", "/plant_simulator"} <= set(errors)
     # by hand: P S l/2 = m g h
-    falls = 5.0 + np.log(8000 * 0.06 * 0.125 / (5 * 9.81 * 0.05))
+    falls = 2.0 + np.log(8000 * 0.06 * 0.125 / (5 * 9.81 * 0.05))
     assert max(states) == pytest.approx(falls, abs=0.01)
     assert states[max(time for time in states if time < falls - 1.0)] == 0.0  # it stood by then
 
 
-def test_four_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
-    demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "4", "--duration", "2")
+def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
+    """Two of the four in the file."""
+    demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "2", "--duration", "2")
     finished(world)
-    bag, names = tmp_path / "run" / "bag", [f"climber_{number}" for number in (1, 2, 3, 4)]
+    bag, names = tmp_path / "run" / "bag", [f"climber_{number}" for number in (1, 2)]
     stamps, frames, tellers = {name: set() for name in names}, set(), set()
     for topic, _, message in read_messages(bag):
         if topic.endswith("/odom"):
@@ -225,7 +239,7 @@ def test_four_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
         run = read_run(bag, name)
         assert np.abs(run.error[:, 1]).max() < 2e-3
         ways.append(tuple(run.pose[-1] - run.pose[0]))
-    assert len(set(ways)) == 4
+    assert len(set(ways)) == 2
 
 
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
@@ -238,12 +252,11 @@ def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     assert np.abs(run.error[:, 1]).max() < 0.05
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_path, number):
+def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_path):
     process = demo(world, tmp_path / "run", "paper.yaml", start_new_session=True)
     is_under_way(world)
     assert len([*inhabitants(world.domain)]) == 5
-    os.killpg(process.pid, number)  # as Ctrl-C in a terminal does
+    os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C in a terminal does
     assert process.wait(60) != 0
     said = world.log("run_demo")
     assert "interrupted" in said

@@ -21,19 +21,20 @@ CONTROLLER, PLANT, PLANNER = "uk_torque_controller", "plant_simulator", "traject
 CROWDED, WHOSE = "more than one", "publishers of wheel_torques"
 LIMIT = 4.0  # [N m] of the configuration
 ON_PATH = 0.02  # [m]
+QUICK_APPROACH = ["approach_speed:=0.3", "approach_yaw_rate:=1.5"]
 WALL_CLOCK = {  # patient: what is slow here is the machine
     PLANT: ["command_timeout:=1.0"],
     # a torque that is held up acts for too long: the guard is right, and has to forgive it, and the
     # climber to come back from wherever it is then
     CONTROLLER: [
         *("odometry_timeout:=1.0", "reference_timeout:=1.0"),
-        *("guard.attempts:=1000", "max_start_distance:=1000.0"),
+        *("guard.attempts:=1000", "max_start_distance:=1000.0", *QUICK_APPROACH),
     ],
     PLANNER: ["rest_to_rest.ramp_time:=1.0"],
 }
 LOCK_STEP = {
     PLANT: ["simulated_time:=true", "lockstep_timeout:=2.0"],
-    CONTROLLER: ["use_sim_time:=true"],
+    CONTROLLER: ["use_sim_time:=true", *QUICK_APPROACH],
     PLANNER: ["use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"],
 }
 

@@ -315,13 +315,13 @@ def test_the_board_cuts_the_torque_of_a_driver_that_dies_and_takes_up_with_the_n
     world.wait(is_driven, "torque")
 
 
-ELLIPSE = ["shape:=ellipse", "ellipse.semi_axis_x:=0.5", "ellipse.semi_axis_y:=0.3"]
+ELLIPSE = ["shape:=ellipse", "ellipse.semi_axis_x:=0.3", "ellipse.semi_axis_y:=0.2"]
 
 
 @pytest.mark.parametrize(
     ("planner", "heading", "rate", "width"),
     [
-        ([*ELLIPSE, "origin_y:=2.7", "rest_to_rest.rate:=0.5"], 0.0, 0.5, 1.0),
+        ([*ELLIPSE, "origin_y:=2.8", "rest_to_rest.rate:=0.8"], 0.0, 0.8, 0.6),
         pytest.param([], math.pi / 4, 0.12, 3.0, marks=pytest.mark.soak),
     ],
     ids=["ellipse", "climber.yaml"],

@@ -75,18 +75,27 @@ def start(world):
         process.stdout.close()
 
 
+def is_under_way(process):
+    """Wait for its progress."""
+    while (said := process.stdout.read(1)) != "×":
+        assert said
+
+
 def gone(world, pids):
     world.wait(lambda: not any(map(parent_of, pids)), "end of all processes")
 
 
-@pytest.mark.parametrize("by_another", [False, True], ids=["alone", "under make"])
-@pytest.mark.parametrize("end", [interrupt_twice, close_the_terminal, kill])
+@pytest.mark.parametrize(
+    ("end", "by_another"),
+    [(kill, False), (kill, True), (interrupt_twice, True), (close_the_terminal, False)],
+    ids=["kill-alone", "kill-under make", "interrupt_twice-under make", "close_the_terminal-alone"],
+)
 def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(
     world, start, tmp_path, end, by_another
 ):
     command = [executable("run_demo"), *DEMO, tmp_path / "run"]
     process = start(*PARENT, *command, "--with-parent") if by_another else start(*command)
-    world.wait(lambda: process.stdout.read(1) == "×", "progress")
+    is_under_way(process)
     family = descendants(process.pid)
     assert len(family) == 4 + by_another
     end(process)
@@ -100,7 +109,7 @@ def test_a_demo_that_is_ended_before_it_began_leaves_nothing(world, start, tmp_p
     process = start(executable("run_demo"), *DEMO, tmp_path / "run")
     world.wait(lambda: len(family := descendants(process.pid)) == 4 and family, "the nodes")
     family = descendants(process.pid)
-    interrupt_twice(process)
+    process.terminate()
     assert process.communicate(timeout=TIMEOUT)[0].splitlines()[-1] == "run_demo: interrupted"
     gone(world, family)
     assert not (tmp_path / "run").exists()
@@ -110,7 +119,7 @@ def test_a_demo_does_not_wait_long_for_a_node_that_does_not_end_once_it_is_told_
     world, start, tmp_path
 ):
     process = start(executable("run_demo"), *DEMO, tmp_path / "run")
-    world.wait(lambda: process.stdout.read(1) == "×", "progress")
+    is_under_way(process)
     family = descendants(process.pid)
     for pid in family:
         os.kill(pid, signal.SIGSTOP)

@@ -5,7 +5,7 @@ import signal
 import pytest
 from world import CONFIG
 
-pytestmark = [pytest.mark.nodes, pytest.mark.installed]
+pytestmark = pytest.mark.nodes
 
 QOS = "qos_overrides./odom.subscription"
 NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
@@ -70,6 +70,7 @@ def test_a_bad_waypoint_file_is_refused_with_one_line(world, tmp_path, content, 
     del world.processes[name]
 
 
+@pytest.mark.installed
 @pytest.mark.parametrize("name", NODES)
 def test_a_missing_parameter_file_is_refused_without_a_traceback(world, name):
     assert world.start_node(name, config="nothing.yaml").wait(60) == 1
@@ -263,6 +264,7 @@ def test_what_can_hardly_be_meant_is_doubted_at_the_start(world, parameter, mean
     assert doubt.startswith(parameter.split(":=")[0])
 
 
+@pytest.mark.installed
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_a_node_cleanly_even_if_it_comes_twice(world, number):
     processes = [world.start_node(name) for name in NODES]

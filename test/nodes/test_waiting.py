@@ -86,7 +86,7 @@ class Waiting(Climb):
         return max(np.hypot(*(curve - place).T).min() for place in places[::20])
 
 
-def test_a_climber_enabled_late_follows_from_the_beginning(world):
+def test_enabled_late_it_begins_at_the_beginning_and_disabled_in_mid_course_goes_on_there(world):
     climb = Waiting(world)
     climb.enable(False)
     climb.is_in("disabled")
@@ -97,20 +97,12 @@ def test_a_climber_enabled_late_follows_from_the_beginning(world):
     begin = climb.now
     climb.enable(True)
     climb.is_in("following")
-    climb.passes(5.0)
-    assert climb.fastest(begin) <= 1.3 * FASTEST
-    assert climb.off_the_path(begin) < 0.02
-    assert climb.position == pytest.approx(waits_at + climb.now - begin, abs=0.5)
-
-
-def test_disabled_in_mid_course_it_goes_on_where_it_was(world):
-    climb = Waiting(world)
-    climb.is_in("following")
     climb.passes(4.0)
+    assert climb.position == pytest.approx(waits_at + climb.now - begin, abs=0.5)
     climb.enable(False)
     climb.is_in("disabled")
     climb.passes(2.0)
-    waits_at, begin = climb.position, climb.now
+    waits_at = climb.position
     climb.passes(5.0)
     assert climb.position == waits_at
     climb.enable(True)
@@ -121,18 +113,24 @@ def test_disabled_in_mid_course_it_goes_on_where_it_was(world):
     assert climb.position < waits_at + 3.6
 
 
-@pytest.mark.parametrize("name", [CONTROLLER, PLANNER])
-def test_a_process_that_was_stopped_goes_on_where_it_was(world, name):
+def test_a_process_that_was_stopped_or_is_a_new_one_goes_on_where_it_was(world):
     climb = Waiting(world)
     climb.is_in("following")
     climb.passes(3.0)
-    world.processes[name].send_signal(signal.SIGSTOP)
-    looks = iter(range(75))  # 1.5 s: the clock of a plant in lock-step stands still
-    world.wait(lambda: next(looks, None) is None, "a while")
-    world.processes[name].send_signal(signal.SIGCONT)
+    for name in (CONTROLLER, PLANNER):
+        world.processes[name].send_signal(signal.SIGSTOP)
+        looks = iter(range(75))  # 1.5 s: the clock of a plant in lock-step stands still
+        world.wait(lambda looks=looks: next(looks, None) is None, "a while")
+        world.processes[name].send_signal(signal.SIGCONT)
+        climb.passes(1.5)
+        climb.is_on_path()
+    before = climb.position
+    climb.kill(CONTROLLER)
+    climb.start(CONTROLLER)
     climb.passes(3.0)
-    assert climb.fastest() <= 1.3 * FASTEST
     climb.is_on_path()
+    assert climb.fastest() <= 1.3 * FASTEST
+    assert before - 1.0 < climb.position <= climb.now
 
 
 @pytest.mark.soak
@@ -155,19 +153,6 @@ def test_a_process_that_was_stopped_for_long_on_the_wall_clock_goes_on_where_it_
     assert climb.off_the_path(0.0) < 0.02
 
 
-def test_a_new_controller_goes_on_where_the_old_one_was(world):
-    climb = Waiting(world)
-    climb.is_in("following")
-    climb.passes(3.0)
-    before = climb.position
-    climb.kill(CONTROLLER)
-    climb.start(CONTROLLER)
-    climb.passes(3.0)
-    climb.is_on_path()
-    assert climb.fastest() <= 1.3 * FASTEST
-    assert before - 1.0 < climb.position <= climb.now
-
-
 def test_a_start_3_m_off_is_refused_in_words(world):
     climb = Waiting(world, {PLANT: ["initial_y:=0.0"]})
     climb.is_in("too_far")
@@ -178,11 +163,11 @@ def test_a_start_3_m_off_is_refused_in_words(world):
 
 
 def test_a_start_3_m_off_that_is_allowed_is_approached_at_its_speed(world):
-    allowed = ["max_start_distance:=5.0", "approach_speed:=0.4"]
+    allowed = ["max_start_distance:=5.0", "approach_speed:=0.8"]
     climb = Waiting(world, {PLANT: ["initial_y:=0.0"], CONTROLLER: allowed})
     climb.is_in("approaching")
     climb.is_in("following")
-    assert climb.fastest() < 0.42
+    assert climb.fastest() < 0.84
     begin = climb.now
     climb.passes(3.0)
     assert climb.off_the_path(begin) < 0.02
@@ -199,38 +184,38 @@ def test_a_push_is_ridden_out(world):
     push.publish(wrench)
     climb.is_in("too_fast")
     climb.is_in("following")
-    climb.passes(10.0)
+    climb.passes(6.0)
     climb.is_on_path()
-    assert climb.fastest(climb.now - 5.0) <= 1.3 * FASTEST
+    assert climb.fastest(climb.now - 3.0) <= 1.3 * FASTEST
 
 
-@pytest.mark.parametrize("side", [0, 1], ids=["left", "right"])
-def test_a_motor_that_dies_is_noticed_and_the_climber_comes_to_rest(world, side):
-    """A relay between controller and plant takes the torque of one wheel away."""
+def test_a_motor_that_dies_is_noticed_and_the_climber_comes_to_rest(world):
+    """A relay between controller and plant takes the torque of one wheel away, then the other's."""
     tracks = ["slip:=true", "locomotion:=tracked", "tracked.length:=0.44"]
     tracks.append("tracked.scrub_friction_coefficient:=0.8")
     to_plant = world.node.create_publisher(JointState, "applied_torques", 1000)
-    dies_at = [math.inf]
+    dead, dies_at = 0, math.inf
 
     def relay(message):
-        if reading.nanoseconds(message.header.stamp) >= dies_at[0] * SECOND:
-            message.effort[side] = 0.0
+        if reading.nanoseconds(message.header.stamp) >= dies_at * SECOND:
+            message.effort[dead] = 0.0
         to_plant.publish(message)
 
     world.node.create_subscription(JointState, "wheel_torques", relay, 1000)
     climb = Waiting(world, {PLANT: [*tracks, "/wheel_torques:=/applied_torques"]})
     climb.is_in("following")
-    climb.passes(4.0)
-    dies_at[0] = climb.now
     known = {"following", "approaching", "waiting"}
-    fault = climb.comes_to(lambda mode: mode not in known, "fault")
-    assert reading.nanoseconds(fault.header.stamp) / SECOND < dies_at[0] + 0.35
-    climb.passes(2.0)
-    assert climb.fastest() < 1.5 * FASTEST + 0.1
-    assert climb.fastest(climb.now - 0.5) < 0.01
-    dies_at[0] = math.inf  # it was mended
-    climb.enable(True)
-    climb.is_in("following")
+    for side in (0, 1):
+        climb.passes(3.0)
+        dead, dies_at = side, climb.now
+        fault = climb.comes_to(lambda mode: mode not in known, "fault")
+        assert reading.nanoseconds(fault.header.stamp) / SECOND < dies_at + 0.35
+        climb.passes(2.0)
+        assert climb.fastest() < 1.5 * FASTEST + 0.1
+        assert climb.fastest(climb.now - 0.5) < 0.01
+        dies_at = math.inf  # it was mended
+        climb.enable(True)
+        climb.is_in("following")
 
 
 def test_what_comes_and_goes_is_said_a_few_times_only(world):
