@@ -97,19 +97,19 @@ def closed_loop(limit: Limit | None, with_numba: bool, steps: int) -> dict[str, 
     loops, preview = many_loops(CLOSED), sampled(ELLIPSE, 1.0)
     keep_what_is_freed()
 
-    def ours(compiled: bool) -> Callable[[], float]:
+    def ours(backend: str) -> Callable[[], float]:
         def by_tick() -> float:
             """Ticks without the first, which is one of start-up."""
-            course = BatchRun(ELLIPSE, TICKS * 0.005, steps=steps, compiled=compiled)
+            course = BatchRun(ELLIPSE, TICKS * 0.005, steps=steps, backend=backend)
             ends: list[float] = []
             loops.run_block(course, preview, lambda: ends.append(time.process_time()))
             return (ends[-1] - ends[0]) / (len(ends) - 1) * TICKS
 
         return by_tick
 
-    run = {"numpy": ours(False)}
+    run = {"numpy": ours("numpy")}
     if with_numba:
-        run["numpy, numba's plant"] = ours(True)
+        run["numpy, numba's plant"] = ours("numba")
     if limit is not None:
         run["C"] = closed_in_c(limit, many_loops(IN_C), steps)
     return {

@@ -7,7 +7,6 @@ reference that waits, jumps and safe outputs, lost and late messages, motors wit
 odometry, pumps, and every contact but that of a `UnicycleModel` climber.
 """
 
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -16,8 +15,9 @@ import numpy as np
 
 from climber_uk.closed_loop import pressure_gauge
 from climber_uk.closed_loop.outcome import Outcome, Tally
+from climber_uk.closed_loop.period import Advance, Given, LoopsState
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
+from climber_uk.closed_loop.unicycle import advanced_often
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.model import Observer
@@ -25,11 +25,10 @@ from climber_uk.control.timing import Timing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Wheeled
-from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, indexed, keep_what_is_freed
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques, Wrench
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.sensors import Sensors
 
@@ -53,7 +52,7 @@ class BatchRun:
     period: float = 0.005  # [s] of the controller
     steps: int = 2  # of the plant in a period
     delay: int = 0  # periods of a torque on its way to the wheels
-    compiled: bool = False  # the plant, by numba: the extra `fast`
+    backend: str = "numpy"  # one of `BACKENDS`
 
 
 @dataclass(frozen=True)
@@ -99,12 +98,34 @@ class Loops:
     def run_block(
         self, course: BatchRun, preview: Preview, on_period: Callable[[], object] = lambda: None
     ) -> Outcome:
-        """The same, all loops at once; `on_period` is called in every period."""
-        estimator = Estimator(self.law.climber, self.observer, self.timing)
-        tally = Tally(len(self.start.x), self.contact)
-        motion, step = self.start, course.period / course.steps
-        advance = _advance_function(course.compiled)
-        on_their_way: deque[Torques] = deque()
+        """The same, all loops at once; `on_period` is called in every period.
+
+        By JAX, it is called where many of them have been gone through.
+        """
+        if course.backend == "jax":
+            from climber_uk.closed_loop.traced import outcome  # JAX takes long to import
+
+            return outcome(self, course, preview, on_period)
+        state = self.begun(course)
+        advance = plant(course)
+        for given in self.periods(course):
+            state.go_through(given, self.sensors, preview.target, advance)
+            on_period()
+        return state.tally.outcome()
+
+    def begun(self, course: BatchRun) -> LoopsState:
+        """Loops before their first period."""
+        in_motion = np.any(self.start.speed) or np.any(self.start.yaw_rate)
+        return LoopsState(
+            Estimator(self.law.climber, self.observer, self.timing),
+            Tally.begun(len(self.start.x), self.contact),
+            self.start,
+            None if in_motion else Torques(0.0, 0.0),
+            course.delay,
+        )
+
+    def periods(self, course: BatchRun) -> Iterator[Given]:
+        """What each period begins with, that at the end of the duration included."""
         ticks = round(course.duration / course.period)
         controllers = pressure_gauge.controllers(
             self.law, self._climbers(course, ticks), course.period, self.gauge
@@ -113,29 +134,9 @@ class Loops:
             *(self._noise(ticks), self._climbers(course, ticks)),
             *(controllers, _targets(course, ticks)),
         )
-        for tick, (noise, climber, law, target) in enumerate(zip(*by_tick, strict=True)):
-            measured = motion if noise is None else self.sensors.corrupted(motion, noise)
-            estimator.climber = law.climber
-            estimator.see(SECOND + round(tick * course.period * SECOND), measured)
-            ahead = estimator.ahead(0.0)
-            next_target = preview.target(law.target_time(ahead))
-            assert next_target is not None  # the preview goes beyond the duration
-            command = law.command(ahead, next_target)
-            estimator.sent(ahead.begins, command.wheels, command.fits, next_target.speed)
-            if not on_their_way:
-                before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
-                on_their_way.extend([before] * course.delay)
-            on_their_way.append(command.wheels)
-            wheels = _within_bounds(on_their_way.popleft(), climber, motion)
-            tally.add(tick * course.period, motion, target, command, wheels, climber)
-            wrench = Wrench(*climber.wrench(*wheels))
-            on_period()
-            motion = advance(UnicycleModel.of(climber), motion, wrench, step, course.steps)
-        return tally.outcome()
-
-    @property
-    def _starts_in_motion(self) -> bool:
-        return bool(np.any(self.start.speed) or np.any(self.start.yaw_rate))
+        for tick, given in enumerate(zip(*by_tick, strict=True)):
+            time = tick * course.period
+            yield Given(SECOND + round(time * SECOND), time, *given)
 
     def _noise(self, ticks: int) -> Iterator[Array | None]:
         """For every odometry five numbers of unit variance (5, N), or None if sensors are ideal."""
@@ -169,16 +170,9 @@ def _targets(course: BatchRun, ticks: int) -> Iterator[ReferencePoint]:
         yield from (ReferencePoint(*numbers) for numbers in rows)
 
 
-def _advance_function(
-    compiled: bool,
-) -> Callable[[UnicycleModel, Motion, Wrench, float, int], Motion]:
-    if not compiled:
-        return advanced_often
-    from climber_uk.closed_loop.compiled import advanced  # numba takes long to import
-
-    return advanced
-
-
-def _within_bounds(torques: Torques, climber: Climber, motion: Motion) -> Torques:
-    right, left = climber.bounds(motion)
-    return Torques(clipped(torques.right, *right), clipped(torques.left, *left))
+def plant(course: BatchRun) -> Advance:
+    """Function that advances climbers by a period."""
+    step, advance = course.period / course.steps, advanced_often
+    if course.backend == "numba":
+        from climber_uk.closed_loop.compiled import advanced as advance
+    return lambda body, motion, wrench: advance(body, motion, wrench, step, course.steps)
