@@ -7,7 +7,7 @@ reference that waits, jumps and safe outputs, lost and late messages, motors wit
 odometry, pumps, and every contact but that of a `UnicycleModel` climber.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -34,6 +34,11 @@ from climber_uk.simulation.sensors import Sensors
 
 LOOPS_AT_ONCE = 16384  # fastest, by measurement
 PERIODS_AT_ONCE = 64  # for which noise and targets are made together
+BACKENDS = (
+    "numpy",
+    "numba",
+    "jax",
+)  # numba compiles the plant, JAX all; extras `fast`, `accelerator`
 
 
 class Change(NamedTuple):
@@ -95,22 +100,15 @@ class Loops:
         ]
         return Outcome(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
 
-    def run_block(
-        self, course: BatchRun, preview: Preview, on_period: Callable[[], object] = lambda: None
-    ) -> Outcome:
-        """The same, all loops at once; `on_period` is called in every period.
-
-        By JAX, it is called where many of them have been gone through.
-        """
+    def run_block(self, course: BatchRun, preview: Preview) -> Outcome:
+        """The same, all loops at once."""
         if course.backend == "jax":
             from climber_uk.closed_loop.traced import outcome  # JAX takes long to import
 
-            return outcome(self, course, preview, on_period)
-        state = self.begun(course)
-        advance = plant(course)
+            return outcome(self, course, preview)
+        state, advance = self.begun(course), plant(course)
         for given in self.periods(course):
             state.go_through(given, self.sensors, preview.target, advance)
-            on_period()
         return state.tally.outcome()
 
     def begun(self, course: BatchRun) -> LoopsState:

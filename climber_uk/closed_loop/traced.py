@@ -1,43 +1,45 @@
-"""Many closed loops by JAX, on whatever it runs: the extra `accelerator`.
+"""Many closed loops by JAX, on whatever it finds: the extra `accelerator`.
 
-No equation stands here: JAX traces `LoopsState.go_through` once, for all loops in a period, and
-compiles what it has seen. The first periods, in which estimators have little to remember, are
-numpy's, and so is all that comes from outside: noise, references, changes of the climbers.
+No equation stands here: JAX traces `LoopsState.go_through`, compiles what it has seen, and goes on
+with that. The first periods, in which an estimator has little to remember, are numpy's, and so is
+what comes from outside: noise, references, changes of the climbers.
 """
 
+import math
+import os
 from collections import deque
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jax import numpy as jnp
 
-from climber_uk.closed_loop.outcome import Outcome, Tally
+from climber_uk.closed_loop.batch import PERIODS_AT_ONCE, BatchRun, Loops, plant
+from climber_uk.closed_loop.outcome import Outcome, Sums, Tally
 from climber_uk.closed_loop.period import Given, LoopsState
-from climber_uk.closed_loop.unicycle import stepped
-from climber_uk.control.estimator import Estimator
+from climber_uk.closed_loop.unicycle import UnicycleModel, stepped
+from climber_uk.control.estimator import Estimator, Memory
 from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.many import mapped
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import ReferencePoint
-
-if TYPE_CHECKING:
-    from climber_uk.closed_loop.batch import BatchRun, Loops
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques, Wrench
 
 jax.config.update("jax_enable_x64", True)
-BY_NUMPY = 3  # periods, and the delay of torques, until an estimator's memory is complete
-AT_ONCE = 64  # periods
+# else XLA computes on a CPU twice what two results need; it has no other way to tell it
+FLAG = "--xla_backend_extra_options=xla_cpu_use_multi_output_fusion=true"
+os.environ["XLA_FLAGS"] = f"{FLAG} {os.environ.get('XLA_FLAGS', '')}"
+
+BY_NUMPY = 3  # periods, and the delay of torques: then an estimator's memory is complete
 
 
 class Slot:
-    """Where an array was: all are the same to JAX, which compares what it has compiled."""
+    """Where an array was."""
 
-    def __array_namespace__(self) -> None:  # noqa: D105
-        return None
+    def __array_namespace__(self) -> None:
+        """None: arrays have one."""
 
 
 SLOT = Slot()
@@ -51,19 +53,36 @@ class Arrays:
         self.of = of
 
     def tree_flatten(self) -> tuple[list[Any], Any]:
-        """The arrays, and what is left."""
+        """Arrays, and what they were taken out of."""
         arrays: list[Any] = []
         return arrays, mapped(lambda array: arrays.append(array) or SLOT, self.of)
 
     @classmethod
-    def tree_unflatten(cls, rest: Any, arrays: Any) -> "Arrays":
-        """The reverse of it."""
+    def tree_unflatten(cls, rest: Any, arrays: list[Any]) -> "Arrays":
+        """Put them back."""
         left = iter(arrays)
         return cls(mapped(lambda _: next(left), rest))
 
 
+class Numbers(NamedTuple):
+    """State of the loops, arrays (N,)."""
+
+    memory: Memory  # of the estimator
+    motion: Motion
+    on_their_way: tuple[Torques, ...]
+    sums: Sums
+
+    @classmethod
+    def of(cls, state: LoopsState) -> "Numbers":
+        """Numbers of a state, in arrays all."""
+        memory, _ = state.estimator.memory
+        on_their_way, number = tuple(state.on_their_way), state.motion.x.shape
+        numbers = cls(memory, state.motion, on_their_way, state.tally.sums)
+        return jax.tree.map(lambda each: jax.numpy.broadcast_to(each, number), numbers)
+
+
 class Rows(NamedTuple):
-    """What periods begin with, a row of each array (AT_ONCE, …) for each."""
+    """What periods begin with: rows of arrays (PERIODS_AT_ONCE, …)."""
 
     time: Any
     target: ReferencePoint
@@ -71,78 +90,109 @@ class Rows(NamedTuple):
     noise: Any
 
 
-def outcome(
-    loops: "Loops", course: "BatchRun", preview: Preview, on_periods: Callable[[], object]
-) -> Outcome:
-    """See `Loops.run_block`."""
-    from climber_uk.closed_loop.batch import plant
+class Clock(NamedTuple):
+    """Times that are the same in every period."""
 
-    state, periods = loops.begun(course), loops.periods(course)
-    stamp = aim = 0
+    period: int  # [ns]
+    aim: int  # from an odometry to what its answer aims at [ns]
+    known: tuple[Any, ...]  # to the estimator, of what it remembers
+    step: float  # of the plant [s]
+    steps: int  # of the plant in a period
+
+
+def outcome(loops: Loops, course: BatchRun, preview: Preview) -> Outcome:
+    """See `Loops.run_block`; `ValueError` for a period that is no integer in nanoseconds."""
+    period = round(course.period * SECOND)
+    if abs(period - course.period * SECOND) > 1e-3:
+        raise ValueError(f"period={course.period} must be whole nanoseconds, for JAX")
+    state, periods, aims = loops.begun(course), loops.periods(course), [0]
 
     def target_at(time: int) -> ReferencePoint | None:
-        nonlocal aim
-        aim = time - stamp
+        aims.append(time - state.estimator.stamp)
         return preview.target(time)
 
-    advance = plant(course)
-    for given in islice(periods, BY_NUMPY + course.delay):
-        stamp = given.stamp
+    advance, late = plant(course), math.ceil(loops.timing.transport_delay / course.period)
+    for given in islice(periods, BY_NUMPY + max(late, course.delay)):
         state.go_through(given, loops.sensors, target_at, advance)
-    memory, times = state.estimator.memory
-    numbers = memory, state.motion, tuple(state.on_their_way), state.tally.sums
-    numbers = _spread(numbers, len(loops.start.x))
-    step = course.period / course.steps
-    while rows := list(islice(periods, AT_ONCE)):
-        given, few = _rows(rows, preview, aim)
-        constant = Arrays((*_shared(loops, rows), loops.observer, loops.timing, loops.sensors, loops.contact))
-        numbers = _go_through(
-            constant, numbers, given, few, times=times, period=round(course.period * SECOND), step=step, steps=course.steps
+    _, known = state.estimator.memory
+    clock = Clock(period, aims[-1], known, course.period / course.steps, course.steps)
+    numbers, changing, number = Numbers.of(state), _changing(loops), len(loops.start.x)
+    while several := list(islice(periods, PERIODS_AT_ONCE)):
+        count = len(several)
+        several += several[-1:] * (PERIODS_AT_ONCE - count)
+        climber = _stacked([given.climber for given in several], changing, number)
+        believed = _stacked([given.law.climber for given in several], changing & {PRESSURE}, number)
+        law = replace(several[0].law, climber=believed)
+        constant = Arrays(
+            (climber, law, loops.observer, loops.timing, loops.sensors, loops.contact)
         )
-        jax.block_until_ready(numbers)
-        on_periods()
-    return Tally(numbers[3], loops.contact).outcome()
+        numbers = _go_through(constant, numbers, _rows(several, preview, clock.aim), count, clock)
+    return Tally(numbers.sums, loops.contact).outcome()
 
 
-def _shared(loops, periods):
-    return periods[0].climber, periods[0].law
+PRESSURE = "suction_pressure"
 
 
-def _rows(periods: list[Given], preview: Preview, aim: int) -> tuple[Rows, int]:
-    few = len(periods)
-    periods = periods + [periods[-1]] * (AT_ONCE - few)
-    time = np.array([each.time for each in periods])
-    target = ReferencePoint(*np.array([each.target for each in periods]).T)
-    aims = ReferencePoint(*np.array([preview.target(each.stamp + aim) for each in periods]).T)
-    noise = None if periods[0].noise is None else np.array([each.noise for each in periods])
-    return Rows(time, target, aims, noise), few
+def _changing(loops: Loops) -> set[str]:
+    """Names of what changes of the climbers."""
+    before, after = loops.climber, [change.climber for change in loops.changes]
+    return {
+        field.name
+        for field in fields(Climber)
+        for climber in after
+        if not np.array_equal(getattr(before, field.name), getattr(climber, field.name))
+    }
 
 
-def _spread(numbers: Any, many: int) -> Any:
-    return jax.tree.map(lambda each: jnp.broadcast_to(each, (many,)), numbers)
+def _stacked(climbers: list[Climber], changing: set[str], number: int) -> Climber:
+    """Climber of several periods: arrays (PERIODS_AT_ONCE, N) of what changes."""
+    rows = {name: [getattr(climber, name) for climber in climbers] for name in changing}
+    return replace(
+        climbers[0],
+        **{
+            name: np.array([np.broadcast_to(row, number) for row in of])
+            for name, of in rows.items()
+        },
+    )
 
 
-@partial(jax.jit, static_argnames=("times", "period", "step", "steps"), donate_argnums=1)
+def _rows(several: list[Given], preview: Preview, aim: int) -> Rows:
+    targets = np.array([given.target for given in several])
+    aims = np.array([preview.target(given.stamp + aim) for given in several])
+    return Rows(
+        np.array([given.time for given in several]),
+        ReferencePoint(*targets.T),
+        ReferencePoint(*aims.T),
+        None if several[0].noise is None else np.array([given.noise for given in several]),
+    )
+
+
+@partial(jax.jit, static_argnames="clock", donate_argnames="numbers")
 def _go_through(
-    constant: Arrays, numbers: Any, rows: Rows, few: int, *, times: Any, period: int, step: float, steps: int
-) -> Any:
-    climber, law, observer, timing, sensors, contact = constant.of
+    constant: Arrays, numbers: Numbers, rows: Rows, count: int, clock: Clock
+) -> Numbers:
+    """Numbers after `count` periods."""
 
-    def advance(body, motion, wrench):
+    def advance(body: UnicycleModel, motion: Motion, wrench: Wrench) -> Motion:
         rates = body.under(wrench)
-        return jax.lax.fori_loop(0, steps, lambda _, now: stepped(rates, now, step), motion)
+        return jax.lax.fori_loop(
+            0, clock.steps, lambda _, now: stepped(rates, now, clock.step), motion
+        )
 
-    def one(i: Any, numbers: Any) -> Any:
-        memory, motion, on_their_way, sums = numbers
-        row = jax.tree.map(lambda each: each[i], rows)
+    def next_period(i: Any, numbers: Numbers) -> Numbers:
+        def now(array: Any) -> Any:
+            return array[i] if array.ndim == 2 else array
+
+        climber, law, observer, timing, sensors, contact = mapped(now, constant.of)
+        time, target, aim, noise = jax.tree.map(lambda row: row[i], rows)
         estimator = Estimator(law.climber, observer, timing)
-        estimator.remember(memory, times, SECOND)
-        state = LoopsState(estimator, Tally(sums, contact), motion, None, len(on_their_way), deque(on_their_way))
-        given = Given(SECOND + period, row.time, row.noise, climber, law, row.target)
-        state.go_through(given, sensors, lambda _: row.aim, advance)
-        memory, now = estimator.memory
-        assert now == times, (now, times)
-        numbers = memory, state.motion, tuple(state.on_their_way), state.tally.sums
-        return _spread(numbers, len(motion.x))
+        estimator.remember(numbers.memory, clock.known, SECOND)
+        state = LoopsState(
+            *(estimator, Tally(numbers.sums, contact), numbers.motion),
+            on_their_way=deque(numbers.on_their_way),
+        )
+        given = Given(SECOND + clock.period, time, noise, climber, law, target)
+        state.go_through(given, sensors, lambda _: aim, advance)
+        return Numbers.of(state)
 
-    return jax.lax.fori_loop(0, few, one, numbers)
+    return jax.lax.fori_loop(0, count, next_period, numbers)

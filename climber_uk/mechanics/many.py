@@ -71,8 +71,7 @@ def chosen(condition: Any, this: Any, that: Any) -> Any:
         return this if condition else that
     if isinstance(this, tuple):
         where = namespace(condition).where
-        numbers = (where(condition, *pair) for pair in zip(this, that, strict=True))
-        return type(this)(*numbers) if hasattr(this, "_fields") else tuple(numbers)
+        return type(this)(*(where(condition, *pair) for pair in zip(this, that, strict=True)))
     names = [field.name for field in dataclasses.fields(this)]
     pairs = {name: (getattr(this, name), getattr(that, name)) for name in names}
     differ = {name: pair for name, pair in pairs.items() if not np.array_equal(*pair)}
