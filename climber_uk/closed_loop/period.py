@@ -49,7 +49,8 @@ class LoopsState:
         """Go through a period; `target_at` has the reference at a stamp [ns]."""
         stamp, time, noise, climber, law, target = given
         estimator, motion = self.estimator, self.motion
-        estimator.climber = law.climber
+        if law.climber is not estimator.climber:
+            estimator.go_over_to(law.climber)
         estimator.see(stamp, motion if noise is None else sensors.corrupted(motion, noise))
         ahead = estimator.ahead(0.0)
         next_target = target_at(law.target_time(ahead))

@@ -185,7 +185,7 @@ def _go_through(
 
         climber, law, observer, timing, sensors, contact = mapped(now, constant.of)
         time, target, aim, noise = jax.tree.map(lambda row: row[i], rows)
-        estimator = Estimator(law.climber, observer, timing)
+        estimator = Estimator(climber, observer, timing)  # goes over to the model of `law`
         estimator.remember(numbers.memory, clock.known, SECOND)
         state = LoopsState(
             *(estimator, Tally(numbers.sums, contact), numbers.motion),

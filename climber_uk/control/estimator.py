@@ -13,7 +13,7 @@ from climber_uk.control.timing import LONGEST_STEP, Latency, Sample, Timing, Tor
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import select, with_sign_of
+from climber_uk.mechanics.elementary import clipped, select, with_sign_of
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 
@@ -92,6 +92,12 @@ class Estimator:
         # whether no limit cut the last answer, so that errors are due to the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
+
+    def go_over_to(self, climber: Climber) -> None:
+        """Have another model; friction that was learnt takes no more away than its seal has."""
+        self.climber, f = climber, climber.seal_friction
+        friction = clipped(self.learnt.friction + 0.0 * f, -f, f)
+        self.learnt = self.learnt._replace(friction=friction)
 
     @property
     def memory(self) -> tuple[Memory, tuple[Any, ...]]:
