@@ -18,8 +18,9 @@ import numpy as np
 from limit import Limit, climber_numbers, law_numbers
 from side_by_side import in_turns, rate, table, timed
 
-from climber_uk.closed_loop.batch import BACKENDS, LOOPS_AT_ONCE, BatchRun, Loops
+from climber_uk.closed_loop.batch import LOOPS_AT_ONCE, Loops
 from climber_uk.closed_loop.outcome import Outcome
+from climber_uk.closed_loop.period import BACKENDS, BatchRun
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
 from climber_uk.control.control_law import ControlLaw, ControlOptions

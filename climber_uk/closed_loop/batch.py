@@ -8,16 +8,15 @@ odometry, pumps, and every contact but that of a `UnicycleModel` climber.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from climber_uk.closed_loop import pressure_gauge
 from climber_uk.closed_loop.outcome import Outcome, Tally
-from climber_uk.closed_loop.period import Advance, Given, LoopsState
+from climber_uk.closed_loop.period import BatchRun, Given, LoopsState, go_on
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.closed_loop.unicycle import advanced_often
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.model import Observer
@@ -29,16 +28,10 @@ from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, indexed, keep_what_is_freed
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
-from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.simulation.sensors import Sensors
 
 LOOPS_AT_ONCE = 16384  # fastest, by measurement
 PERIODS_AT_ONCE = 64  # for which noise and targets are made together
-BACKENDS = (
-    "numpy",
-    "numba",
-    "jax",
-)  # numba compiles the plant, JAX all; extras `fast`, `accelerator`
 
 
 class Change(NamedTuple):
@@ -46,18 +39,6 @@ class Change(NamedTuple):
 
     time: Any
     climber: Climber
-
-
-@dataclass(frozen=True)
-class BatchRun:
-    """Trajectory, duration and timing, which all loops share."""
-
-    trajectory: Trajectory
-    duration: float  # [s]
-    period: float = 0.005  # [s] of the controller
-    steps: int = 2  # of the plant in a period
-    delay: int = 0  # periods of a torque on its way to the wheels
-    backend: str = "numpy"  # one of `BACKENDS`
 
 
 @dataclass(frozen=True)
@@ -102,13 +83,13 @@ class Loops:
 
     def run_block(self, course: BatchRun, preview: Preview) -> Outcome:
         """The same, all loops at once."""
+        state, periods = self.begun(course), self.periods(course)
         if course.backend == "jax":
-            from climber_uk.closed_loop.traced import outcome  # JAX takes long to import
+            from climber_uk.closed_loop import traced  # JAX takes long to import
 
-            return outcome(self, course, preview)
-        state, advance = self.begun(course), plant(course)
-        for given in self.periods(course):
-            state.go_through(given, self.sensors, preview.target, advance)
+            traced.go_on(state, periods, course, preview, self._changing)
+        else:
+            go_on(state, periods, course, preview)
         return state.tally.outcome()
 
     def begun(self, course: BatchRun) -> LoopsState:
@@ -117,6 +98,7 @@ class Loops:
         return LoopsState(
             Estimator(self.law.climber, self.observer, self.timing),
             Tally.begun(len(self.start.x), self.contact),
+            self.sensors,
             self.start,
             None if in_motion else Torques(0.0, 0.0),
             course.delay,
@@ -148,6 +130,18 @@ class Loops:
             drawn = np.array([random.normal(size=(many, 5)) for random in randoms])
             yield from np.ascontiguousarray(drawn.transpose(1, 2, 0))
 
+    @property
+    def _changing(self) -> set[str]:
+        """Names of what changes of the climbers."""
+        return {
+            field.name
+            for field in fields(Climber)
+            for change in self.changes
+            if not np.array_equal(
+                getattr(self.climber, field.name), getattr(change.climber, field.name)
+            )
+        }
+
     def _climbers(self, course: BatchRun, ticks: int) -> Iterator[Climber]:
         """The true climbers at every period."""
         climber = self.climber
@@ -166,11 +160,3 @@ def _targets(course: BatchRun, ticks: int) -> Iterator[ReferencePoint]:
         target = course.trajectory.at(times).target
         rows = zip(*(each.tolist() for each in target), strict=True)
         yield from (ReferencePoint(*numbers) for numbers in rows)
-
-
-def plant(course: BatchRun) -> Advance:
-    """Function that advances climbers by a period."""
-    step, advance = course.period / course.steps, advanced_often
-    if course.backend == "numba":
-        from climber_uk.closed_loop.compiled import advanced as advance
-    return lambda body, motion, wrench: advance(body, motion, wrench, step, course.steps)

@@ -56,7 +56,7 @@ class Tally:
     def begun(cls, number: int, contact: Contact) -> "Tally":
         """Tally of `number` loops."""
         none, most, never = np.zeros(number), np.full(number, MAX_MARGIN), np.full(number, np.inf)
-        return cls(Sums(*[none] * 7, most, most, never), contact)
+        return cls(Sums(*(*[none] * 7, most, most, never)), contact)
 
     def add(
         self,

@@ -8,7 +8,8 @@ what comes from outside: noise, references, changes of the climbers.
 import math
 import os
 from collections import deque
-from dataclasses import fields, replace
+from collections.abc import Iterator, Set
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
@@ -16,9 +17,9 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from climber_uk.closed_loop.batch import PERIODS_AT_ONCE, BatchRun, Loops, plant
-from climber_uk.closed_loop.outcome import Outcome, Sums, Tally
-from climber_uk.closed_loop.period import Given, LoopsState
+from climber_uk.closed_loop import period
+from climber_uk.closed_loop.outcome import Sums, Tally
+from climber_uk.closed_loop.period import BatchRun, Given, LoopsState
 from climber_uk.closed_loop.unicycle import UnicycleModel, stepped
 from climber_uk.control.estimator import Estimator, Memory
 from climber_uk.mechanics import SECOND
@@ -28,10 +29,13 @@ from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques, Wrench
 
 jax.config.update("jax_enable_x64", True)
-# else XLA computes on a CPU twice what two results need; it has no other way to tell it
+# else XLA computes on a CPU twice what two results need; there is no other way to tell it
 FLAG = "--xla_backend_extra_options=xla_cpu_use_multi_output_fusion=true"
 os.environ["XLA_FLAGS"] = f"{FLAG} {os.environ.get('XLA_FLAGS', '')}"
 
+BY_NUMPY = 3  # periods, beside the delay: then an estimator's memory is complete
+AT_ONCE = 64  # periods
+PRESSURE = "suction_pressure"  # what controllers are told of a change
 BY_NUMPY = 3  # periods, and the delay of torques: then an estimator's memory is complete
 
 
@@ -55,7 +59,13 @@ class Arrays:
     def tree_flatten(self) -> tuple[list[Any], Any]:
         """Arrays, and what they were taken out of."""
         arrays: list[Any] = []
-        return arrays, mapped(lambda array: arrays.append(array) or SLOT, self.of)
+
+        def taken(array: Any) -> Slot:
+            arrays.append(array)
+            return SLOT
+
+        rest = mapped(taken, self.of)
+        return arrays, rest
 
     @classmethod
     def tree_unflatten(cls, rest: Any, arrays: list[Any]) -> "Arrays":
@@ -82,7 +92,7 @@ class Numbers(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """What periods begin with: rows of arrays (PERIODS_AT_ONCE, …)."""
+    """What periods begin with: rows of arrays (AT_ONCE, …)."""
 
     time: Any
     target: ReferencePoint
@@ -94,66 +104,51 @@ class Clock(NamedTuple):
     """Times that are the same in every period."""
 
     period: int  # [ns]
-    aim: int  # from an odometry to what its answer aims at [ns]
     known: tuple[Any, ...]  # to the estimator, of what it remembers
     step: float  # of the plant [s]
     steps: int  # of the plant in a period
 
 
-def outcome(loops: Loops, course: BatchRun, preview: Preview) -> Outcome:
-    """See `Loops.run_block`; `ValueError` for a period that is no integer in nanoseconds."""
-    period = round(course.period * SECOND)
-    if abs(period - course.period * SECOND) > 1e-3:
+def go_on(
+    state: LoopsState,
+    periods: Iterator[Given],
+    course: BatchRun,
+    preview: Preview,
+    changing: Set[str],
+) -> None:
+    """Go through all periods of a course; `changing` are names of what changes of the climbers.
+
+    Raises `ValueError` for a period that is no integer in nanoseconds.
+    """
+    nanoseconds = round(course.period * SECOND)
+    if abs(nanoseconds - course.period * SECOND) > 1e-3:
         raise ValueError(f"period={course.period} must be whole nanoseconds, for JAX")
-    state, periods, aims = loops.begun(course), loops.periods(course), [0]
-
-    def target_at(time: int) -> ReferencePoint | None:
-        aims.append(time - state.estimator.stamp)
-        return preview.target(time)
-
-    advance, late = plant(course), math.ceil(loops.timing.transport_delay / course.period)
-    for given in islice(periods, BY_NUMPY + max(late, course.delay)):
-        state.go_through(given, loops.sensors, target_at, advance)
-    _, known = state.estimator.memory
-    clock = Clock(period, aims[-1], known, course.period / course.steps, course.steps)
-    numbers, changing, number = Numbers.of(state), _changing(loops), len(loops.start.x)
-    while several := list(islice(periods, PERIODS_AT_ONCE)):
-        count = len(several)
-        several += several[-1:] * (PERIODS_AT_ONCE - count)
+    estimator, tally, number = state.estimator, state.tally, len(state.motion.x)
+    late = math.ceil(estimator.timing.transport_delay / course.period)
+    period.go_on(state, islice(periods, BY_NUMPY + max(late, course.delay)), course, preview)
+    _, known = estimator.memory
+    clock = Clock(nanoseconds, known, course.period / course.steps, course.steps)
+    numbers = Numbers.of(state)
+    while several := list(islice(periods, AT_ONCE)):
+        count, law = len(several), several[0].law
+        several += several[-1:] * (AT_ONCE - count)
         climber = _stacked([given.climber for given in several], changing, number)
         believed = _stacked([given.law.climber for given in several], changing & {PRESSURE}, number)
-        law = replace(several[0].law, climber=believed)
-        constant = Arrays(
-            (climber, law, loops.observer, loops.timing, loops.sensors, loops.contact)
-        )
-        numbers = _go_through(constant, numbers, _rows(several, preview, clock.aim), count, clock)
-    return Tally(numbers.sums, loops.contact).outcome()
+        law = replace(law, climber=believed)
+        same = estimator.observer, estimator.timing, state.sensors, tally.contact
+        aim = law.target_time(estimator.ahead(0.0)) - estimator.stamp
+        rows = _rows(several, preview, aim)
+        numbers = _go_through(Arrays((climber, law, *same)), numbers, rows, count, clock)
+    tally.sums = numbers.sums
 
 
-PRESSURE = "suction_pressure"
-
-
-def _changing(loops: Loops) -> set[str]:
-    """Names of what changes of the climbers."""
-    before, after = loops.climber, [change.climber for change in loops.changes]
-    return {
-        field.name
-        for field in fields(Climber)
-        for climber in after
-        if not np.array_equal(getattr(before, field.name), getattr(climber, field.name))
-    }
-
-
-def _stacked(climbers: list[Climber], changing: set[str], number: int) -> Climber:
-    """Climber of several periods: arrays (PERIODS_AT_ONCE, N) of what changes."""
-    rows = {name: [getattr(climber, name) for climber in climbers] for name in changing}
-    return replace(
-        climbers[0],
-        **{
-            name: np.array([np.broadcast_to(row, number) for row in of])
-            for name, of in rows.items()
-        },
-    )
+def _stacked(climbers: list[Climber], changing: Set[str], number: int) -> Climber:
+    """Climber of several periods: arrays (AT_ONCE, N) of what changes."""
+    rows: dict[str, Any] = {}
+    for name in changing:
+        values = [getattr(climber, name) for climber in climbers]
+        rows[name] = np.array([np.broadcast_to(value, number) for value in values])
+    return replace(climbers[0], **rows)
 
 
 def _rows(several: list[Given], preview: Preview, aim: int) -> Rows:
@@ -187,12 +182,10 @@ def _go_through(
         time, target, aim, noise = jax.tree.map(lambda row: row[i], rows)
         estimator = Estimator(climber, observer, timing)  # goes over to the model of `law`
         estimator.remember(numbers.memory, clock.known, SECOND)
-        state = LoopsState(
-            *(estimator, Tally(numbers.sums, contact), numbers.motion),
-            on_their_way=deque(numbers.on_their_way),
-        )
+        tally, on_their_way = Tally(numbers.sums, contact), deque(numbers.on_their_way)
+        state = LoopsState(estimator, tally, sensors, numbers.motion, on_their_way=on_their_way)
         given = Given(SECOND + clock.period, time, noise, climber, law, target)
-        state.go_through(given, sensors, lambda _: aim, advance)
+        state.go_through(given, lambda _: aim, advance)
         return Numbers.of(state)
 
     return jax.lax.fori_loop(0, count, next_period, numbers)
