@@ -165,19 +165,6 @@ def test_friction_that_jumps_is_learnt():
     assert (all_of_them.peak_torque[2:] > outcome.peak_torque[2:] + 0.1).all()
 
 
-def test_what_was_learnt_of_friction_goes_with_the_suction_in_any_company():
-    lost = replace(BUILT, suction_pressure=1500.0)
-    rough = replace(BUILT, seal_friction_coefficient=0.2)  # so that most of f is learnt away
-    change = Change(np.array([0.4, np.inf, np.inf, np.inf]), lost)
-    still = ON_EIGHT._replace(y=np.array([3.0, 3.0, 3.0, 3.3]))  # the last one has to drive back
-    loops = Loops(still, rough, ControlLaw(BUILT, SLOW), changes=(change,), gauge=0.05)
-    course = BatchRun(EIGHT, 1.0)
-    together, alone = loops.run(course), loops.run(course, block=1)
-    for whole, part in zip(together, alone, strict=True):
-        np.testing.assert_array_equal(whole, part)
-    assert (together.worst[:3] < 0.05).all()
-
-
 @pytest.mark.parametrize(
     ("backend", "installed", "said"),
     [
