@@ -1,47 +1,52 @@
-/* The controller's law and the plain climber once more, in C: the limit for `bench/tick.py` and
- * `bench/batch.py`. Guidance, observer and limits as in climber_uk/control, the step as in
- * climber_uk/closed_loop/unicycle.py; both benchmarks refuse to run if it gives something else. */
+/* The controller's law and the unicycle climber once more, in C: the limit for `bench/tick.py` and
+ * `bench/batch.py`, which refuse to run if it gives something else. Guidance, observer and limits
+ * as in climber_uk/control, the step as in closed_loop/unicycle.py, sums as in closed_loop/outcome.py.
+ * Many climbers lie side by side in rows, and no loop over them has a branch: with -O3 -ffast-math
+ * the compiler does eight at once, libmvec's tanh and atan included. */
 #include <math.h>
 
 typedef struct { double x, y, heading, cosine, sine, speed, yaw_rate; } Motion;
 typedef struct { double drive, turn; } Wrench;
 typedef struct { double x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y; } Target;
 typedef struct { double mass, inertia, radius, half_track, friction, weight, limit; } Climber;
-typedef struct { double k_x, k_y, rate, omega_n, v_s, v_c, fastest; } Gains;
-typedef struct { Climber climber; Gains gains; double friction_speed, bandwidth; } Controller;
-typedef struct { Motion motion; Wrench held, disturbance; int learning; } Memory;
+typedef struct { double k_x, k_y, rate, omega_n, v_s, share, v_c, radius, turn_rate; } Gains;
+typedef struct { Climber climber; Gains gains; double friction_speed, bandwidth; } Law;
+typedef struct { double force, turn, force_1, turn_1, friction; } Learnt;
+typedef struct { Motion motion; Wrench held; Learnt learnt; double learning, direction; } Memory;
 typedef struct {
-  double x, y, heading, cosine, sine, v, v_1, omega, omega_1;
-  double wait, wait_1, hurry, hurry_1, g, g_1, g_2;
+  double x, y, heading, c, s, v, v_1, omega, omega_1;
+  double wait, wait_1, hurry, hurry_1, turn, turn_1, g, g_1, g_2;
 } Track;
 
-static double sign(double x) { return (x > 0) - (x < 0); }
-static double clip(double x, double low, double high) { return fmin(fmax(x, low), high); }
+#define SLOW 0.01
+#define INLINE static inline __attribute__((always_inline))
 
-/* The series is as long as it has to be for a turn below 0.03; see `elementary.rotated`. */
-static void rotate(double c, double s, double angle, double *cosine, double *sine) {
-  double q = angle * angle, dc, ds;
-  if (q < 9e-4) {
-    dc = 1 - q * (1.0 / 2 - q * (1.0 / 24 - q * (1.0 / 720)));
-    ds = angle * (1 - q * (1.0 / 6 - q * (1.0 / 120 - q * (1.0 / 5040))));
-  } else {
-    dc = cos(angle);
-    ds = sin(angle);
-  }
+INLINE double sign(double x) { return (x > 0) - (x < 0); }
+INLINE double clip(double x, double low, double high) { return fmin(fmax(x, low), high); }
+
+/* Good to 1e-16 for less than MOST; who turns faster is not for this code. */
+#define MOST 0.1
+INLINE void rotate(double c, double s, double angle, double *cosine, double *sine) {
+  double q = angle * angle;
+  double dc = 1 - q * (1.0 / 2 - q * (1.0 / 24 - q * (1.0 / 720 - q * (1.0 / 40320))));
+  double ds = angle * (1 - q * (1.0 / 6 - q * (1.0 / 120 - q * (1.0 / 5040))));
   *cosine = dc * c - ds * s;
   *sine = ds * c + dc * s;
 }
 
-static Motion rolled(const Climber *p, Motion m, Wrench w, double time) {
-  double half = time / 2, omega_1 = w.turn / p->inertia, c, s;
+INLINE Motion predicted(const Climber *p, Motion m, Wrench w, double time, double friction) {
+  double half = time / 2, omega_1 = w.turn / p->inertia, c, s, most = p->friction + friction;
   rotate(m.cosine, m.sine, half * (m.yaw_rate + half / 2 * omega_1), &c, &s);
-  double push = w.drive - p->weight * s;
-  double rub = fabs(m.speed) > 0.01 ? copysign(p->friction, m.speed)
-                                    : clip(push, -p->friction, p->friction);
+  double push = w.drive - p->weight * s, held = clip(push, -most, most);
+  double rub = fabs(m.speed) > SLOW ? copysign(most, m.speed) : held;
   double v_1 = (push - rub) / p->mass, way = time * (m.speed + half * v_1);
+  double v = m.speed + time * v_1, stops = m.speed * v < 0;
+  double left = time + m.speed / (stops ? v_1 : 1), back_1 = (push - held) / p->mass;
+  way = stops ? 0.5 * (m.speed * (time - left) + left * left * back_1) : way;
+  v = stops ? left * back_1 : v;
   double angle = time * (m.yaw_rate + half * omega_1);
-  Motion end = {m.x + way * c, m.y + way * s, m.heading + angle, 0, 0,
-                m.speed + time * v_1, m.yaw_rate + time * omega_1};
+  Motion end = {m.x + way * c, m.y + way * s, m.heading + angle, 0, 0, v,
+                m.yaw_rate + time * omega_1};
   rotate(m.cosine, m.sine, angle, &end.cosine, &end.sine);
   return end;
 }
@@ -50,94 +55,127 @@ static Track track(const Gains *k, const Target *t) {
   double c = cos(t->heading), s = sin(t->heading);
   double v = t->v_x * c + t->v_y * s, v_1 = t->a_x * c + t->a_y * s;
   double v_2 = t->j_x * c + t->j_y * s + t->omega * t->omega * v;
-  double fade = k->v_s * k->v_s, root = sqrt(v * v + fade), slope = fade / (root * root * root);
-  double curvature = -3 * v * slope / (root * root), wait = sqrt(v * v + fade / 4);
+  double fade = k->v_s * k->v_s, square = v * v + fade, root = sqrt(square);
+  double slope = fade / (root * square), g_1 = slope * v_1;
+  double wait = sqrt(v * v + fade / 4), more = k->share * fabs(v);
+  int below = more < k->v_c;
+  double hurry = sqrt(fade / 4 + (below ? more * more : k->v_c * k->v_c));
+  double turn = root / k->radius;
+  int slower = turn < k->turn_rate;
   Track found = {t->x, t->y, t->heading, c, s, v, v_1, t->omega, t->omega_1,
-                 wait, v * v_1 / wait, k->v_s / 2 + k->v_c * fabs(v) / root,
-                 k->v_c * sign(v) * slope * v_1, k->k_y * v / root, k->k_y * slope * v_1,
-                 k->k_y * (curvature * v_1 * v_1 + slope * v_2)};
+                 wait, v * v_1 / wait,
+                 hurry, below ? k->share * k->share * v * v_1 / hurry : 0,
+                 slower ? turn : k->turn_rate, slower ? v * v_1 / (root * k->radius) : 0,
+                 k->k_y * v / root, k->k_y * g_1,
+                 k->k_y * (slope * v_2 - 3 * g_1 * v * v_1 / square)};
   return found;
 }
 
-static void demand(const Gains *k, const Track *t, Motion m, double *v_1, double *turning,
-                   double *wanted) {
+INLINE void demand(const Gains *k, const Track *t, Motion m, double *v_1, double *turning,
+                          double *wanted) {
   double dx = m.x - t->x, dy = m.y - t->y, turned = m.heading - t->heading;
   turned -= 2 * M_PI * floor(turned / (2 * M_PI) + 0.5);
-  double e_x = dx * t->cosine + dy * t->sine, e_y = dy * t->cosine - dx * t->sine;
-  double v_x = m.speed * (m.cosine * t->cosine + m.sine * t->sine);
-  double sine_e = m.sine * t->cosine - m.cosine * t->sine;
-  double omega = m.yaw_rate - t->omega;
+  double e_x = dx * t->c + dy * t->s, e_y = dy * t->c - dx * t->s;
+  double v_x = m.speed * (m.cosine * t->c + m.sine * t->s);
+  double sine_e = m.sine * t->c - m.cosine * t->s, omega = m.yaw_rate - t->omega;
   double e_x1 = v_x - t->v + t->omega * e_y, e_y1 = m.speed * sine_e - t->omega * e_x;
   int ahead = e_x * t->v > 0;
   double most = ahead ? t->wait : t->hurry, most_1 = ahead ? t->wait_1 : t->hurry_1;
   double u = k->k_x * e_x / most, part = tanh(u), inside = 1 - part * part;
-  *wanted = t->v - most * part;
-  *v_1 = t->v_1 - (k->k_x * inside * e_x1 + (part - u * inside) * most_1) -
-         k->rate * (m.speed - *wanted);
+  double v = t->v - most * part;
+  *v_1 = t->v_1 - (k->k_x * inside * e_x1 + (part - u * inside) * most_1) - k->rate * (m.speed - v);
   double e_y2 = *v_1 * sine_e + v_x * omega - t->omega_1 * e_x - t->omega * e_x1;
   double w = t->g * e_y, w_1 = t->g_1 * e_y + t->g * e_y1;
   double w_2 = t->g_2 * e_y + 2 * t->g_1 * e_y1 + t->g * e_y2;
   double slope = 1 / (1 + w * w), steered = slope * w_1, led = turned + atan(w);
   double led_1 = omega + steered, led_2 = slope * w_2 - 2 * w * steered * steered;
-  part = tanh(k->omega_n * led / k->fastest);
-  *turning = t->omega_1 - led_2 -
-             k->omega_n * ((1 - part * part) * led_1 + led_1 + k->fastest * part);
+  u = k->omega_n * led / t->turn, part = tanh(u), inside = 1 - part * part;
+  *turning = t->omega_1 - led_2 - k->omega_n * (inside * led_1 + led_1 + t->turn * part) -
+             t->turn_1 * (part - u * inside);
+  *wanted = v * t->v < 0 ? 0 : v;
 }
 
-static Wrench limited(const Climber *p, Wrench w) {
+INLINE Wrench limited(const Climber *p, Wrench w) {
   double to_mean = p->radius / 2, to_twist = to_mean / p->half_track, most = p->limit;
   double mean = to_mean * w.drive, twist = to_twist * w.turn;
-  if (fabs(mean + twist) <= most && fabs(mean - twist) <= most) return w;
-  twist = clip(twist, -most, most);
-  double left = most - fabs(twist);
-  Wrench got = {clip(mean, -left, left) / to_mean, twist / to_twist};
+  int fits = (fabs(mean + twist) <= most) & (fabs(mean - twist) <= most);
+  double cut = clip(twist, -most, most), left = most - fabs(cut);
+  Wrench got = {fits ? w.drive : clip(mean, -left, left) / to_mean,
+                fits ? w.turn : cut / to_twist};
   return got;
 }
 
-/* See and answer an odometry of a period ago, and leave what is to be remembered. */
-void tick(const Controller *k, Memory *memory, const Motion *found, const Target *target,
-          double period, double *torques) {
+INLINE Learnt corrected(const Law *k, const Memory *m, Motion found, double period) {
   const Climber *p = &k->climber;
-  Wrench r = memory->disturbance, acting = {memory->held.drive + r.drive,
-                                            memory->held.turn + r.turn};
-  Motion expected = rolled(p, memory->motion, acting, period);
-  double share = (1 - exp(-k->bandwidth * period)) / period;
-  if (memory->learning) {
-    r.drive += p->mass * share * (found->speed - expected.speed);
-    r.turn += p->inertia * share * (found->yaw_rate - expected.yaw_rate);
-  }
-  Track t = track(&k->gains, target);
-  Wrench wanted, got = memory->held;
-  for (int i = 0; i < 2; i++) {
-    Wrench push = {got.drive + r.drive, got.turn + r.turn};
-    Motion aim = rolled(p, *found, push, period / 2);
-    double v_1, turning, speed;
-    demand(&k->gains, &t, aim, &v_1, &turning, &speed);
-    wanted.drive = p->mass * v_1 + p->friction * tanh(speed / k->friction_speed) +
-                   p->weight * aim.sine - r.drive;
-    wanted.turn = p->inertia * turning - r.turn;
-    got = limited(p, wanted);
-  }
-  memory->learning = fabs(wanted.drive - got.drive) <= 1e-9 && fabs(wanted.turn - got.turn) <= 1e-9;
-  memory->motion = *found;
-  memory->held = got;
-  memory->disturbance = r;
-  double mean = p->radius / 2 * got.drive, twist = p->radius / 2 * got.turn / p->half_track;
-  torques[0] = mean + twist;
-  torques[1] = mean - twist;
+  Learnt old = m->learnt, r = old;
+  Wrench acting = {m->held.drive + old.force, m->held.turn + old.turn};
+  Motion expected = predicted(p, m->motion, acting, period, old.friction);
+  double fresh = 1 - exp(-fmin(k->bandwidth * period, 0.2)), newer = fresh * fresh / period;
+  double v_1 = p->mass * (found.speed - expected.speed) / period;
+  double omega_1 = p->inertia * (found.yaw_rate - expected.yaw_rate) / period;
+  double change = period * old.force_1 + 2 * fresh * v_1, direction = m->direction;
+  double rubs = clip(old.friction - 0.5 * direction * change, -p->friction, p->friction);
+  r.friction = direction * expected.speed > -SLOW ? rubs : old.friction;
+  r.force += change + direction * (r.friction - old.friction);
+  r.turn += period * old.turn_1 + 2 * fresh * omega_1;
+  r.force_1 = fabs(expected.speed) > 1e-3 ? old.force_1 + newer * v_1 : 0;
+  r.turn_1 += newer * omega_1;
+  int learns = m->learning > 0;
+  Learnt now = {learns ? r.force : old.force, learns ? r.turn : old.turn,
+                learns ? r.force_1 : 0, learns ? r.turn_1 : 0,
+                learns ? r.friction : old.friction};
+  return now;
 }
 
-static Motion slid(const Climber *p, Motion m, Wrench w, double direction, double time) {
-  double half = time / 2, turning = w.turn / p->inertia, c_1, s_1;
+/* What is wanted of the wheels where `held` will have led to in half a period. */
+INLINE Wrench wanted_of(const Law *k, const Track *t, Motion found, Wrench held, Learnt r,
+                        double period) {
+  const Climber *p = &k->climber;
+  Wrench push = {held.drive + r.force, held.turn + r.turn};
+  Motion aim = predicted(p, found, push, period / 2, r.friction);
+  double v_1, turning, speed;
+  demand(&k->gains, t, aim, &v_1, &turning, &speed);
+  double rub = (p->friction + r.friction) * tanh(speed / k->friction_speed);
+  Wrench wanted = {p->mass * v_1 + rub + p->weight * aim.sine - r.force,
+                   p->inertia * turning - r.turn};
+  return wanted;
+}
+
+/* See and answer an odometry of a period ago; what is to be remembered has the answer. */
+INLINE Memory answered(const Law *k, Memory m, Motion found, const Track *t, double period) {
+  const Climber *p = &k->climber;
+  Learnt r = corrected(k, &m, found, period);
+  Wrench guess = limited(p, wanted_of(k, t, found, m.held, r, period));
+  Wrench wanted = wanted_of(k, t, found, guess, r, period), got = limited(p, wanted);
+  double fits = (fabs(wanted.drive - got.drive) <= 1e-9) & (fabs(wanted.turn - got.turn) <= 1e-9);
+  Memory now = {found, got, r, fits, fabs(t->v) > SLOW ? sign(t->v) : 0};
+  return now;
+}
+
+INLINE void torques_of(const Climber *p, Wrench w, double *right, double *left) {
+  double mean = p->radius / 2 * w.drive, twist = p->radius / 2 * w.turn / p->half_track;
+  *right = mean + twist;
+  *left = mean - twist;
+}
+
+void tick(const Law *k, Memory *memory, const Motion *found, const Target *target,
+          double period, double *torques) {
+  Track t = track(&k->gains, target);
+  *memory = answered(k, *memory, *found, &t, period);
+  torques_of(&k->climber, memory->held, torques, torques + 1);
+}
+
+INLINE Motion slid(const Climber *p, Motion m, Wrench w, double direction, double time) {
+  double half = time / 2, turning = w.turn / p->inertia, c_1, s_1, c_2, s_2;
+  double angle = time * (m.yaw_rate + half * turning);
   rotate(m.cosine, m.sine, half * (m.yaw_rate + half / 2 * turning), &c_1, &s_1);
-  double angle = time * (m.yaw_rate + half * turning), c_2, s_2;
   rotate(m.cosine, m.sine, angle, &c_2, &s_2);
   double free = (w.drive - direction * p->friction) / p->mass;
   double part = time / 6, fall = part * p->weight / p->mass;
-  double v_1 = m.speed + half * free - fall * (1.25 * m.sine + 2 * s_1 - 0.25 * s_2);
   double v_2 = m.speed + time * free - fall * (m.sine + 4 * s_1 + s_2);
-  Motion end = {m.x + part * (m.speed * m.cosine + 4 * v_1 * c_1 + v_2 * c_2),
-                m.y + part * (m.speed * m.sine + 4 * v_1 * s_1 + v_2 * s_2),
+  double v_14 = 2 * (m.speed + v_2) - 3 * fall * (m.sine - s_2);
+  Motion end = {m.x + part * (m.speed * m.cosine + v_14 * c_1 + v_2 * c_2),
+                m.y + part * (m.speed * m.sine + v_14 * s_1 + v_2 * s_2),
                 m.heading + angle, c_2, s_2, v_2, m.yaw_rate + time * turning};
   return end;
 }
@@ -167,70 +205,124 @@ static Motion advanced(const Climber *p, Motion m, Wrench w, double time) {
   return from_rest(p, there, w, time - until);
 }
 
-/* As `rotate`, without a branch that keeps the compiler from doing eight at once. */
-static inline void rotate_small(double c, double s, double angle, double *cosine, double *sine) {
-  double q = angle * angle;
-  double dc = 1 - q * (1.0 / 2 - q * (1.0 / 24 - q * (1.0 / 720)));
-  double ds = angle * (1 - q * (1.0 / 6 - q * (1.0 / 120 - q * (1.0 / 5040))));
-  *cosine = dc * c - ds * s;
-  *sine = ds * c + dc * s;
+/* Climbers side by side: [j][i] is number j, in the order of its struct, of climber i. */
+enum { BLOCK = 128 };
+typedef double Motions[7][BLOCK];
+
+INLINE Motion motion_of(Motions a, int i) {
+  Motion m = {a[0][i], a[1][i], a[2][i], a[3][i], a[4][i], a[5][i], a[6][i]};
+  return m;
 }
 
-/* Steps of n climbers, each under its wrench: rows of n numbers in the order of the structs. All
- * slide on first; those that stop, rest or turn fast are done again. */
-void open_loops(int n, int steps, double time, const Climber *p, const double *w, double *m) {
-  enum { BLOCK = 256 };
-  double end[7][BLOCK];
-  for (int first = 0; first < n; first += BLOCK) {
-    int many = n - first < BLOCK ? n - first : BLOCK;
-    const double *restrict drive = w + first, *restrict turn = w + n + first;
-    double *restrict x = m + first, *restrict y = x + n, *restrict heading = y + n;
-    double *restrict c = heading + n, *restrict s = c + n, *restrict v = s + n;
-    double *restrict omega = v + n;
-    double half = time / 2, part = time / 6, fall = part * p->weight / p->mass;
-    for (int k = 0; k < steps; k++) {
-      for (int i = 0; i < many; i++) {
-        double turning = turn[i] / p->inertia, c_1, s_1, c_2, s_2;
-        double angle = time * (omega[i] + half * turning);
-        rotate_small(c[i], s[i], half * (omega[i] + half / 2 * turning), &c_1, &s_1);
-        rotate_small(c[i], s[i], angle, &c_2, &s_2);
-        double free = (drive[i] - copysign(p->friction, v[i])) / p->mass;
-        double v_1 = v[i] + half * free - fall * (1.25 * s[i] + 2 * s_1 - 0.25 * s_2);
-        double v_2 = v[i] + time * free - fall * (s[i] + 4 * s_1 + s_2);
-        end[0][i] = x[i] + part * (v[i] * c[i] + 4 * v_1 * c_1 + v_2 * c_2);
-        end[1][i] = y[i] + part * (v[i] * s[i] + 4 * v_1 * s_1 + v_2 * s_2);
-        end[2][i] = heading[i] + angle;
-        end[3][i] = c_2;
-        end[4][i] = s_2;
-        end[5][i] = v_2;
-        end[6][i] = omega[i] + time * turning;
+INLINE void put(Motions a, int i, Motion m) {
+  a[0][i] = m.x, a[1][i] = m.y, a[2][i] = m.heading, a[3][i] = m.cosine;
+  a[4][i] = m.sine, a[5][i] = m.speed, a[6][i] = m.yaw_rate;
+}
+
+INLINE Climber climber_of(double a[7][BLOCK], int i) {
+  Climber p = {a[0][i], a[1][i], a[2][i], a[3][i], a[4][i], a[5][i], a[6][i]};
+  return p;
+}
+
+/* All slide on first; those that rest or stop are done again, one by one. */
+static void step(double p[7][BLOCK], Motions m, double w[2][BLOCK], double time) {
+  Motions end;
+  int rare = 0;
+  for (int i = 0; i < BLOCK; i++) {
+    Climber own = climber_of(p, i);
+    Motion now = motion_of(m, i);
+    Wrench wrench = {w[0][i], w[1][i]};
+    Motion then = slid(&own, now, wrench, copysign(1, now.speed), time);
+    rare |= now.speed * then.speed <= 0;
+    put(end, i, then);
+  }
+  if (rare)
+    for (int i = 0; i < BLOCK; i++)
+      if (m[5][i] * end[5][i] <= 0) {
+        Climber own = climber_of(p, i);
+        Wrench wrench = {w[0][i], w[1][i]};
+        put(end, i, advanced(&own, motion_of(m, i), wrench, time));
       }
-      for (int i = 0; i < many; i++)
-        if (!(v[i] * end[5][i] > 0) || !(fabs(end[2][i] - heading[i]) < 0.03)) {
-          Motion now = {x[i], y[i], heading[i], c[i], s[i], v[i], omega[i]};
-          Wrench own = {drive[i], turn[i]};
-          now = advanced(p, now, own, time);
-          end[0][i] = now.x, end[1][i] = now.y, end[2][i] = now.heading, end[3][i] = now.cosine;
-          end[4][i] = now.sine, end[5][i] = now.speed, end[6][i] = now.yaw_rate;
-        }
-      for (int j = 0; j < 7; j++)
-        for (int i = 0; i < many; i++) m[j * n + first + i] = end[j][i];
-    }
+  for (int j = 0; j < 7; j++)
+    for (int i = 0; i < BLOCK; i++) m[j][i] = end[j][i];
+}
+
+/* Rows of n numbers to rows of a block, whose last ones are those of the last climber. */
+static void get(int rows, int n, int first, const double *from, double (*to)[BLOCK]) {
+  for (int j = 0; j < rows; j++)
+    for (int i = 0; i < BLOCK; i++) to[j][i] = from[j * n + (first + i < n ? first + i : n - 1)];
+}
+
+static void give(int rows, int n, int first, double (*from)[BLOCK], double *to) {
+  for (int j = 0; j < rows; j++)
+    for (int i = 0; i < BLOCK && first + i < n; i++) to[j * n + first + i] = from[j][i];
+}
+
+/* Steps of n climbers, each under its wrench. */
+void open_loops(int n, int steps, double time, const double *climbers, const double *wrenches,
+                double *motions) {
+  double p[7][BLOCK], w[2][BLOCK];
+  Motions m;
+  for (int first = 0; first < n; first += BLOCK) {
+    get(7, n, first, climbers, p);
+    get(2, n, first, wrenches, w);
+    get(7, n, first, motions, m);
+    for (int k = 0; k < steps; k++) step(p, m, w, time);
+    give(7, n, first, m, motions);
   }
 }
 
-/* Ticks of n climbers with their controllers; targets are those that the answers aim at. */
-void closed_loops(int n, int ticks, int steps, double period, const Controller *k,
-                  const Climber *p, const Target *aims, Motion *m, Memory *memories) {
-  for (int i = 0; i < n; i++) {
-    Memory memory = memories[i];
+/* Ticks of n climbers with their controllers, which share a law: `now` are the references at the
+ * odometry, `aims` those that the answers aim at, `load` is what grips. Sums are those of `Sums`,
+ * without falls: squares, saturated, worst, last, settled, peak torque, slip margin. */
+void closed_loops(int n, int ticks, int steps, double period, const Law *k, const double *climbers,
+                  const Target *now, const Target *aims, double load, double *motions,
+                  double *memories, double *sums) {
+  double p[7][BLOCK], w[2][BLOCK], memory[16][BLOCK], sum[7][BLOCK];
+  Motions m;
+  for (int first = 0; first < n; first += BLOCK) {
+    get(7, n, first, climbers, p);
+    get(7, n, first, motions, m);
+    get(16, n, first, memories, memory);
+    get(7, n, first, sums, sum);
     for (int j = 0; j < ticks; j++) {
-      double torques[2];
-      tick(k + i, &memory, m + i, aims + j, period, torques);
-      Wrench w = {(torques[0] + torques[1]) / p[i].radius,
-                  p[i].half_track * (torques[0] - torques[1]) / p[i].radius};
-      for (int s = 0; s < steps; s++) m[i] = advanced(p + i, m[i], w, period / steps);
+      Track t = track(&k->gains, aims + j);
+      double x = now[j].x, y = now[j].y, time = j * period;
+      for (int i = 0; i < BLOCK; i++) {
+        Motion found = motion_of(m, i);
+        Memory old = {motion_of(memory, i),
+                      {memory[7][i], memory[8][i]},
+                      {memory[9][i], memory[10][i], memory[11][i], memory[12][i], memory[13][i]},
+                      memory[14][i], memory[15][i]};
+        Memory is = answered(k, old, found, &t, period);
+        put(memory, i, found);
+        memory[7][i] = is.held.drive, memory[8][i] = is.held.turn;
+        memory[9][i] = is.learnt.force, memory[10][i] = is.learnt.turn;
+        memory[11][i] = is.learnt.force_1, memory[12][i] = is.learnt.turn_1;
+        memory[13][i] = is.learnt.friction;
+        memory[14][i] = is.learning, memory[15][i] = is.direction;
+      }
+      for (int i = 0; i < BLOCK; i++) {
+        Climber own = climber_of(p, i);
+        Wrench held = {memory[7][i], memory[8][i]};
+        double right, left, dx = m[0][i] - x, dy = m[1][i] - y, far = dx * dx + dy * dy;
+        torques_of(&k->climber, held, &right, &left);
+        w[0][i] = (right + left) / own.radius;
+        w[1][i] = own.half_track * (right - left) / own.radius;
+        double beside = own.mass * m[5][i] * m[6][i] + own.weight * m[3][i];
+        double pull = sqrt(w[0][i] * w[0][i] + beside * beside);
+        sum[0][i] += far;
+        sum[1][i] += 1 - memory[14][i];
+        sum[2][i] = fmax(sum[2][i], far);
+        sum[3][i] = far;
+        sum[4][i] = far > 1e-4 ? time : sum[4][i];
+        sum[5][i] = fmax(sum[5][i], fmax(fabs(right), fabs(left)));
+        sum[6][i] = fmin(sum[6][i], load < 100 * pull ? load / pull : 100);
+      }
+      for (int s = 0; s < steps; s++) step(p, m, w, period / steps);
     }
-    memories[i] = memory;
+    give(7, n, first, m, motions);
+    give(16, n, first, memory, memories);
+    give(7, n, first, sum, sums);
   }
 }

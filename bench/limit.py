@@ -15,7 +15,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
 SOURCE = Path(__file__).parent / "climber.c"
-FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC"]
+FLAGS = ["-O3", "-march=native", "-ffast-math", "-shared", "-fPIC"]
 
 
 class Limit:
@@ -39,22 +39,21 @@ class Limit:
 
 
 def climber_numbers(climber: Climber, number: int) -> Array:
-    """Numbers (number, 7) of a `Climber` in C, or of many."""
+    """Numbers (7, number) of a `Climber` in C, or of many."""
     numbers = (
         *(climber.mass, climber.yaw_inertia, climber.wheel_radius, climber.half_track),
         *(climber.seal_friction, climber.weight_along_wall, climber.max_wheel_torque),
     )
-    return np.stack([np.broadcast_to(each, number) for each in numbers], axis=1).astype(float)
+    return np.array([np.broadcast_to(each, number) for each in numbers], float)
 
 
-def controller_numbers(law: ControlLaw, observer: Observer, number: int) -> Array:
-    """Numbers (number, 16) of a `ControlLaw` in C."""
+def law_numbers(law: ControlLaw, observer: Observer) -> Array:
+    """Numbers (18,) of a `Law` in C."""
     gains = law.constraints
     assert isinstance(gains, Guidance)
     numbers = (
         *(gains.along_track_gain, gains.cross_track_gain, gains.speed_rate),
-        *(gains.heading_frequency, gains.fade_speed, gains.catch_up_speed, gains.turn_rate),
-        *(law.options.friction_speed, observer.bandwidth),
+        *(gains.heading_frequency, gains.fade_speed, gains.catch_up_share, gains.catch_up_speed),
+        *(gains.turn_radius, gains.turn_rate, law.options.friction_speed, observer.bandwidth),
     )
-    rest = np.broadcast_to(numbers, (number, 9))
-    return np.concatenate([climber_numbers(law.climber, number), rest], axis=1)
+    return np.concatenate([climber_numbers(law.climber, 1)[:, 0], numbers])

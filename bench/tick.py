@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from limit import Limit, controller_numbers
+from limit import Limit, law_numbers
 from scipy.linalg import sqrtm
 
 from climber_uk.closed_loop.simulate import sampled
@@ -142,17 +142,16 @@ def ticks(law: ControlLaw, known: bool = False) -> Callable[[], None]:
 
 def ticks_in_c(limit: Limit, law: ControlLaw) -> tuple[Callable[[], None], Array]:
     """Ticks of the same law in C, of targets that are known; and their torques (n, 2)."""
-    controllers = controller_numbers(law, Observer(), 1)
     numbers, preview = np.array(motions_on_the_way(TICKS)), sampled(PAPER, 1.0)
     times = (SECOND + round((number + 0.5) * PERIOD * SECOND) for number in range(TICKS))
     aims = np.array([preview.target(time) for time in times])
-    memory, torques = np.zeros((1, 12)), np.zeros((TICKS, 2))
-    memory[0, :7] = numbers[0]
-    arrays = (("ControlLaw", controllers), ("Memory", memory), ("Motion", numbers))
+    memory, torques = np.zeros(16), np.zeros((TICKS, 2))
+    arrays = (("Law", law_numbers(law, Observer())), ("Memory", memory), ("Motion", numbers))
     numbers_of_law, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
-    targets, told = limit.pointer("ReferencePoint", aims), limit.pointer("double", torques)
+    targets, told = limit.pointer("Target", aims), limit.pointer("double", torques)
 
     def some() -> None:
+        memory[14] = 0.0  # it has seen nothing before
         in_c = limit.functions.tick  # which lives as long as the library does
         for i in range(TICKS):
             in_c(numbers_of_law, past, motions + i, targets + i, PERIOD, told + 2 * i)

@@ -15,10 +15,10 @@ def compare(rounds: int) -> None:
     """Print the tables."""
     limit, given = Limit(), inputs(batch.STEPS)
     rollout = timed(lambda: by_mujoco(MODELS[0], batch.OPEN, given, threads=1))
-    kinds = {f"open loop, N = {batch.OPEN}": batch.open_loop(limit, with_numba=True)}
+    kinds = {f"open loop, N = {batch.OPEN}": batch.open_loop(limit, batch.installed())}
     for name, steps in batch.RATES.items():
         title = f"closed loop, N = {batch.CLOSED}, {name} / 5 ms"
-        kinds[title] = batch.closed_loop(limit, True, steps)
+        kinds[title] = batch.closed_loop(limit, batch.installed(), steps)
     for title, ways in kinds.items():
         ways[named(MODELS[0])] = batch.Way(rollout, batch.OPEN * batch.STEPS)
         batch.compared(title, ways, -(-rounds // SLOW))

@@ -14,6 +14,7 @@ from climber_uk.campaign.distributions import Distribution, Uniform, distributio
 from climber_uk.campaign.limits import Limit
 from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, PARAMETERS, SEED
 from climber_uk.campaign.scenario import Node, Scenario
+from climber_uk.closed_loop.period import BACKENDS
 from climber_uk.mechanics import Array
 from climber_uk.messages.topics import NODES, PLANT
 from climber_uk.parameters.declaration import parameter, parameters
@@ -30,6 +31,9 @@ class Size:
     runs: int = parameter(10_000, "", "number of runs; too few: wide intervals", at_least=1)
     seed: int = parameter(0, "", "of all draws: the same seed, the same runs", at_least=0)
     duration: float = parameter(20.0, "s", "of each run; too short: late falls unseen", above=0)
+    backend: str = parameter(
+        "numpy", "", "what computes them, an extra but numpy", choices=BACKENDS
+    )
 
 
 @dataclass(frozen=True)
@@ -111,14 +115,15 @@ def _campaign(tree: Any, directory: Path, instead: dict[str, int]) -> Campaign:
     constraints = shared.get(CONSTRAINT_SET, PARAMETERS[CONSTRAINT_SET].default)
     for name in own:
         names.check_drawn(name, constraints)
-    scenario = Scenario(shared, size.duration)
+    scenario = Scenario(shared, size.duration, size.backend)
     return Campaign(base, size, scenario, own, tuple(Limit.read(text) for text in limits))
 
 
 def _size(given: dict[str, Any]) -> Size:
     for name, value in given.items():
         if name not in Size.__dataclass_fields__:
-            raise ValueError(f"{name} is not one of base, runs, seed, duration, parameters, limits")
+            known = ", ".join(("base", *Size.__dataclass_fields__, "parameters", "limits"))
+            raise ValueError(f"{name} is not one of {known}")
         default = getattr(Size, name)
         given[name] = names.typed(name, value, default)
     return Size(**given)

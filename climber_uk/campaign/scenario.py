@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from climber_uk.campaign.names import PARAMETERS, REQUIRED, SEED, WITHOUT
-from climber_uk.closed_loop.batch import BatchRun, Change, Loops
+from climber_uk.closed_loop.batch import Change, Loops
+from climber_uk.closed_loop.period import BatchRun
 from climber_uk.control.build import settings
 from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber
@@ -43,6 +44,7 @@ class Scenario:
 
     values: Mapping[str, Any]  # of parameters, by full name
     duration: float  # [s]
+    backend: str = "numpy"  # see `BatchRun`
 
     def __post_init__(self) -> None:
         defaults = {name: PARAMETERS[name].default for name in REQUIRED} | WITHOUT
@@ -55,7 +57,8 @@ class Scenario:
         """Trajectory, duration and timing of all runs; raises as `Node.read` does."""
         options = Node(PLANT, self.values).read(SimulationOptions)
         trajectory = build_trajectory(Node(PLANNER, self.values).read)
-        return BatchRun(trajectory, self.duration, options.control_period, options.steps)
+        period, steps = options.control_period, options.steps
+        return BatchRun(trajectory, self.duration, period, steps, backend=self.backend)
 
     def loops(self, own: Mapping[str, Any]) -> Loops:
         """Loops of runs with `own` values (n,) of parameters; raises as `Node.read` does."""

@@ -4,6 +4,7 @@ One: a trajectory -> `simulate.simulate` (the nodes' `Controller` and `Simulated
 of delay, jitter, loss and noise between them) -> `simulate.Run`.
 
 Many: arrays (N,) in the place of numbers -> `batch.Loops` (the nodes' `Estimator`, with
-`pressure_gauge` and `simulation.sensors`) -> steps of the plants (`unicycle`, or `compiled`, which
-is the same by numba) -> `outcome.Tally` -> `outcome.Outcome`.
+`pressure_gauge` and `simulation.sensors`) -> `period.LoopsState`, from one period to the next ->
+steps of the plants (`unicycle`, or `compiled`, which is the same by numba) -> `outcome.Tally` ->
+`outcome.Outcome`. By JAX (`traced`) all of it but the first periods.
 """

@@ -7,17 +7,16 @@ reference that waits, jumps and safe outputs, lost and late messages, motors wit
 odometry, pumps, and every contact but that of a `UnicycleModel` climber.
 """
 
-from collections import deque
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from climber_uk.closed_loop import pressure_gauge
 from climber_uk.closed_loop.outcome import Outcome, Tally
+from climber_uk.closed_loop.period import BatchRun, Given, LoopsState, go_on
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.model import Observer
@@ -25,12 +24,10 @@ from climber_uk.control.timing import Timing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, Wheeled
-from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, indexed, keep_what_is_freed
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques, Wrench
-from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
 from climber_uk.simulation.sensors import Sensors
 
 LOOPS_AT_ONCE = 16384  # fastest, by measurement
@@ -42,18 +39,6 @@ class Change(NamedTuple):
 
     time: Any
     climber: Climber
-
-
-@dataclass(frozen=True)
-class BatchRun:
-    """Trajectory, duration and timing, which all loops share."""
-
-    trajectory: Trajectory
-    duration: float  # [s]
-    period: float = 0.005  # [s] of the controller
-    steps: int = 2  # of the plant in a period
-    delay: int = 0  # periods of a torque on its way to the wheels
-    compiled: bool = False  # the plant, by numba: the extra `fast`
 
 
 @dataclass(frozen=True)
@@ -96,15 +81,31 @@ class Loops:
         ]
         return Outcome(*(np.concatenate(arrays) for arrays in zip(*outcomes, strict=True)))
 
-    def run_block(
-        self, course: BatchRun, preview: Preview, on_period: Callable[[], object] = lambda: None
-    ) -> Outcome:
-        """The same, all loops at once; `on_period` is called in every period."""
-        estimator = Estimator(self.law.climber, self.observer, self.timing)
-        tally = Tally(len(self.start.x), self.contact)
-        motion, step = self.start, course.period / course.steps
-        advance = _advance_function(course.compiled)
-        on_their_way: deque[Torques] = deque()
+    def run_block(self, course: BatchRun, preview: Preview) -> Outcome:
+        """The same, all loops at once."""
+        state, periods = self.begun(course), self.periods(course)
+        if course.backend == "jax":
+            from climber_uk.closed_loop import traced  # JAX takes long to import
+
+            traced.go_on(state, periods, course, preview, self._changing)
+        else:
+            go_on(state, periods, course, preview)
+        return state.tally.outcome()
+
+    def begun(self, course: BatchRun) -> LoopsState:
+        """Loops before their first period."""
+        in_motion = np.any(self.start.speed) or np.any(self.start.yaw_rate)
+        return LoopsState(
+            Estimator(self.law.climber, self.observer, self.timing),
+            Tally.begun(len(self.start.x), self.contact),
+            self.sensors,
+            self.start,
+            None if in_motion else Torques(0.0, 0.0),
+            course.delay,
+        )
+
+    def periods(self, course: BatchRun) -> Iterator[Given]:
+        """What each period begins with, that at the end of the duration included."""
         ticks = round(course.duration / course.period)
         controllers = pressure_gauge.controllers(
             self.law, self._climbers(course, ticks), course.period, self.gauge
@@ -113,29 +114,9 @@ class Loops:
             *(self._noise(ticks), self._climbers(course, ticks)),
             *(controllers, _targets(course, ticks)),
         )
-        for tick, (noise, climber, law, target) in enumerate(zip(*by_tick, strict=True)):
-            measured = motion if noise is None else self.sensors.corrupted(motion, noise)
-            estimator.climber = law.climber
-            estimator.see(SECOND + round(tick * course.period * SECOND), measured)
-            ahead = estimator.ahead(0.0)
-            next_target = preview.target(law.target_time(ahead))
-            assert next_target is not None  # the preview goes beyond the duration
-            command = law.command(ahead, next_target)
-            estimator.sent(ahead.begins, command.wheels, command.fits, next_target.speed)
-            if not on_their_way:
-                before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
-                on_their_way.extend([before] * course.delay)
-            on_their_way.append(command.wheels)
-            wheels = _within_bounds(on_their_way.popleft(), climber, motion)
-            tally.add(tick * course.period, motion, target, command, wheels, climber)
-            wrench = Wrench(*climber.wrench(*wheels))
-            on_period()
-            motion = advance(UnicycleModel.of(climber), motion, wrench, step, course.steps)
-        return tally.outcome()
-
-    @property
-    def _starts_in_motion(self) -> bool:
-        return bool(np.any(self.start.speed) or np.any(self.start.yaw_rate))
+        for tick, given in enumerate(zip(*by_tick, strict=True)):
+            time = tick * course.period
+            yield Given(SECOND + round(time * SECOND), time, *given)
 
     def _noise(self, ticks: int) -> Iterator[Array | None]:
         """For every odometry five numbers of unit variance (5, N), or None if sensors are ideal."""
@@ -148,6 +129,18 @@ class Loops:
             many = min(PERIODS_AT_ONCE, ticks + 1 - first)
             drawn = np.array([random.normal(size=(many, 5)) for random in randoms])
             yield from np.ascontiguousarray(drawn.transpose(1, 2, 0))
+
+    @property
+    def _changing(self) -> set[str]:
+        """Names of what changes of the climbers."""
+        return {
+            field.name
+            for field in fields(Climber)
+            for change in self.changes
+            if not np.array_equal(
+                getattr(self.climber, field.name), getattr(change.climber, field.name)
+            )
+        }
 
     def _climbers(self, course: BatchRun, ticks: int) -> Iterator[Climber]:
         """The true climbers at every period."""
@@ -167,18 +160,3 @@ def _targets(course: BatchRun, ticks: int) -> Iterator[ReferencePoint]:
         target = course.trajectory.at(times).target
         rows = zip(*(each.tolist() for each in target), strict=True)
         yield from (ReferencePoint(*numbers) for numbers in rows)
-
-
-def _advance_function(
-    compiled: bool,
-) -> Callable[[UnicycleModel, Motion, Wrench, float, int], Motion]:
-    if not compiled:
-        return advanced_often
-    from climber_uk.closed_loop.compiled import advanced  # numba takes long to import
-
-    return advanced
-
-
-def _within_bounds(torques: Torques, climber: Climber, motion: Motion) -> Torques:
-    right, left = climber.bounds(motion)
-    return Torques(clipped(torques.right, *right), clipped(torques.left, *left))

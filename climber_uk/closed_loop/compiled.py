@@ -49,7 +49,6 @@ FOR_NUMBA = {
     elementary.with_sign_of: lambda size, of: size if of >= 0 else -size,
     elementary.clipped: lambda value, lowest, highest: min(max(value, lowest), highest),
     elementary.select: lambda condition, this, that: this if condition else that,
-    elementary.everywhere: lambda condition: condition,
     elementary.rotated: _rotated,
     elementary.swept: _swept,
     many.amended: _amended,
@@ -58,7 +57,8 @@ for function, replacement in FOR_NUMBA.items():
     overload(function, strict=False, jit_options=INLINE)(lambda *_, chosen=replacement: chosen)
 for function in (unicycle.slid, unicycle._stuck, unicycle._applied):
     register_jitable(**INLINE)(function)
-for function in (unicycle._from_rest, unicycle._to_rest, unicycle._broken_loose, unicycle.stepped):
+RARE = unicycle._stopped, unicycle._from_rest, unicycle._to_rest, unicycle._broken_loose
+for function in (*RARE, unicycle.stepped):
     register_jitable(**LIKE_C)(function)
 
 

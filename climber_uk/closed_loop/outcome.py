@@ -9,6 +9,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import MAX_MARGIN
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, is_pulled_off
+from climber_uk.mechanics.elementary import anywhere, larger, select, smaller
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
 
 SETTLED = 0.01  # [m] from the reference, within which a loop has settled
@@ -28,22 +29,38 @@ class Outcome(NamedTuple):
     fell: Array  # time of the fall [s]; infinite without one
 
 
-class Tally:
-    """Sums and extremes of `number` loops, period by period."""
+class Sums(NamedTuple):
+    """Sums and extremes of the periods so far, of each loop until its fall, arrays (N,)."""
 
-    def __init__(self, number: int, contact: Contact) -> None:
-        self.contact, self.times = contact, np.zeros(number)
-        self.squares, self.saturated = np.zeros(number), np.zeros(number)
-        self.worst, self.last, self.settled_at = np.zeros((3, number))
-        self.peak = np.zeros(number)
-        self.slip, self.tip = np.full(number, MAX_MARGIN), np.full(number, MAX_MARGIN)
-        self.fell = np.full(number, np.inf)
+    periods: Any
+    squares: Any  # of the distance [m²]
+    saturated: Any
+    worst: Any  # square of the distance [m²]
+    last: Any  # likewise
+    settled: Any
+    peak_torque: Any
+    slip_margin: Any
+    tip_margin: Any
+    fell: Any
+
+
+class Tally:
+    """Sums up many loops, period by period."""
+
+    def __init__(self, sums: Sums, contact: Contact) -> None:
+        self.sums, self.contact = sums, contact
         self._climber: Climber | None = None
         self._on_wall: Any = True  # or an array (N,), once one has fallen
 
+    @classmethod
+    def begun(cls, number: int, contact: Contact) -> "Tally":
+        """Tally of `number` loops."""
+        none, most, never = np.zeros(number), np.full(number, MAX_MARGIN), np.full(number, np.inf)
+        return cls(Sums(*(*[none] * 7, most, most, never)), contact)
+
     def add(
         self,
-        time: float,
+        time: Any,
         motion: Motion,
         target: ReferencePoint,
         command: Command,
@@ -54,20 +71,26 @@ class Tally:
         if climber is not self._climber:
             self._update_fallen(time, climber)
         x, y = motion.x - target.x, motion.y - target.y
-        square, on = x * x + y * y, self._on_wall
-        np.add(self.times, 1, out=self.times, where=on)
-        np.add(self.squares, square, out=self.squares, where=on)
-        np.maximum(self.worst, square, out=self.worst, where=on)
-        np.copyto(self.last, square, where=on)
-        np.copyto(self.settled_at, time, where=(square > SETTLED * SETTLED) & on)
-        np.add(self.saturated, np.logical_not(command.fits), out=self.saturated, where=on)
-        for torque in wheels:
-            np.maximum(self.peak, np.abs(torque), out=self.peak, where=on)
+        square, on, sums = x * x + y * y, self._on_wall, self.sums
+        is_far = square > SETTLED * SETTLED
+        cut = select(command.fits, sums.saturated, sums.saturated + 1)
+        torque = larger(abs(wheels.right), abs(wheels.left))
         lateral = climber.lateral_reaction(motion)
         margin = self.contact.slip_margin(climber, self._into, climber.wrench(*wheels)[0], lateral)
-        np.minimum(self.slip, margin, out=self.slip, where=on)
+        self.sums = Sums(
+            periods=select(on, sums.periods + 1, sums.periods),
+            squares=select(on, sums.squares + square, sums.squares),
+            saturated=select(on, cut, sums.saturated),
+            worst=select(on, larger(sums.worst, square), sums.worst),
+            last=select(on, square, sums.last),
+            settled=select(is_far & on, time, sums.settled),
+            peak_torque=select(on, larger(sums.peak_torque, torque), sums.peak_torque),
+            slip_margin=select(on, smaller(sums.slip_margin, margin), sums.slip_margin),
+            tip_margin=sums.tip_margin,
+            fell=sums.fell,
+        )
 
-    def _update_fallen(self, time: float, climber: Climber) -> None:
+    def _update_fallen(self, time: Any, climber: Climber) -> None:
         """Find the loops that fall at `time` [s], as `climber` becomes the true one."""
         self._climber = climber
         self._into = climber.gravity_into_wall
@@ -75,15 +98,24 @@ class Tally:
         along = climber.weight_along_wall / climber.mass
         tip = self.contact.tip_margin(climber, self._into, along)
         falls = is_pulled_off(climber, normal) | (tip < 1)
-        self.tip = np.minimum(self.tip, tip)
-        self.fell = np.minimum(self.fell, np.where(falls, time, np.inf))
-        if np.isfinite(self.fell).any():
-            self._on_wall = np.isinf(self.fell)
+        sums = self.sums
+        fell = smaller(sums.fell, select(falls, time, np.inf))
+        self.sums = sums._replace(tip_margin=smaller(sums.tip_margin, tip), fell=fell)
+        if anywhere(fell < np.inf):
+            self._on_wall = fell == np.inf
 
     def outcome(self) -> Outcome:
         """Outcome of the periods so far."""
-        times = np.maximum(self.times, 1)
+        sums = Sums(*(np.asarray(each) for each in self.sums))
+        periods = np.maximum(sums.periods, 1)
         return Outcome(
-            *(np.sqrt(self.squares / times), np.sqrt(self.worst), np.sqrt(self.last)),
-            *(self.settled_at, self.peak, self.saturated / times, self.slip, self.tip, self.fell),
+            rms=np.sqrt(sums.squares / periods),
+            worst=np.sqrt(sums.worst),
+            last=np.sqrt(sums.last),
+            settled=sums.settled,
+            peak_torque=sums.peak_torque,
+            saturated=sums.saturated / periods,
+            slip_margin=sums.slip_margin,
+            tip_margin=sums.tip_margin,
+            fell=sums.fell,
         )

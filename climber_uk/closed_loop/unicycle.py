@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from climber_uk.mechanics.climber import DEGREE, GRAVITY, Climber
 from climber_uk.mechanics.elementary import (
     clipped,
-    everywhere,
     rotated,
     select,
     sign,
@@ -76,11 +75,7 @@ def advanced_often(
 def stepped(rates: Accelerations, motion: Motion, time: float) -> Motion:
     """Motion after a step of `time` [s], in which the seal may stick and slide."""
     end = slid(rates, motion, with_sign_of(rates.friction, motion.speed), time)
-    if everywhere(motion.speed * end.speed > 0):
-        return end
-    direction, rests = with_sign_of(1.0, motion.speed), motion.speed == 0
-    end = amended(direction * end.speed < 0, end, _to_rest, rates, motion, direction, time)
-    return amended(rests, end, _from_rest, rates, motion, time)
+    return amended(motion.speed * end.speed <= 0, end, _stopped, rates, motion, end, time)
 
 
 def slid(rates: Accelerations, motion: Motion, friction: Any, time: Any) -> Motion:
@@ -116,6 +111,13 @@ def _stuck(rates: Accelerations, motion: Motion, time: Any) -> Motion:
 def _applied(rates: Accelerations, motion: Motion) -> Any:
     """Forward acceleration [m/s²] without friction."""
     return rates.forward - rates.gravity * motion.sine
+
+
+def _stopped(rates: Accelerations, motion: Motion, end: Motion, time: Any) -> Motion:
+    """Motion after a step in which it rests or stops; `end` is that as if it slid throughout."""
+    direction, rests = with_sign_of(1.0, motion.speed), motion.speed == 0
+    end = amended(direction * end.speed < 0, end, _to_rest, rates, motion, direction, time)
+    return amended(rests, end, _from_rest, rates, motion, time)
 
 
 def _from_rest(rates: Accelerations, motion: Motion, time: Any) -> Motion:

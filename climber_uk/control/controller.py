@@ -103,7 +103,8 @@ class Controller:
 
     @law.setter
     def law(self, law: ControlLaw) -> None:
-        self._law, self.estimator.climber = law, law.climber
+        self._law = law
+        self.estimator.go_over_to(law.climber)
 
     @property
     def state(self) -> State | None:

@@ -4,7 +4,6 @@ One climber, or many in step: arrays (N,) where there are floats. Stamps are int
 nanoseconds, on the clock of the odometry.
 """
 
-import math
 from typing import Any, NamedTuple
 
 from climber_uk.control.control_law import ControlInput
@@ -14,6 +13,7 @@ from climber_uk.control.timing import LONGEST_STEP, Latency, Sample, Timing, Tor
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.elementary import clipped, select, with_sign_of
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 
@@ -42,6 +42,16 @@ class Observed(NamedTuple):
             left += torques.left * time
         whole = whole or 1.0
         return Torques(right / whole, left / whole)
+
+
+class Memory(NamedTuple):
+    """What an `Estimator` has of before, in numbers: of one climber, or of each of many."""
+
+    motion: Motion
+    learnt: DisturbanceEstimate
+    direction: Any  # of the reference
+    learning: Any
+    torques: tuple[Torques, ...]  # those that act, and those on their way
 
 
 class Estimator:
@@ -82,6 +92,28 @@ class Estimator:
         # whether no limit cut the last answer, so that errors are due to the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
+
+    def go_over_to(self, climber: Climber) -> None:
+        """Have another model; friction that was learnt takes no more away than its seal has."""
+        self.climber, f = climber, climber.seal_friction
+        friction = clipped(self.learnt.friction + 0.0 * f, -f, f)
+        self.learnt = self.learnt._replace(friction=friction)
+
+    @property
+    def memory(self) -> tuple[Memory, tuple[Any, ...]]:
+        """What it has of before: numbers, and the times of all, without the clock."""
+        assert self.motion is not None
+        begun, torques = zip(*self._sent.begun, strict=True)
+        numbers = Memory(self.motion, self.learnt, self._direction, self._learning, torques)
+        return numbers, (self.period, self._delay, *(begins - self.stamp for begins in begun))
+
+    def remember(self, memory: Memory, times: tuple[Any, ...], stamp: int) -> None:
+        """Go on from the `memory` of another one, as if its last stamp [ns] had been `stamp`."""
+        self.motion, self.learnt, self._direction, self._learning, torques = memory
+        self.period, self._delay, *begun = times
+        self._period_is_measured, self.stamp, self._sent = True, stamp, TorqueHistory()
+        for begins, each in zip(begun, torques, strict=True):
+            self._sent.add(stamp + begins, each)
 
     @property
     def disturbance(self) -> Wrench:
@@ -124,7 +156,7 @@ class Estimator:
         return self._sent.begin(self.stamp + round(delay * SECOND))
 
     def sent(
-        self, begins: int, torques: Torques, learning: Any = False, speed: float | None = None
+        self, begins: int, torques: Torques, learning: Any = False, speed: Any | None = None
     ) -> None:
         """Torques were sent, which act from `begins` [ns] on, to drive at a `speed` [m/s].
 
@@ -133,7 +165,7 @@ class Estimator:
         """
         self._learning = learning
         if speed is not None:
-            self._direction = math.copysign(1.0, speed) if abs(speed) > SLOW else 0.0
+            self._direction = select(abs(speed) > SLOW, with_sign_of(1.0, speed), 0.0)
         self._sent.add(begins, torques)
         # without odometry, too, that of long ago is not needed
         self._sent.forget_before(max(self.stamp, begins - LONG_AGO))

@@ -112,6 +112,11 @@ class TorqueHistory:
         begins, _ = self._begun.pop()
         self.add(begins, torques)
 
+    @property
+    def begun(self) -> tuple[tuple[int, Torques], ...]:
+        """All that it has: from when torques act [ns], and these."""
+        return tuple(self._begun)
+
     def forget_before(self, time: int) -> None:
         """Keep only what matters from `time` [ns] on."""
         while len(self._begun) > 1 and self._begun[1][0] <= time:

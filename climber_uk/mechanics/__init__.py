@@ -18,6 +18,13 @@ Stamps = np.ndarray[tuple[Any, ...], np.dtype[np.int64]]  # [ns]
 SECOND = 1_000_000_000  # [ns]
 
 
+def namespace(array: Any) -> Any:
+    """The library of an array: numpy, also of a number; else what has the same functions (JAX)."""
+    if isinstance(array, np.ndarray):
+        return np
+    return getattr(array, "__array_namespace__", lambda: np)()
+
+
 def unpack(array: Array) -> tuple[Any, ...]:
     """Components along the last axis: floats of one vector, arrays (...) of many.
 

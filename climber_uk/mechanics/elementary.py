@@ -3,6 +3,9 @@
 Floats stay floats: numpy's functions turn a float into a numpy scalar, and arithmetic on those
 takes three times as long. Conditions are a bool, or an array (N,) of them: `select` and
 `everywhere` take the place of `if`.
+
+Arrays are numpy's or JAX's. The values of the latter are not known while a loop is traced, and
+nothing is left out for what they are: of them `everywhere` is False and `anywhere` True.
 """
 
 import math
@@ -11,23 +14,23 @@ from typing import Any
 
 import numpy as np
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, namespace
 
 FULL_TURN = 2 * math.pi  # [rad]
 Derivatives = tuple[Any, Any, Any, Any]  # (...) of order 0, 1, 2, 3
 
 
-def _either(of_float: Callable[[float], float], of_array: Callable[[Array], Array]) -> Any:
-    return lambda x: of_float(x) if isinstance(x, float) else of_array(x)
+def _either(of_float: Callable[[float], float], name: str) -> Any:
+    return lambda x: of_float(x) if isinstance(x, float) else getattr(namespace(x), name)(x)
 
 
-cos = _either(math.cos, np.cos)
-sin = _either(math.sin, np.sin)
-arctan = _either(math.atan, np.arctan)
-tanh = _either(math.tanh, np.tanh)
-sqrt = _either(math.sqrt, np.sqrt)
-exp = _either(math.exp, np.exp)
-sign = _either(lambda x: math.copysign(1.0, x) if x else 0.0, np.sign)
+cos = _either(math.cos, "cos")
+sin = _either(math.sin, "sin")
+arctan = _either(math.atan, "arctan")
+tanh = _either(math.tanh, "tanh")
+sqrt = _either(math.sqrt, "sqrt")
+exp = _either(math.exp, "exp")
+sign = _either(lambda x: math.copysign(1.0, x) if x else 0.0, "sign")
 
 
 def arctan2(y: Any, x: Any) -> Any:
@@ -35,21 +38,33 @@ def arctan2(y: Any, x: Any) -> Any:
     return math.atan2(y, x) if isinstance(y, float) else np.arctan2(y, x)
 
 
+def larger(this: Any, that: Any) -> Any:
+    """The larger one of two arrays, element by element; not a number if either is none."""
+    return namespace(this).maximum(this, that)
+
+
+def smaller(this: Any, that: Any) -> Any:
+    """The smaller one of two arrays; see `larger`."""
+    return namespace(this).minimum(this, that)
+
+
 def with_sign_of(size: Any, of: Any) -> Any:
     """`size` (>= 0) with the sign of `of`; where all of an array are positive, `size` itself."""
     if isinstance(of, float):
         return math.copysign(size, of)
-    return size if of.min(initial=np.inf) > 0 else np.copysign(size, of)
+    if namespace(of) is np and of.min(initial=np.inf) > 0:
+        return size
+    return namespace(of).copysign(size, of)
 
 
 def wrapped(angle: Any) -> Any:
     """The angle [rad] in [-π, π)."""
     if isinstance(angle, float):
         return angle if -3.0 < angle < 3.0 else (angle + math.pi) % FULL_TURN - math.pi
-    if np.abs(angle).max(initial=0.0) < 3.0:
+    if namespace(angle) is np and np.abs(angle).max(initial=0.0) < 3.0:
         return angle
     # numpy's remainder takes ten times as long
-    return angle - FULL_TURN * np.floor(angle / FULL_TURN + 0.5)
+    return angle - FULL_TURN * namespace(angle).floor(angle / FULL_TURN + 0.5)
 
 
 def clipped(value: Any, lowest: Any, highest: Any) -> Any:
@@ -57,36 +72,41 @@ def clipped(value: Any, lowest: Any, highest: Any) -> Any:
     if isinstance(value, float):
         raised = lowest if value < lowest else value
         return highest if raised > highest else raised
-    return np.clip(value, lowest, highest)
+    return namespace(value).clip(value, lowest, highest)
 
 
 def select(condition: Any, this: Any, that: Any) -> Any:
     """`this` where `condition` holds, else `that`."""
-    if condition is True:
-        return this
-    if isinstance(condition, np.ndarray):
-        return np.where(condition, this, that)
-    return this if condition else that
+    if condition is True or condition is False or isinstance(condition, np.bool_):
+        return this if condition else that
+    return namespace(condition).where(condition, this, that)
 
 
 def everywhere(condition: Any) -> Any:
     """`condition` of a float, or whether all of an array's hold: a bool for `if`."""
-    return condition if condition is True or condition is False else bool(condition.all())
+    if condition is True or condition is False:
+        return condition
+    return namespace(condition) is np and bool(condition.all())
 
 
 def anywhere(condition: Any) -> Any:
     """Whether `condition` holds for the one, or for any of many."""
-    return condition if condition is True or condition is False else bool(condition.any())
+    if condition is True or condition is False:
+        return condition
+    return namespace(condition) is not np or bool(condition.any())
 
 
 def either(condition: Any, these: tuple[Any, Any], those: tuple[Any, Any]) -> tuple[Any, Any]:
     """`select` of two numbers by one condition."""
-    if isinstance(condition, np.ndarray):
-        return np.where(condition, these[0], those[0]), np.where(condition, these[1], those[1])
-    return these if condition else those
+    if condition is True or condition is False or isinstance(condition, np.bool_):
+        return these if condition else those
+    return select(condition, these[0], those[0]), select(condition, these[1], those[1])
 
 
 SMALL_ANGLE = 0.03  # [rad] below which a few terms of the series give sine and cosine
+# of x², as many as it takes up to an eighth of half a turn
+COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(7)]
+SINE = [(-1) ** k / math.factorial(2 * k + 1) for k in range(7)]
 
 
 def rotated(heading: Any, cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any, Any]:
@@ -117,6 +137,8 @@ def _rotate(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[A
     Each result depends on its own angle only, not on those beside it.
     """
     square = angle * angle
+    if namespace(square) is not np:
+        return _rotate_any(cosine, sine, angle)
     largest = square.max(initial=0.0)
     if largest < SMALL_ANGLE * SMALL_ANGLE:
         return _by_series(cosine, sine, angle, square)
@@ -125,6 +147,16 @@ def _rotate(heading: Array, cosine: Array, sine: Array, angle: Array) -> tuple[A
         return np.cos(end), np.sin(end)
     c, s = _by_series(cosine, sine, angle, square)
     return np.where(small, c, np.cos(end)), np.where(small, s, np.sin(end))
+
+
+def _rotate_any(cosine: Any, sine: Any, angle: Any) -> tuple[Any, Any]:
+    """The same without a look at the values: the series of an eighth of the angle, doubled."""
+    part = wrapped(angle) / 8
+    square = part * part
+    c, s = _polynomial(square, *COSINE), part * _polynomial(square, *SINE)
+    for _ in range(3):
+        c, s = 1 - 2 * s * s, 2 * s * c
+    return c * cosine - s * sine, s * cosine + c * sine
 
 
 def _by_series(cosine: Array, sine: Array, angle: Array, square: Array) -> tuple[Array, Array]:

@@ -5,7 +5,6 @@ vectors. So the equations of every tick stand on the components here, floats of 
 arrays (N,) of many; `State` has the same as vectors. Time derivatives end in _1 and _2 (§1.3).
 """
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -60,10 +59,9 @@ class ReferencePoint(NamedTuple):
     j_y: Any  # [m/s³]
 
     @property
-    def speed(self) -> float:
-        """Along its heading [m/s], of one climber."""
-        heading = self.heading
-        return float(self.v_x * math.cos(heading) + self.v_y * math.sin(heading))
+    def speed(self) -> Any:
+        """Along its heading [m/s]."""
+        return self.v_x * cos(self.heading) + self.v_y * sin(self.heading)
 
 
 class Wrench(NamedTuple):

@@ -59,6 +59,8 @@ def test_a_bad_parameter_is_refused_by_name_value_and_bound(campaign_file, param
         ({"limits": ["fell =< 0"]}, "must be a metric, one of <= >="),
         ({"limits": ["fell < nan"]}, "nan must be a finite number"),
         ({"run": 3}, "run is not one of base, runs"),
+        ({"backend": "abacus"}, "backend='abacus' must be one of numpy, numba, jax"),
+        ({"backend": 3}, "backend=3 must be a str"),
     ],
 )
 def test_a_bad_entry_is_refused(campaign_file, entries, said):

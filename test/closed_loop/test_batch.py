@@ -3,7 +3,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from climber_uk.closed_loop.batch import BatchRun, Change, Loops
+from climber_uk.closed_loop import period
+from climber_uk.closed_loop.batch import Change, Loops
+from climber_uk.closed_loop.period import BatchRun
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller, Settings
@@ -161,6 +163,19 @@ def test_friction_that_jumps_is_learnt():
     all_of_them = replace(loops, changes=(Change(0.2, rough),)).run(BatchRun(EIGHT, 1.0))
     np.testing.assert_allclose(all_of_them.rms[:2], outcome.rms[:2], rtol=1e-12)
     assert (all_of_them.peak_torque[2:] > outcome.peak_torque[2:] + 0.1).all()
+
+
+@pytest.mark.parametrize(
+    ("backend", "installed", "said"),
+    [
+        ("torch", True, "backend='torch' must be one of numpy, numba, jax"),
+        ("jax", False, r"backend='jax' is not installed \(pip install jax\)"),
+    ],
+)
+def test_what_cannot_compute_them_is_refused(backend, installed, said, monkeypatch):
+    monkeypatch.setattr(period, "find_spec", lambda name: installed or None)
+    with pytest.raises(ValueError, match=said):
+        BatchRun(EIGHT, 1.0, backend=backend)
 
 
 @pytest.mark.parametrize(

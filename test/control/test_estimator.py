@@ -10,13 +10,13 @@ from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.exact import Exact
 from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.model import Observer
+from climber_uk.control.model import DisturbanceEstimate, Observer
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import Timing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import State, Torques
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
@@ -99,6 +99,31 @@ def test_friction_that_is_not_known_is_learnt(share):
     more = other.seal_friction - CLIMBER.seal_friction
     assert ours.estimator.disturbance[0] == pytest.approx(-more, abs=0.1)
     assert lap(controller(observer=FIXED_MODEL), other).rms(after=2.0) > 0.1
+
+
+@pytest.mark.parametrize("pressure", [2000.0, np.array([2000.0, 7000.0])])
+def test_friction_that_was_learnt_is_none_beyond_that_of_a_seal_with_less_suction(pressure):
+    controlling, lost = controller(BUILT), replace(BUILT, suction_pressure=pressure)
+    estimator = controlling.estimator
+    estimator.learnt = DisturbanceEstimate(force=3.0, friction=-16.0)
+    controlling.law = replace(controlling.law, climber=lost)
+    assert estimator.climber is lost
+    assert estimator.learnt.force == 3.0
+    f = lost.seal_friction  # 14.4, or more than was learnt
+    np.testing.assert_array_equal(estimator.learnt.friction, np.maximum(-16.0, -f))
+
+
+def test_an_estimator_goes_on_from_the_memory_of_another():
+    first, second = (controller().estimator for _ in range(2))
+    motion, period = START.motion, SECOND // 200
+    for tick in range(4):
+        first.see(SECOND + tick * period, motion)
+        first.sent(first.ahead(0.002).begins, Torques(0.1 * tick, 0.2), True, 10.0)
+    second.remember(*first.memory, stamp=5 * SECOND)
+    assert second.memory == first.memory
+    first.see(first.stamp + period, motion)
+    second.see(5 * SECOND + period, motion)
+    assert second.memory == first.memory
 
 
 def test_mass_and_inertia_may_be_off_by_a_fifth():
