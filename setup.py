@@ -29,6 +29,8 @@ setup(
         "cluster": ["distributed"],
         # thousands of closed loops at once, their plants compiled
         "fast": ["numba"],
+        # the same on all of an accelerator, or faster on a CPU
+        "accelerator": ["jax"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo", "coverage"],
     },
     zip_safe=False,
