@@ -94,13 +94,14 @@ class Loops:
 
     def begun(self, course: BatchRun) -> LoopsState:
         """Loops before their first period."""
+        number = len(self.start.x)
         in_motion = np.any(self.start.speed) or np.any(self.start.yaw_rate)
         return LoopsState(
             Estimator(self.law.climber, self.observer, self.timing),
-            Tally.begun(len(self.start.x), self.contact),
+            Tally.begun(number, self.contact),
             self.sensors,
             self.start,
-            None if in_motion else Torques(0.0, 0.0),
+            None if in_motion else Torques(*np.zeros((2, number))),
             course.delay,
         )
 

@@ -21,6 +21,7 @@ from climber_uk.mechanics.elementary import (
     with_sign_of,
     wrapped,
 )
+from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import parameter, parameters
 
@@ -180,12 +181,11 @@ class Observer:
         heading_change = wrapped(measured.heading - heading)
 
         memory = exp(-self.pose_bandwidth * time)
-        new = 1 - memory
-        if everywhere(self.bandwidth > 0):
-            g, h, k = 1 - memory**3, 1.5 * (1 - memory**2) * new, new**3
-        else:
-            g, h, k = 1 - memory**2, new**2, 0.0
-            learnt = _faded(learnt, time)
+        new, learns = 1 - memory, self.bandwidth > 0
+        g = select(learns, 1 - memory**3, 1 - memory**2)
+        h = select(learns, 1.5 * (1 - memory**2) * new, new**2)
+        k = select(learns, new**3, 0.0)
+        learnt = chosen(learns, learnt, _faded(learnt, time))
         x, y = x + g * (ahead * cosine - beside * sine), y + g * (ahead * sine + beside * cosine)
         v, omega = v + h / time * ahead, omega + h / time * heading_change
         motion = Motion(x, y, *rotated(heading, cosine, sine, g * heading_change), v, omega)

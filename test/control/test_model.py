@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, predict
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import State, Torques, Wrench
+from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench
 from climber_uk.simulation.plant import Plant
 
 CLIMBER = Climber()
@@ -139,3 +139,21 @@ def test_errors_of_the_pose_filter_decay_with_all_poles_at_one_place(bandwidth, 
     decays = np.poly([np.exp(-observer.pose_bandwidth * h)] * order)
     np.testing.assert_allclose(np.convolve(errors, decays, mode="valid"), 0, atol=1e-12)
     assert abs(errors[0]) > 0.01
+
+
+def test_of_many_that_take_speeds_from_poses_each_has_its_own_bandwidth():
+    bandwidths = [0.0, 14.0]
+    learnt = DisturbanceEstimate(3.0, 0.2, friction=1.0)
+    expected = Motion.at(1.0, 2.0, 0.3, 0.5, 0.1)
+    measured = Motion.at(1.01, 2.02, 0.31, 0.5, 0.1)
+
+    def corrected(bandwidth, expected):
+        observer = Observer(bandwidth=bandwidth, velocity_source="pose")
+        shares = observer.shares(0.005, 0.0)
+        return observer.corrected(Climber(), learnt, expected, measured, 0.005, shares)
+
+    many = corrected(np.array(bandwidths), Motion(*(np.full(2, each) for each in expected)))
+    for i, bandwidth in enumerate(bandwidths):
+        for got, wanted in zip(many, corrected(bandwidth, expected), strict=True):
+            for numbers, number in zip(got, wanted, strict=True):
+                assert np.broadcast_to(numbers, 2)[i] == pytest.approx(number, rel=1e-12)
