@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from importlib.util import find_spec
+from multiprocessing import get_context
 from typing import NamedTuple
 
 import numpy as np
@@ -182,7 +183,7 @@ def half(number: int) -> None:
 
 def two_processes() -> float:
     """How many times as fast two processes are as one, for the same loops in the same blocks."""
-    with ProcessPoolExecutor(2) as pool:
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:  # JAX has threads
         list(pool.map(half, [LOOPS_AT_ONCE // 8] * 2))  # they have started
         ratios = []
         for _ in range(3):
