@@ -17,17 +17,9 @@ from climber_uk.mechanics import Array
 MAX_SWEEPS = 5000  # a few suffice, unless contacts only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
 FEW = 4  # contacts, for which sweeps alone are faster
-NEAR = (
-    1e-2,
-    1e-4,
-    1e-6,
-    1e-8,
-    1e-10,
-    1e-12,
-)  # [m/s] of sliding, below which friction is taken for viscous
+NEAR = 1e-3, 1e-6, 1e-9, 1e-12  # [m/s] of sliding, below which friction is taken for viscous
 STICKING = 100.0  # times the smallest of these
-MAX_STEPS = 60  # of Newton's method, with each of these
-ROUNDING = 1e-14  # of the minimised function
+MAX_STEPS = 40  # of Newton's method, with each of these
 SMALLEST = 1e-90  # [N s] of an impulse, below which it counts as 0: its cube still is a number
 
 
@@ -46,7 +38,9 @@ def solve_friction_impulses(
     And for each cone whether its contact sticks.
     """
     if len(cones) > FEW and lightness.all():
-        return _by_newton(velocity, 1 / lightness, cones)
+        found = _by_newton(velocity, 1 / lightness, cones)
+        if found is not None:
+            return found
     velocity = velocity.copy()
     impulses: list[Array] = [np.zeros(len(cone.rows)) for cone in cones]
     per_impulse = [lightness[:, None] * cone.rows.T for cone in cones]  # M⁻¹ Hᵀ
@@ -71,37 +65,41 @@ def solve_friction_impulses(
     return velocity, sticks
 
 
-def _by_newton(velocity: Array, masses: Array, cones: list[Cone]) -> tuple[Array, list[bool]]:
-    """The same, with √(s² + ε²) in the place of |s| and an ε that shrinks: see `NEAR`."""
+def _by_newton(
+    velocity: Array, masses: Array, cones: list[Cone]
+) -> tuple[Array, list[bool]] | None:
+    """The same, with √(s² + ε²) in the place of |s| and ε shrinking by `NEAR`; None: not found.
+
+    Newton's method on ν, and on the directions w = s/√(s² + ε²) as unknowns of their own (Chan,
+    Golub & Mulet 1999): so it takes few steps where contacts stick, too.
+    """
     limits = np.array([cone.limit for cone in cones])
-    lengths = [len(cone.rows) for cone in cones]
-    rows = np.concatenate([cone.rows for cone in cones])
-    owner = np.repeat(range(len(cones)), lengths)  # of each row
-
-    def sliding(of: Array, near: float) -> tuple[Array, Array, float]:
-        s, change = rows @ of, of - velocity
-        size = np.sqrt(np.bincount(owner, s * s) + near**2)
-        return s, size, float(change * masses @ change / 2 + limits @ size)
-
-    found = velocity
+    rows = np.zeros((len(cones), max(len(cone.rows) for cone in cones), len(velocity)))
+    for number, cone in enumerate(cones):
+        rows[number, : len(cone.rows)] = cone.rows
+    flat = rows.reshape(-1, len(velocity))
+    found, directions = velocity, np.zeros(rows.shape[:2])
     for near in NEAR:
-        s, size, height = sliding(found, near)
         for _ in range(MAX_STEPS):
-            pull = (limits / size)[owner]  # impulse per sliding
-            slope = masses * (found - velocity) + rows.T @ (pull * s)
-            turned = np.zeros((len(cones), len(velocity)))
-            np.add.at(turned, owner, s[:, None] * rows)
-            curvature = np.diag(masses) + rows.T @ (pull[:, None] * rows)
-            curvature -= turned.T @ ((limits / size**3)[:, None] * turned)
-            step = 2 * np.linalg.solve(curvature, slope)
-            lower = np.inf
-            while lower > height + ROUNDING * abs(height) and np.abs(step).max() > UNCHANGED / 2:
-                step /= 2
-                s, size, lower = sliding(found - step, near)
-            found, height = found - step, lower
+            s = rows @ found
+            size = np.sqrt((s * s).sum(axis=1) + near * near)
+            pull = limits / size  # impulse per sliding
+            weighed = (pull[:, None, None] * rows).reshape(flat.shape)
+            turned = (s[:, None, :] @ rows)[:, 0]
+            held = ((pull / size)[:, None, None] * directions[:, None, :] @ rows)[:, 0]
+            curvature = flat.T @ weighed - (turned.T @ held + held.T @ turned) / 2
+            curvature += np.diag(masses)
+            step = np.linalg.solve(curvature, masses * (velocity - found) - weighed.T @ s.ravel())
+            slid = rows @ step
+            along = (s * slid).sum(axis=1) / size
+            change = (s + slid - directions * along[:, None]) / size[:, None] - directions
+            found, directions = found + step, directions + change
+            directions /= np.maximum(1.0, np.sqrt((directions**2).sum(axis=1)))[:, None]
             if np.abs(step).max() <= UNCHANGED + near / 1e6:
                 break
-    return found, (size < STICKING * NEAR[-1]).tolist()
+        else:
+            return None
+    return found, (np.sqrt(((rows @ found) ** 2).sum(axis=1)) < STICKING * NEAR[-1]).tolist()
 
 
 def impulse_against(sliding: Array, W: Array, limit: float) -> Array:

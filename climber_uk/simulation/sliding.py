@@ -18,7 +18,7 @@ from climber_uk.simulation.cones import Cone, solve_friction_impulses
 from climber_uk.simulation.inputs import Inputs
 from climber_uk.simulation.rigid_body import RigidBody, forward_speed
 
-PARTS, PARTS_SCRUBBING = 8, 2  # of a step; where wheels scrub, the motion is smooth
+PARTS, PARTS_SCRUBBING = 8, 1  # of a step; where wheels scrub, the motion is smooth
 STUCK = 1e-10  # [m/s] of sliding that the iteration may leave where a contact sticks
 
 
