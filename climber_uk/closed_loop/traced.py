@@ -36,7 +36,6 @@ os.environ["XLA_FLAGS"] = f"{FLAG} {os.environ.get('XLA_FLAGS', '')}"
 BY_NUMPY = 3  # periods, beside the delay: then an estimator's memory is complete
 AT_ONCE = 64  # periods
 PRESSURE = "suction_pressure"  # what controllers are told of a change
-BY_NUMPY = 3  # periods, and the delay of torques: then an estimator's memory is complete
 
 
 class Slot:
