@@ -121,7 +121,8 @@ class Loops:
             next_target = preview.target(law.target_time(ahead))
             assert next_target is not None  # the preview goes beyond the duration
             command = law.command(ahead, next_target)
-            estimator.sent(ahead.begins, command.wheels, command.fits, next_target.speed)
+            speeds = next_target.speed, command.yaw_rate
+            estimator.sent(ahead.begins, command.wheels, command.fits, *speeds)
             if not on_their_way:
                 before = command.wheels if self._starts_in_motion else Torques(0.0, 0.0)
                 on_their_way.extend([before] * course.delay)
