@@ -9,6 +9,7 @@ import argparse
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,14 +65,16 @@ class WithMatrices(ControlLaw):
 
     solve: Callable[[Array, Array, Array, Array], Array] = as_the_paper
 
-    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
+    def closed_form(
+        self, prepared: Any, motion: Motion, friction: Any = 0.0, *_: Any
+    ) -> tuple[Any, Any, Any]:
         """See `ControlLaw.generic`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
         demand = self.constraints.desired_acceleration(prepared, motion)
         direction = np.tanh(demand.speed / self.options.friction_speed)
         Q = climber.applied_force(heading, direction)
         Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
-        return float(along(heading, Qc)), float(Qc[2])
+        return float(along(heading, Qc)), float(Qc[2]), demand.yaw_rate
 
 
 def motions_on_the_way(number: int) -> list[Motion]:
@@ -101,10 +104,13 @@ def tick(controller: Controller, stamp: int, motion: Motion) -> Command:
     target_time = controller.law.target_time(ahead)
     target = active.target(ahead.motion, ahead.begins, target_time)
     assert target.point is not None
-    command = controller.law.command(ahead, target.point)
+    at = partial(active.around, target, target_time)
+    course = estimator.slip.course(controller.law.climber, target.point, at)
+    command = controller.law.command(ahead._replace(course=course), target.point)
     check_finite(command.wheels)
     active.go_on(target)
-    estimator.sent(ahead.begins, command.wheels, command.fits, target.point.speed)
+    speeds = target.point.speed, command.yaw_rate
+    estimator.sent(ahead.begins, command.wheels, command.fits, *speeds)
     return command
 
 

@@ -4,7 +4,8 @@ Whatever is a number in a `Climber`, in gains, in sensors or in a start may be a
 for each loop. Loops run in blocks that fit the cache, and their outcome is summed up on the way:
 memory grows with the block, not with N or the duration. Not in here, but in `simulate`: a
 reference that waits, jumps and safe outputs, lost and late messages, motors with a lag, wheel
-odometry, pumps, and every contact but that of a `UnicycleModel` climber.
+odometry, pumps, and every contact but that of a `UnicycleModel` climber: its wheels hold, and no
+side slip is learnt.
 """
 
 from collections.abc import Iterator

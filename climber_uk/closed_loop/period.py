@@ -89,7 +89,8 @@ class LoopsState:
         next_target = target_at(law.target_time(ahead))
         assert next_target is not None  # the preview goes beyond the duration
         command = law.command(ahead, next_target)
-        estimator.sent(ahead.begins, command.wheels, command.fits, next_target.speed)
+        speeds = next_target.speed, command.yaw_rate
+        estimator.sent(ahead.begins, command.wheels, command.fits, *speeds)
         if not self.on_their_way:
             self.on_their_way.extend([self.first or command.wheels] * self.delay)
         self.on_their_way.append(command.wheels)

@@ -1,9 +1,10 @@
 """From odometry and reference to wheel torques; pure numerics, no ROS.
 
 `build` makes it all as parameters say: a `controller.Controller`, through which an odometry goes
-from top to bottom. What it tells: `estimator` (by the `model`; `timing`: when torques act). Whether
-that can be, and whether to follow: `twist`, `guard`, `safety`, else the `safe_output`. Where to:
-`active_reference` (`approach`, `time_scaling`). Which torques: `control_law`, with one of the
-`constraints` (which acceleration: `guidance`, `exact`, as `constraint_set` says).
+from top to bottom. What it tells: `estimator` (by the `model`; `timing`: when torques act;
+`side_slip`: wheels that give way). Whether that can be, and whether to follow: `twist`, `guard`,
+`safety`, else the `safe_output`. Where to: `active_reference` (`approach`, `time_scaling`). Which
+torques: `control_law`, with one of the `constraints` (which acceleration: `guidance`, `exact`, as
+`constraint_set` says).
 docs/architecture.md follows one odometry through it.
 """

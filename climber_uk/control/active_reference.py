@@ -194,6 +194,16 @@ class ActiveReference:
             return Target(Mode.WAITING)
         return Target(Mode.FOLLOWING, "", point, self.is_gentle, progress)
 
+    def around(self, target: Target, target_time: int, later: float) -> ReferencePoint:
+        """The point of a target, `later` [s]; the first or the last there is, if that is beyond."""
+        followed, point = self.followed, target.point
+        assert followed is not None
+        assert point is not None
+        shift = target.progress.at(0)
+        first, last = int(followed.times[0]) - shift, int(followed.times[-1]) - shift
+        time = min(max(target_time + round(later * SECOND), first), last)
+        return target.progress.target(followed, time) or point
+
     def slowed(self, target: Target, missing: float, target_time: int, period: float) -> Target:
         """Target that asks `missing` [m/s²] less along the climber; see `Pace.slowed`."""
         preview, progress = self.followed, target.progress

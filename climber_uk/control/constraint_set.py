@@ -58,9 +58,18 @@ def demanded(constraints: ConstraintSet, state: State, reference: Reference) -> 
     return constraints.desired_acceleration(constraints.prepare(reference.target), state.motion)
 
 
-def rows(state: State, desired: DesiredAcceleration) -> tuple[Array, Array]:
-    """A (..., 3, 3) and b (..., 3) of desired accelerations and of no-slip (18); A Aᵀ = 1."""
+def rows(
+    state: State, desired: DesiredAcceleration, slip: float = 0.0, rate: float = 0.0
+) -> tuple[Array, Array]:
+    """A (..., 3, 3) and b (..., 3) of desired accelerations and of no-slip (18); A Aᵀ = 1.
+
+    Wheels that give way sideways at v_y = `slip` v, of a course that turns from the heading at
+    `rate` [rad/s], have [sinθ -cosθ 0] q̇ = -v_y in the place of (17).
+    """
     slip_row, slip_b = no_slip(state)
+    v, omega = state.forward_speed, state.yaw_rate
+    slip_b = slip_b - slip * desired.forward - v * (1 + slip * slip) * rate
+    forward = desired.forward - omega * slip * v
     sine, minus_cosine, zero = unpack(slip_row)
     A = np.stack([pack(-minus_cosine, sine, zero), pack(zero, zero, zero + 1), slip_row], axis=-2)
-    return A, pack(desired.forward, desired.yaw, slip_b)
+    return A, pack(forward, desired.yaw, slip_b)

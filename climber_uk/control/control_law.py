@@ -15,11 +15,13 @@ import numpy as np
 
 from climber_uk.control.constraint_set import ConstraintSet, rows
 from climber_uk.control.model import predict
+from climber_uk.control.side_slip import Course
 from climber_uk.mechanics import SECOND, Array, pack, unpack
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
 from climber_uk.mechanics.quantities import (
     Bounds,
+    DesiredAcceleration,
     Motion,
     ReferencePoint,
     State,
@@ -32,7 +34,8 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
-Solve = Callable[[Any, Motion, Any], tuple[Any, Any]]  # force and moment
+TURN_SPEED = 0.05  # [rad/s] of a wanted yaw rate below which what resists turning fades
+Solve = Callable[..., tuple[Any, Any, Any]]  # force, moment, yaw rate wanted
 
 
 @parameters(slots=True)
@@ -70,6 +73,9 @@ class ControlInput(NamedTuple):
     period: float  # [s] for which the answer is going to act
     begins: int = 0  # [ns] when that begins
     friction: Any = 0.0  # [N] of the seal beyond the climber's
+    turning: Any = 0.0  # [N m] that resists turning
+    aside: Any = 0.0  # [m/s] at which wheels give way to the left
+    course: Course | None = None  # None: where its heading is
 
 
 class Command(NamedTuple):
@@ -79,6 +85,7 @@ class Command(NamedTuple):
     demanded: Wrench
     lateral: Any  # [N] reaction of the wheels
     lost: Wrench  # drive and moment that limits took away; of many, `NOTHING` if none of any
+    yaw_rate: Any = 0.0  # wanted [rad/s]
 
     @property
     def torques(self) -> Array:
@@ -138,55 +145,93 @@ class ControlLaw:
         A fixed-point iteration of two passes: the answer itself moves the state to the time that it
         is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
-        climber, (motion, held, (r_F, r_N), period, _, friction) = self.climber, situation
+        motion, held, (r_F, r_N), period, _, friction, turning, aside, course = situation
+        climber = self.climber
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         right, left = self._fixed_bounds or self._bounds(situation)
         solve = self._solve
         drive, yaw_moment = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
-            predicted = predict(climber, motion, drive + r_F, yaw_moment + r_N, ahead, friction)
-            force, moment = solve(prepared, predicted, friction)
+            force, moment = drive + r_F, yaw_moment + r_N
+            predicted = predict(climber, motion, force, moment, ahead, friction, turning, aside)
+            force, moment, yaw_rate = solve(prepared, predicted, friction, turning, course)
             force, moment = force - r_F, moment - r_N
             drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
         lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
         lateral = climber.lateral_reaction(predicted)
-        return Command(Torques(tau_r, tau_l), Wrench(force, moment), lateral, lost)
+        return Command(Torques(tau_r, tau_l), Wrench(force, moment), lateral, lost, yaw_rate)
 
-    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
+    def closed_form(
+        self,
+        prepared: Any,
+        motion: Motion,
+        friction: Any = 0.0,
+        turning: Any = 0.0,
+        course: Course | None = None,
+    ) -> tuple[Any, Any, Any]:
         """Qc = M Aᵀ b - Q (docs/theory.md, §4.2) in the climber's frame.
 
-        Forward [N] and about z [N m]; floats, or arrays (N,) of many climbers. `friction` [N] is
-        that beyond the climber's.
+        Forward [N] and about z [N m], and the yaw rate wanted [rad/s]; floats, or arrays (N,) of
+        many climbers. `friction` [N] is that beyond the climber's, and `turning` [N m] resists.
         """
-        v_1, yaw_acceleration, speed = self.constraints.desired_acceleration(prepared, motion)
+        v_1, yaw_acceleration, speed, yaw_rate = self._desired(prepared, motion, course)
+        if course is not None:
+            v_1 = v_1 - motion.yaw_rate * motion.speed * course.slope
         mass, inertia, modelled, weight = self.climber.inertial
         rubbing = (modelled + friction) * tanh(speed / self.options.friction_speed)
-        return mass * v_1 + rubbing + weight * motion.sine, inertia * yaw_acceleration
+        scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
+        force = mass * v_1 + rubbing + weight * motion.sine
+        return force, inertia * yaw_acceleration + scrubbing, yaw_rate
 
-    def generic(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
+    def _desired(self, prepared: Any, motion: Motion, course: Course | None) -> DesiredAcceleration:
+        """What constraints ask of a climber on its `course`, which they take for its heading.
+
+        What goes along it at V = v / cosβ is, to them, a climber whose wheels hold.
+        """
+        constraints = self.constraints
+        if course is None:
+            return constraints.desired_acceleration(prepared, motion)
+        along = course.motion(motion)
+        desired = constraints.desired_acceleration(prepared, along)
+        forward = desired.forward * course.cosine - along.speed * course.sine * course.rate
+        yaw, yaw_rate = desired.yaw - course.acceleration, desired.yaw_rate - course.rate
+        return DesiredAcceleration(forward, yaw, desired.speed, yaw_rate)
+
+    def generic(
+        self,
+        prepared: Any,
+        motion: Motion,
+        friction: Any = 0.0,
+        turning: Any = 0.0,
+        course: Course | None = None,
+    ) -> tuple[Any, Any, Any]:
         """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
 
-        Rows that constraints give themselves need no closed form.
+        Rows that constraints give themselves need no closed form; they know of no side slip.
         """
-        state, heading, constraints = State.moving(motion), motion.heading, self.constraints
+        heading, constraints, yaw_rate = motion.heading, self.constraints, 0.0
+        ratio = 0.0 if course is None else course.slope
+        state = State.moving(motion, ratio * motion.speed)
         if hasattr(constraints, "rows"):
             A, b, speed = constraints.rows(prepared, state)
         else:
-            desired = constraints.desired_acceleration(prepared, motion)
-            (A, b), speed = rows(state, desired), desired.speed
+            desired = self._desired(prepared, motion, course)
+            speed, yaw_rate = desired.speed, desired.yaw_rate
+            A, b = rows(state, desired, ratio, 0.0 if course is None else course.rate)
         direction = tanh(speed / self.options.friction_speed)
         Q = self.climber.applied_force(heading, direction)
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
-        return along(heading, Qc) + friction * direction, unpack(Qc)[2]
+        scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
+        return along(heading, Qc) + friction * direction, unpack(Qc)[2] + scrubbing, yaw_rate
 
     def of_forces(
-        self, target: ReferencePoint, motion: Motion, friction: Any = 0.0
-    ) -> tuple[Any, Any]:
+        self, target: ReferencePoint, motion: Motion, friction: Any = 0.0, *_: Any
+    ) -> tuple[Any, Any, Any]:
         """Force and moment of another law, which knows the climber's friction only."""
         assert self.other is not None
         force, moment = self.other.wrench(self.climber, target, motion)
-        return force + friction * tanh(target.speed / self.options.friction_speed), moment
+        return force + friction * tanh(target.speed / self.options.friction_speed), moment, 0.0
 
     def braking(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

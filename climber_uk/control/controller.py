@@ -11,6 +11,7 @@ while there is none.
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from climber_uk.control.active_reference import ActiveReference
@@ -349,7 +350,9 @@ class Controller:
             point = target.point
             if point is None:
                 return target.mode, target.detail, None
-            law = self._law_for(target.is_gentle)
+            at = partial(active.around, target, target_time)
+            course = estimator.slip.course(self._law.climber, point, at)
+            ahead, law = ahead._replace(course=course), self._law_for(target.is_gentle)
             command = law.command(ahead, point)
             lost = command.lost.force
             if abs(lost) > CUT and active.pacing.catch_up > 0:
@@ -359,7 +362,8 @@ class Controller:
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
         active.go_on(target)
-        estimator.sent(ahead.begins, command.wheels, command.fits, point.speed)
+        wheels, fits, speeds = command.wheels, command.fits, (point.speed, command.yaw_rate)
+        estimator.sent(ahead.begins, wheels, fits, *speeds)
         return target.mode, target.detail, command
 
     def _law_for(self, is_gentle: bool) -> ControlLaw:

@@ -7,13 +7,14 @@ nanoseconds, on the clock of the odometry.
 from typing import Any, NamedTuple
 
 from climber_uk.control.control_law import ControlInput
-from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, Shares, predict
+from climber_uk.control.model import SLOW, SLOW_TURN, DisturbanceEstimate, Observer, Shares, predict
 from climber_uk.control.safety import Safety
+from climber_uk.control.side_slip import NO_SLIP
 from climber_uk.control.timing import LONGEST_STEP, Latency, Sample, Timing, TorqueHistory
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import clipped, select, with_sign_of
+from climber_uk.mechanics.elementary import clipped, select, sign
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 
@@ -50,6 +51,7 @@ class Memory(NamedTuple):
     motion: Motion
     learnt: DisturbanceEstimate
     direction: Any  # of the reference
+    turn: Any
     learning: Any
     torques: tuple[Torques, ...]  # those that act, and those on their way
 
@@ -84,11 +86,13 @@ class Estimator:
         self._sent.restart()
         self.motion: Motion | None = None
         self._last_odometry: Motion | None = None  # as it came
+        self._last_pose: Motion | None = None  # the same of any source
 
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
-        self.learnt = DisturbanceEstimate()
+        self.learnt, self.slip = DisturbanceEstimate(), NO_SLIP
         self._direction = 0.0  # of the reference: 1 forwards, -1 backwards, 0 at rest
+        self._turn: Any = 0.0  # as wanted: 1 to the left, -1 to the right, 0 hardly
         # whether no limit cut the last answer, so that errors are due to the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
@@ -104,12 +108,13 @@ class Estimator:
         """What it has of before: numbers, and the times of all, without the clock."""
         assert self.motion is not None
         begun, torques = zip(*self._sent.begun, strict=True)
-        numbers = Memory(self.motion, self.learnt, self._direction, self._learning, torques)
+        ways = self._direction, self._turn
+        numbers = Memory(self.motion, self.learnt, *ways, self._learning, torques)
         return numbers, (self.period, self._delay, *(begins - self.stamp for begins in begun))
 
     def remember(self, memory: Memory, times: tuple[Any, ...], stamp: int) -> None:
         """Go on from the `memory` of another one, as if its last stamp [ns] had been `stamp`."""
-        self.motion, self.learnt, self._direction, self._learning, torques = memory
+        self.motion, self.learnt, self._direction, self._turn, self._learning, torques = memory
         self.period, self._delay, *begun = times
         self._period_is_measured, self.stamp, self._sent = True, stamp, TorqueHistory()
         for begins, each in zip(begun, torques, strict=True):
@@ -119,7 +124,8 @@ class Estimator:
     def disturbance(self) -> Wrench:
         """Force [N] along the climber and moment [N m] beside the model's, friction included."""
         learnt = self.learnt
-        return Wrench(learnt.force - self._direction * learnt.friction, learnt.moment)
+        moment = learnt.moment - self._turn * learnt.turning
+        return Wrench(learnt.force - self._direction * learnt.friction, moment)
 
     def see(self, stamp: int, motion: Motion) -> Observed | None:
         """Correct state and disturbance by an odometry of `stamp` [ns], newer than the last.
@@ -144,8 +150,9 @@ class Estimator:
         """Situation when an answer to the last odometry, given at its `age` [s], begins to act."""
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
-        held, friction = self._sent.last, learnt.friction
-        return ControlInput(motion, held, disturbance, self.period, begins, friction)
+        held, resistance = self._sent.last, (learnt.friction, learnt.turning)
+        aside = self.slip.speed(self.climber, motion) if self.slip is not NO_SLIP else 0.0
+        return ControlInput(motion, held, disturbance, self.period, begins, *resistance, aside)
 
     def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
@@ -156,16 +163,24 @@ class Estimator:
         return self._sent.begin(self.stamp + round(delay * SECOND))
 
     def sent(
-        self, begins: int, torques: Torques, learning: Any = False, speed: Any | None = None
+        self,
+        begins: int,
+        torques: Torques,
+        learning: Any = False,
+        speed: Any | None = None,
+        yaw_rate: Any = 0.0,
     ) -> None:
         """Torques were sent, which act from `begins` [ns] on, to drive at a `speed` [m/s].
+
+        The `yaw_rate` [rad/s] is the one that is wanted.
 
         `learning` is whether they are what was wanted: where a limit cut them, nothing is
         learnt of the disturbance.
         """
         self._learning = learning
         if speed is not None:
-            self._direction = select(abs(speed) > SLOW, with_sign_of(1.0, speed), 0.0)
+            self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
+            self._turn = sign(select(abs(yaw_rate) > SLOW_TURN, yaw_rate, 0.0))
         self._sent.add(begins, torques)
         # without odometry, too, that of long ago is not needed
         self._sent.forget_before(max(self.stamp, begins - LONG_AGO))
@@ -184,10 +199,11 @@ class Estimator:
     def _rolled(self, motion: Motion, acting: Acting) -> Motion:
         """Motion after torques have acted, each for some time [s]."""
         climber, learnt = self.climber, self.learnt
-        r_F, r_N, friction = learnt.force, learnt.moment, learnt.friction
+        r_F, r_N, resisting = learnt.force, learnt.moment, (learnt.friction, learnt.turning)
+        aside = self.slip.speed(climber, motion) if self.slip is not NO_SLIP else 0.0
         for torques, time in acting:
             force, moment = climber.wrench(*torques)
-            motion = predict(climber, motion, force + r_F, moment + r_N, time, friction)
+            motion = predict(climber, motion, force + r_F, moment + r_N, time, *resisting, aside)
         return motion
 
     def _correct(
@@ -197,6 +213,11 @@ class Estimator:
         time = (stamp - self.stamp) / SECOND
         reaction = self._delay + self.period / 2
         observed = Observed(before, motion, time, acted, self.disturbance, reaction)
+        bandwidth = self.observer.side_slip_bandwidth
+        if self._last_pose is not None and isinstance(motion.x, float) and bandwidth > 0:
+            poses = self._last_pose, motion
+            self.slip = self.slip.learnt(self.climber, *poses, time, bandwidth)
+        self._last_pose = motion
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)
         self._period_is_measured = True
@@ -207,7 +228,7 @@ class Estimator:
             if self.timing.learn_delay and is_known:
                 self._learn_delay(acted[-1][0], expected, motion, time, shares)
         self.motion, learnt = self.observer.corrected(
-            self.climber, self.learnt, expected, motion, time, shares, self._direction
+            self.climber, self.learnt, expected, motion, time, shares, self._direction, self._turn
         )
         self.stamp = stamp
         if is_known:

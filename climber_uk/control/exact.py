@@ -54,4 +54,5 @@ class Exact:
         wanted_x = v_x + self.natural_frequency * (x_d - x)
         wanted_y = v_y + self.natural_frequency * (y_d - y)
         wanted = wanted_x * cos(heading_d) + wanted_y * sin(heading_d)
-        return DesiredAcceleration(v_1, theta_2, wanted)
+        yaw_rate = omega - select(at_rest, 0.0, phi / select(at_rest, 1.0, v))
+        return DesiredAcceleration(v_1, theta_2, wanted, yaw_rate)

@@ -192,7 +192,8 @@ class Guard:
         if wanted.speed > MOVES:
             stands = abs(motion.speed) < STANDS * wanted.speed
         else:  # it turns in place, or rests
-            stands = abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
+            turns = climber.half_track * wanted.yaw_rate > MOVES
+            stands = turns and abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
         effort = 0.0
         if stands and load >= STRONG:
             effort = load / STRONG  # it shows the sooner, the stronger it is

@@ -168,4 +168,5 @@ class Guidance:
         theta_2 = omega_d1 - psi_2 - omega_n * (sech2_u * psi_1 + s)
         theta_2 = theta_2 - R_1 * (tanh_u - u * sech2_u)
         # ahead of a reference that comes it waits, and overcomes no friction to go back
-        return DesiredAcceleration(v_1, theta_2, select(wanted * v_d < 0.0, 0.0, wanted))
+        wanted = select(wanted * v_d < 0.0, 0.0, wanted)
+        return DesiredAcceleration(v_1, theta_2, wanted, omega - s)

@@ -27,17 +27,27 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 SLOW = 0.01  # [m/s] of a measured speed that may as well be rest
 EXPECTED_REST = 1e-3  # [m/s] of an expected speed that is none
+SLOW_TURN = 0.03  # [rad/s] of a measured yaw rate that may as well be none
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
+TURNING_SHARE = 0.95  # of an unknown moment, put down to what resists turning
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 Shares = tuple[Any, Any]  # of an error, put down to the disturbance and to its change
 
 
 def predict(
-    climber: Climber, motion: Motion, force: Any, moment: Any, time: float, friction: Any = 0.0
+    climber: Climber,
+    motion: Motion,
+    force: Any,
+    moment: Any,
+    time: float,
+    friction: Any = 0.0,
+    turning: Any = 0.0,
+    aside: Any = 0.0,
 ) -> Motion:
     """Motion `time` [s] later under a constant force [N] and moment [N m], by the midpoint rule.
 
-    Both include the disturbance; `friction` [N] is that of the seal beyond the model's f. Below
+    Both include the disturbance; `friction` [N] is that of the seal beyond the model's f, `turning`
+    [N m] what resists turning, and `aside` [m/s] how fast the wheels give way to the left. Below
     `SLOW`, where the sign of a measured speed is chance, friction is taken to balance what
     pushes, up to all of it: while that suffices the speed stays as it is, rather than being braked
     to rest (docs/theory.md, §8.2).
@@ -45,6 +55,8 @@ def predict(
     mass, inertia, modelled, weight = climber.inertial
     friction = modelled + friction
     x, y, heading, cosine, sine, v, omega = motion
+    if anywhere(turning != 0.0):
+        moment = _turned(moment, turning, omega, inertia / time)
     half, omega_1 = 0.5 * time, moment / inertia
     halfway, angle = half * (omega + 0.5 * half * omega_1), time * (omega + half * omega_1)
     c, s, heading, cosine, sine = swept(heading, cosine, sine, halfway, angle)
@@ -53,7 +65,7 @@ def predict(
     rubbing, slides = with_sign_of(friction, v), abs(v) > SLOW
     if not (slides is True or everywhere(slides)):
         rubbing = select(slides, rubbing, clipped(push, -friction, friction))
-    v_1 = (push - rubbing) / mass
+    v_1 = (push - rubbing) / mass + omega * aside
     displacement, end = time * (v + half * v_1), v + time * v_1
     stops = v * end < 0
     if stops is not False and anywhere(stops):  # friction ends a motion, and does not reverse it
@@ -62,7 +74,20 @@ def predict(
         displacement = select(stops, 0.5 * (v * (time - left) + left * left * back_1), displacement)
         end = select(stops, left * back_1, end)
     v, omega = end, omega + time * omega_1
-    return Motion(x + displacement * c, y + displacement * s, heading, cosine, sine, v, omega)
+    aside = time * aside
+    x, y = x + displacement * c - aside * s, y + displacement * s + aside * c
+    return Motion(x, y, heading, cosine, sine, v, omega)
+
+
+def _turned(moment: Any, turning: Any, omega: Any, stopping: Any) -> Any:
+    """Moment [N m] that is left of what resists turning, which ends a turn and reverses none.
+
+    `stopping` [kg m²/s] is the moment that ends it, by its rate. What hardly turns is held.
+    """
+    turns = abs(omega) > SLOW_TURN
+    left = moment - select(turns, with_sign_of(turning, omega), clipped(moment, -turning, turning))
+    stops = turns & (abs(moment) < turning) & (omega * (omega + left / stopping) < 0)
+    return select(stops, -stopping * omega, left)
 
 
 class DisturbanceEstimate(NamedTuple):
@@ -73,11 +98,12 @@ class DisturbanceEstimate(NamedTuple):
     force_rate: Any = 0.0  # [N/s]
     moment_rate: Any = 0.0  # [N m/s]
     friction: Any = 0.0  # [N] of the seal beyond the model's f; -f to f
+    turning: Any = 0.0  # [N m] that resists turning: none in the model
 
     @property
     def without_rates(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
-        return DisturbanceEstimate(self.force, self.moment, friction=self.friction)
+        return self._replace(force_rate=0.0, moment_rate=0.0)
 
     def changed(
         self, climber: Climber, change: Any, direction: float, speed: Any
@@ -92,6 +118,18 @@ class DisturbanceEstimate(NamedTuple):
         friction = clipped(before - 0.5 * direction * change, -f, f)
         friction = select(direction * speed > -SLOW, friction, before)
         return self.force + change + direction * (friction - before), friction
+
+    def turned(self, climber: Climber, change: Any, direction: Any, rate: Any) -> tuple[Any, Any]:
+        """The same of the moment and of what resists turning [N m], at a yaw `rate` [rad/s].
+
+        It may be as much as the motors can overcome. Nothing but it is likely to be as large, so
+        that it takes most of a change.
+        """
+        before, lever = self.turning, climber.half_track / climber.wheel_radius
+        turning = before - TURNING_SHARE * direction * change
+        turning = clipped(turning, 0.0, 2 * lever * climber.max_wheel_torque)
+        turning = select(direction * rate > -SLOW_TURN, turning, before)
+        return self.moment + change + direction * (turning - before), turning
 
 
 @parameters(slots=True)
@@ -120,6 +158,13 @@ class Observer:
         "speeds of odometry: those of its stamp, or means of the period before, as of encoders",
         choices=("auto", "instantaneous", "mean"),
     )
+    side_slip_bandwidth: float = parameter(
+        6.0,
+        "1/s",
+        "how fast it is learnt from poses by how much wheels give way sideways; 0: they hold",
+        at_least=0,
+        runtime=True,
+    )
     pose_bandwidth: float = parameter(
         60.0, "1/s", "of the filter that takes speeds from poses", above=0, runtime=True
     )
@@ -133,29 +178,34 @@ class Observer:
         time: float,
         shares: Shares,
         direction: float = 0.0,
+        turn: Any = 0.0,
     ) -> tuple[Motion, DisturbanceEstimate]:
         """Motion and disturbance after `time` [s] in which `expected` became `measured`.
 
         `shares` are those of the observer for that time; `direction` is 1 where the climber is to
-        drive forwards, -1 backwards, 0 at rest.
+        drive forwards, -1 backwards, 0 at rest; `turn` is the same to the left and to the right.
         """
         if self.velocity_source == "pose":
-            return self._from_pose(climber, learnt, expected, measured, time, direction)
+            return self._from_pose(climber, learnt, expected, measured, time, direction, turn)
         if everywhere(self.bandwidth == 0):
             return measured, _faded(learnt, time)
-        _, moment, force_rate, moment_rate, _ = learnt
+        _, _, force_rate, moment_rate, _, turning = learnt
         mass, inertia, _, _ = climber.inertial
         new, newer = shares
         acceleration = (measured.speed - expected.speed) / time
         yaw_acceleration = (measured.yaw_rate - expected.yaw_rate) / time
         change = time * force_rate + new * mass * acceleration
         force, friction = learnt.changed(climber, change, direction, expected.speed)
-        moment = moment + time * moment_rate + new * inertia * yaw_acceleration
+        change = time * moment_rate + new * inertia * yaw_acceleration
+        moment, turning = learnt.turned(climber, change, turn, expected.yaw_rate)
         # at rest stiction balances any force, so that no change of it shows
         slides = abs(expected.speed) > EXPECTED_REST
         force_rate = select(slides, force_rate + newer / time * mass * acceleration, 0.0)
         moment_rate = moment_rate + newer / time * inertia * yaw_acceleration
-        return measured, DisturbanceEstimate(force, moment, force_rate, moment_rate, friction)
+        held = (turning > 0.0) & (abs(expected.yaw_rate) < EXPECTED_REST)
+        moment_rate = select(held, 0.0, moment_rate)
+        learnt = DisturbanceEstimate(force, moment, force_rate, moment_rate, friction, turning)
+        return measured, learnt
 
     def shares(self, time: float, delay: float) -> Shares:
         """Shares of an unexpected acceleration: disturbance, and its change in `time` [s].
@@ -174,6 +224,7 @@ class Observer:
         measured: Motion,
         time: float,
         direction: float,
+        turn: Any,
     ) -> tuple[Motion, DisturbanceEstimate]:
         x, y, heading, cosine, sine, v, omega = expected
         ahead = (measured.x - x) * cosine + (measured.y - y) * sine
@@ -191,11 +242,15 @@ class Observer:
         motion = Motion(x, y, *rotated(heading, cosine, sine, g * heading_change), v, omega)
         mass, inertia, _, _ = climber.inertial
         force, friction = learnt.changed(climber, k / time**2 * mass * ahead, direction, v)
-        moment = learnt.moment + k / time**2 * inertia * heading_change
-        return motion, DisturbanceEstimate(force, moment, friction=friction)
+        moment, turning = learnt.turned(
+            climber, k / time**2 * inertia * heading_change, turn, omega
+        )
+        return motion, DisturbanceEstimate(force, moment, friction=friction, turning=turning)
 
 
 def _faded(learnt: DisturbanceEstimate, time: float) -> DisturbanceEstimate:
     left = exp(-time / FORGETTING_TIME)
-    force, moment = learnt.force * left, learnt.moment * left
-    return DisturbanceEstimate(force, moment, friction=learnt.friction * left)
+    force, moment, _, _, friction, turning = learnt
+    return DisturbanceEstimate(
+        left * force, left * moment, friction=left * friction, turning=left * turning
+    )

@@ -21,6 +21,7 @@ class DesiredAcceleration(NamedTuple):
     forward: Any  # v̇ [m/s²]
     yaw: Any  # θ̈ [rad/s²]
     speed: Any  # wanted [m/s]: friction is fed forward with its sign
+    yaw_rate: Any = 0.0  # wanted [rad/s]: what resists turning is, too
 
 
 class Motion(NamedTuple):
@@ -95,12 +96,11 @@ class State:
         return cls(pose, pack(speed * cos(heading), speed * sin(heading), yaw_rate))
 
     @classmethod
-    def moving(cls, motion: Motion) -> "State":
-        """State of a climber in `motion`, which has no side slip."""
-        return cls(
-            pack(motion.x, motion.y, motion.heading),
-            pack(motion.speed * motion.cosine, motion.speed * motion.sine, motion.yaw_rate),
-        )
+    def moving(cls, motion: Motion, side_slip: Any = 0.0) -> "State":
+        """State of a climber in `motion`, with a `side_slip` [m/s] to the left."""
+        v, cosine, sine = motion.speed, motion.cosine, motion.sine
+        v_x, v_y = v * cosine - side_slip * sine, v * sine + side_slip * cosine
+        return cls(pack(motion.x, motion.y, motion.heading), pack(v_x, v_y, motion.yaw_rate))
 
     @cached_property
     def motion(self) -> Motion:

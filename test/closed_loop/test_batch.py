@@ -11,6 +11,7 @@ from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
+from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import Timing
@@ -76,7 +77,9 @@ def alone(case, i, duration):
     model = replace(BUILT if trajectory is EIGHT else PAPER, **known)
     law = ControlLaw(as_floats(model, i), as_floats(gains, i))
     timing = Timing(transport_delay=0.005 * delay)
-    settings = Settings(law, timing=timing, pacing=Pacing(catch_up=0.0))
+    # of many, no side slip is learnt: their wheels hold
+    observer, pacing = Observer(side_slip_bandwidth=0.0), Pacing(catch_up=0.0)
+    settings = Settings(law, observer, timing, pacing)
     link = Link(step=0.005 / steps, delay=0.005 * delay)
     state = State.moving(Motion(*(float(number) for number in indexed(start, i))))
     controller = Controller(settings, Safety(max_jump=1e9))

@@ -33,7 +33,7 @@ def state_of(case):
 
 def predict(state, demand, h):
     """State after h [s] of rolling with constant v̇ and θ̈, by the midpoint of speed and heading."""
-    v_1, turning, _ = demand
+    v_1, turning, *_ = demand
     x, y, heading = state.pose
     v, omega = state.forward_speed, state.yaw_rate
     s = np.linspace(0, h, 9)  # Simpson's rule is exact here to far below the tolerances
@@ -57,7 +57,7 @@ def differences(function, state, demand, time):
 def test_ahead_of_a_reference_that_comes_it_overcomes_no_friction_to_go_back(speed, ahead, sign):
     target = ReferencePoint(0.0, 0.0, 0.0, speed, *(7 * [0.0]))
     motion, gains = Motion(ahead, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), Guidance()
-    slower, _, wanted = gains.desired_acceleration(gains.prepare(target), motion)
+    slower, _, wanted, _ = gains.desired_acceleration(gains.prepare(target), motion)
     assert np.sign(wanted) == sign
     assert np.sign(slower) == -np.sign(ahead)
 
@@ -138,7 +138,7 @@ def test_the_hidden_constraint_decays_at_its_rate(case):
 def test_the_rows_solved_by_udwadia_kalaba_give_the_demand(constraints, case):
     trajectory, time, _, v, omega = case
     state, climber = state_of(case), Climber()
-    v_1, turning, _ = demand = demanded(constraints(), state, trajectory.at(time))
+    v_1, turning, _, _ = demand = demanded(constraints(), state, trajectory.at(time))
     A, b = rows(state, demand)
     np.testing.assert_allclose(A @ A.T, np.eye(3), atol=1e-15)
     q_2 = constrained_acceleration(climber.mass_matrix, np.array([1.0, -2.0, 3.0]), A, b)
@@ -153,12 +153,12 @@ def test_on_the_path_the_demand_is_that_of_the_path(constraints):
     reference = trajectory.at(1.0)
     state = State(reference.pose, reference.velocity)
     demand = demanded(constraints(), state, reference)
-    np.testing.assert_allclose(demand, [0, 0, 1.4], atol=1e-12)
+    np.testing.assert_allclose(demand, [0, 0, 1.4, 0.7], atol=1e-12)
 
 
 def test_the_exact_set_asks_no_turn_of_a_climber_at_rest():
     reference = Trajectory(Circle(), ConstantRate()).at(0.0)
-    v_1, turning, _ = demanded(Exact(), State.rolling(reference.pose, 0.0, 0.5), reference)
+    v_1, turning, *_ = demanded(Exact(), State.rolling(reference.pose, 0.0, 0.5), reference)
     assert np.isfinite(v_1)
     assert turning == 0
 
@@ -169,7 +169,7 @@ def test_the_exact_set_overcomes_friction_towards_a_reference_that_has_come_to_i
         [np.cos(reference.heading), np.sin(reference.heading), 0.0]
     )
     state = State(behind, np.zeros(3))
-    _, _, wanted = demanded(Exact(natural_frequency=5.0), state, reference)
+    _, _, wanted, _ = demanded(Exact(natural_frequency=5.0), state, reference)
     assert wanted == pytest.approx(0.05, abs=1e-12)  # ω_n times the distance
 
 

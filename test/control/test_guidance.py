@@ -104,7 +104,7 @@ def test_a_false_equilibrium_keeps_a_climber_on_a_circle_within_the_circle():
     last = np.flatnonzero(over > 0)[-1]
     there = brentq(lambda e: excess(gains, radius, v_d, np.array(e))[0], e_y[last], e_y[last + 1])
     _, state = excess(gains, radius, v_d, np.array(there))
-    v_1, theta_2, _ = demanded(gains, state, on_a_circle(v_d, v_d / radius))
+    v_1, theta_2, *_ = demanded(gains, state, on_a_circle(v_d, v_d / radius))
     assert abs(v_1) < 1e-9
     assert abs(theta_2) < 1e-9
     assert np.hypot(*state.pose[:2]) > 5

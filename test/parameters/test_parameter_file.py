@@ -26,7 +26,7 @@ def file(tmp_path):
 def test_our_files_hold_for_a_node_in_any_namespace():
     values = read_file(CONFIG / "climber.yaml", "/uk_torque_controller")
     assert values == read_file(CONFIG / "climber.yaml", NODE)
-    assert values["guidance.cross_track_gain"] == 3.0
+    assert values["guidance.cross_track_gain"] == 12.0
     assert "initial_y" not in values  # the plant's
 
 

@@ -1,0 +1,200 @@
+"""Wheels that give way sideways: learnt from poses, and followed along the course that is left."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from climber_uk.closed_loop.simulate import sampled, simulate
+from climber_uk.control.approach import ANYWHERE
+from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
+from climber_uk.control.controller import Controller, Settings
+from climber_uk.control.exact import Exact
+from climber_uk.control.guidance import Guidance
+from climber_uk.control.model import DisturbanceEstimate, Observer, predict
+from climber_uk.control.safety import Mode
+from climber_uk.control.side_slip import Course, SideSlip, _ahead
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import Motion, ReferencePoint, State, Torques, Wrench
+from climber_uk.mechanics.shapes import Circle, Line
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+
+CLIMBER = Climber(
+    seal_friction_coefficient=0.6,
+    wheel_load_share=0.8,
+    suction_pressure=8000.0,
+    max_wheel_torque=4.0,
+)
+GAINS = Guidance(cross_track_gain=10.0, fade_speed=0.1)
+CIRCLE = Trajectory(Circle(radius=0.5), RestToRest(rate=0.4, ramp_time=3.0))
+LINE = Trajectory(Line(length=2.0, direction=0.7), RestToRest(rate=0.2, ramp_time=2.0))
+PERIOD, STEPS = 0.005, 5
+numbers = st.floats(-1, 1)
+
+
+class Scrubbing:
+    """A climber on a wall whose wheels creep and scrub, and whose turning is resisted."""
+
+    def __init__(self, climber, pose, creep, scrub, resistance):
+        self.climber, self.creep, self.scrub, self.resistance = climber, creep, scrub, resistance
+        self.pose, self.v, self.omega, self.aside = np.array(pose, float), 0.0, 0.0, 0.0
+
+    @property
+    def state(self):
+        """As a good odometry gives it."""
+        x, y, heading = self.pose
+        return State.moving(Motion.at(x, y, heading, self.v, self.omega), self.aside)
+
+    def advance(self, torques):
+        """A period, by Euler's steps."""
+        climber, step = self.climber, PERIOD / STEPS
+        force, moment = climber.wrench(*torques)
+        for _ in range(STEPS):
+            sine, cosine = np.sin(self.pose[2]), np.cos(self.pose[2])
+            push = force - climber.weight_along_wall * sine
+            self.v = slid(self.v, push, climber.seal_friction, step / climber.mass)
+            self.omega = slid(self.omega, moment, self.resistance, step / climber.yaw_inertia)
+            load = climber.weight_along_wall * cosine / (climber.mass * 9.81)
+            self.aside = self.creep * abs(self.v) - self.scrub * abs(self.omega) * load
+            middle = self.pose[2] + step * self.omega / 2
+            sine, cosine = np.sin(middle), np.cos(middle)
+            along, left = np.array([cosine, sine]), np.array([-sine, cosine])
+            self.pose[:2] += step * (self.v * along + self.aside * left)
+            self.pose[2] += step * self.omega
+
+
+def slid(rate, push, friction, by):
+    """Rate after a step of Coulomb's friction; `by` is the step by the inertia."""
+    free = rate + by * push
+    return np.sign(free) * max(abs(free) - by * friction, 0.0)
+
+
+def drive(trajectory, duration, constraints=GAINS, observer=None, **slip):
+    """Distances from the reference [m], the controller, and all the modes there were."""
+    law = ControlLaw(CLIMBER, constraints)
+    controller = Controller(Settings(law, observer or Observer()), approach=ANYWHERE)
+    controller.on_reference(0, sampled(trajectory, duration))
+    plant = Scrubbing(CLIMBER, trajectory.at(0.0).pose, **slip)
+    distances, modes = [], set()
+    for tick in range(round(duration / PERIOD)):
+        answer = controller.on_odometry(0, SECOND + round(tick * PERIOD * SECOND), plant.state)
+        modes.add(controller.mode)
+        distances.append(plant.pose[:2] - trajectory.at(tick * PERIOD).pose[:2])
+        plant.advance(answer.torques)
+    return np.linalg.norm(distances, axis=1), controller, modes
+
+
+@pytest.mark.parametrize("creep", [-0.03, 0.0, 0.03])
+@pytest.mark.parametrize("resistance", [0.0, 30.0])
+def test_a_climber_that_sags_while_it_turns_stays_on_its_circle(creep, resistance):
+    slip = {"creep": creep, "scrub": 0.08, "resistance": resistance}
+    distance, controller, modes = drive(CIRCLE, 19.0, **slip)
+    assert modes == {Mode.FOLLOWING}  # it is no fault
+    assert np.sqrt(np.mean(distance**2)) < 3e-3
+    assert distance.max() < 7e-3
+    assert controller.estimator.slip.scrub == pytest.approx(0.07, abs=0.02)
+
+
+def test_it_would_be_far_off_if_nothing_were_learnt():
+    slip = {"creep": 0.0, "scrub": 0.08, "resistance": 30.0}
+    distance, *_ = drive(CIRCLE, 19.0, observer=Observer(side_slip_bandwidth=0.0), **slip)
+    assert np.sqrt(np.mean(distance**2)) > 1e-2
+
+
+def test_creep_leaves_no_distance_on_a_line():
+    slip = {"creep": 0.02, "scrub": 0.0, "resistance": 0.0}
+    distance, *_ = drive(LINE, 11.0, **slip)
+    assert distance[1000:1900].max() < 1e-4
+
+
+@pytest.mark.parametrize("constraints", [GAINS, Exact()])
+def test_where_wheels_hold_it_is_as_if_nothing_were_learnt(constraints):
+    def distance(bandwidth):
+        law = ControlLaw(CLIMBER, constraints)
+        observer = Observer(side_slip_bandwidth=bandwidth)
+        controller = Controller(Settings(law, observer), approach=ANYWHERE)
+        start = State(CIRCLE.at(0.0).pose, np.zeros(3))
+        return simulate(CIRCLE, start, 6.0, controller, CLIMBER).distance
+
+    np.testing.assert_allclose(distance(6.0), distance(0.0), atol=1e-6)
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from([Guidance(), Exact()]),
+    st.tuples(numbers, numbers, st.floats(-3, 3), st.floats(0.1, 3), numbers),
+    st.tuples(st.floats(-0.7, 0.7), numbers, numbers),
+    st.tuples(numbers, numbers),
+)
+def test_on_a_course_the_closed_form_is_what_the_rows_give(constraints, motion, course, resists):
+    friction, turning = 9.0 * resists[0], 20.0 * abs(resists[1])
+    target = CIRCLE.at(1.5).target
+    given_ = ControlInput(
+        Motion.at(*motion),
+        Torques(0.1, -0.2),
+        Wrench(1.0, -0.3),
+        PERIOD,
+        0,
+        friction,
+        turning,
+        0.01,
+        Course.at(*course),
+    )
+    one, other = (
+        ControlLaw(CLIMBER, constraints, ControlOptions(solver=solver)).command(given_, target)
+        for solver in ("closed_form", "generic")
+    )
+    np.testing.assert_allclose(one.demanded, other.demanded, rtol=1e-9, atol=1e-9)
+
+
+@given(st.floats(-0.5, 0.5), st.tuples(numbers, numbers, numbers))
+def test_a_heading_that_has_to_be_ahead_solves_its_equation(lead, coefficients):
+    heading = np.polynomial.Polynomial([0.0, *coefficients]) * 0.1
+
+    def at(later):
+        derivatives = (heading.deriv(n)(later) if n else heading(later) for n in range(3))
+        angle, rate, acceleration = (float(each) for each in derivatives)
+        return ReferencePoint(0.0, 0.0, angle, 0.0, 0.0, rate, 0.0, 0.0, acceleration, 0.0, 0.0)
+
+    angle, rate, acceleration = _ahead(at(0.0), at, lead)
+    wanted = at(0.0)
+    assert angle - lead * (rate + wanted.yaw_rate) == pytest.approx(0.0, abs=1e-9)
+    assert rate - lead * (acceleration + wanted.yaw_acceleration) == pytest.approx(0.0, abs=1e-9)
+
+
+@given(st.floats(-0.5, 0.5))
+def test_a_pose_that_jumps_is_hardly_a_side_slip(jump):
+    before = Motion.at(0.0, 0.0, 0.3, 0.2, 0.1)
+    ahead = 0.2 * PERIOD
+    x, y = ahead * np.cos(0.3) - jump * np.sin(0.3), ahead * np.sin(0.3) + jump * np.cos(0.3)
+    after = Motion.at(float(x), float(y), 0.3, 0.2, 0.1)
+    slip = SideSlip().learnt(CLIMBER, before, after, PERIOD, 6.0)
+    for _ in range(200):
+        slip = slip.learnt(CLIMBER, after, after._replace(x=x + ahead), PERIOD, 0.0)
+    assert abs(slip.creep) < 0.01
+
+
+def test_resisted_turns_end_and_do_not_begin_below_the_resistance():
+    still = Motion.at(0.0, 0.0, 0.0, 0.0, 0.0)
+    assert predict(CLIMBER, still, 0.0, 29.0, PERIOD, turning=30.0).yaw_rate == 0
+    assert predict(CLIMBER, still, 0.0, 31.0, PERIOD, turning=30.0).yaw_rate > 0
+    turns = still._replace(yaw_rate=0.1)
+    assert predict(CLIMBER, turns, 0.0, 0.0, PERIOD, turning=30.0).yaw_rate == pytest.approx(0.0)
+    many = still._replace(yaw_rate=np.array([0.0, 0.1, -0.5]))
+    moments = np.array([29.0, 0.0, 3.0])
+    got = predict(CLIMBER, many, 0.0, moments, PERIOD, turning=np.full(3, 30.0)).yaw_rate
+    one = [
+        predict(CLIMBER, still._replace(yaw_rate=rate), 0.0, moment, PERIOD, turning=30.0).yaw_rate
+        for rate, moment in zip([0.0, 0.1, -0.5], [29.0, 0.0, 3.0], strict=True)
+    ]
+    np.testing.assert_allclose(got, one, atol=1e-12)
+
+
+@given(st.floats(-40, 40), st.sampled_from([-1.0, 0.0, 1.0]), st.floats(-2, 2), st.floats(0, 50))
+def test_what_is_learnt_of_turning_adds_up(change, direction, rate, turning):
+    learnt = DisturbanceEstimate(moment=2.0, turning=turning)
+    moment, after = learnt.turned(CLIMBER, change, direction, rate)
+    assert moment - direction * after == pytest.approx(2.0 - direction * turning + change)
+    assert after >= 0
