@@ -9,23 +9,13 @@ it, first without and then with `learn_delay`.
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
-from robustness import (
-    AT_REST,
-    BUILT,
-    EIGHT,
-    ELLIPSE,
-    GUIDANCE,
-    IN_MOTION,
-    PAPER,
-    SLOW_GUIDANCE,
-    run_of,
-)
+from identification_experiments import SCENARIOS as RUNS
+from identification_experiments import Scenario
 from scipy.linalg import expm
 
-from climber_uk.closed_loop.simulate import Link
+from climber_uk.closed_loop.simulate import Link, Run, simulate
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller, Settings
@@ -33,31 +23,18 @@ from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
-from climber_uk.control.timing import Timing
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import State
-from climber_uk.mechanics.trajectory import Trajectory
 
 MILLISECOND = 1e-3
 LONGEST = 0.2  # [s] that is looked for
 OFF, CHATTER = 5e-3, 0.05  # [m] RMS distance and [N m] RMS change of a torque: it does not stand
 
 
-class Scenario(NamedTuple):
-    """A climber on a path, its gains, and the speed [m/s] about which the loop is taken linear."""
-
-    climber: Climber
-    gains: Guidance
-    trajectory: Trajectory
-    start: State
-    speed: float
-
-
+# with the speed [m/s] about which the loop is taken linear
 SCENARIOS = {
-    "climber.yaml": Scenario(BUILT, SLOW_GUIDANCE, EIGHT, AT_REST, 0.26),
-    "defaults, as slow": Scenario(BUILT, GUIDANCE, EIGHT, AT_REST, 0.26),
-    "paper.yaml": Scenario(PAPER, GUIDANCE, ELLIPSE, IN_MOTION, 10.0),
+    "climber.yaml": (RUNS["climber.yaml"], 0.26),
+    "defaults, as slow": (replace(RUNS["climber.yaml"], guidance=Guidance()), 0.26),
+    "paper.yaml": (RUNS["paper.yaml"], 10.0),
 }
 
 
@@ -116,12 +93,19 @@ def stands(channel: Channel, observer: Observer, period: float, delay: float, la
     return float(np.abs(np.linalg.eigvals(matrix)).max()) < 1 + 1e-6
 
 
-def simulated(scenario: Scenario, observer: Observer, learns: bool, link: Link) -> bool:
+def untold(
+    scenario: Scenario, controller: Controller, link: Link, learns: bool, duration: float
+) -> Run:
+    """Run of a controller whom nobody told what its link is like; it `learns` the delay or not."""
+    timing = replace(controller.estimator.timing, learn_delay=learns)
+    controller.estimator.timing = timing
+    path = scenario.trajectory, scenario.start, duration
+    return simulate(*path, controller, scenario.believed, link)
+
+
+def simulated(scenario: Scenario, controller: Controller, link: Link, learns: bool) -> bool:
     """Whether the loop of the nodes stands."""
-    law = ControlLaw(scenario.climber, scenario.gains)
-    settings = Settings(law, observer, Timing(learn_delay=learns))
-    controller = Controller(settings, Safety(), ANYWHERE, UNGUARDED)
-    run = run_of(scenario.trajectory, scenario.start, 15.0, controller, scenario.climber, link)
+    run = untold(scenario, controller, link, learns, 15.0)
     return run.rms(7.5) < OFF and run.chatter() < CHATTER
 
 
@@ -134,9 +118,11 @@ def longest(holds: Callable[[float], bool], step: float) -> float:
     return low * step / MILLISECOND
 
 
-def linear_margins(scenario: Scenario, observer: Observer, period: float) -> tuple[float, float]:
+def linear_margins(
+    gains: Guidance, speed: float, observer: Observer, period: float
+) -> tuple[float, float]:
     """Longest delay and lag [ms], by eigenvalues."""
-    channels = Channel.both(scenario.gains, scenario.speed)
+    channels = Channel.both(gains, speed)
 
     def holds(delay: float, lag: float) -> bool:
         return all(stands(channel, observer, period, delay, lag) for channel in channels)
@@ -145,13 +131,13 @@ def linear_margins(scenario: Scenario, observer: Observer, period: float) -> tup
 
 
 def simulated_margins(
-    scenario: Scenario, observer: Observer, period: float, learns: bool
+    scenario: Scenario, make: Callable[[], Controller], period: float = 0.005, learns: bool = False
 ) -> tuple[float, float]:
-    """Longest delay and lag [ms], of the loop that the nodes run."""
+    """Longest delay and lag [ms], of the loop that the nodes run with a controller so made."""
     link = Link(period=period)
 
     def holds(**late: float) -> bool:
-        return simulated(scenario, observer, learns, replace(link, **late))
+        return simulated(scenario, make(), replace(link, **late), learns)
 
     return (
         longest(lambda t: holds(delay=t), link.step),
@@ -167,9 +153,14 @@ def main() -> None:
     options = parser.parse_args()
     period, observer = options.period, Observer(bandwidth=options.bandwidth)
     print(f"{'delay, lag [ms]':<20}{'linear':>16}{'simulated':>16}{'and learnt':>16}")
-    for name, scenario in SCENARIOS.items():
-        cells = [linear_margins(scenario, observer, period)]
-        cells += [simulated_margins(scenario, observer, period, learns) for learns in (False, True)]
+    for name, (scenario, speed) in SCENARIOS.items():
+        law = ControlLaw(scenario.believed, scenario.guidance)
+
+        def make(law: ControlLaw = law) -> Controller:
+            return Controller(Settings(law, observer), Safety(), ANYWHERE, UNGUARDED)
+
+        cells = [linear_margins(scenario.guidance, speed, observer, period)]
+        cells += [simulated_margins(scenario, make, period, learns) for learns in (False, True)]
         print(f"{name:<20}" + "".join(f"{f'{d:.1f}, {lag:.1f}':>16}" for d, lag in cells))
 
 

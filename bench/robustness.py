@@ -7,17 +7,18 @@ import argparse
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 
 import numpy as np
-from identification_experiments import SCENARIOS
-from rivals import AdaptiveGains, AdaptiveRobust, Kanayama, KanayamaGains
-from scipy.optimize import minimize
+from identification_experiments import SCENARIOS, Scenario
+from margins import simulated_margins
+from rivals import LQR, AdaptiveRobust, Integrating, Kanayama, SuperTwisting, Weights
 from scipy.spatial import cKDTree
 
-from climber_uk.closed_loop.simulate import Controlling, Link, Run, as_commanded, simulate
+from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.constraint_set import ConstraintSet
-from climber_uk.control.control_law import ControlLaw, ControlOptions
+from climber_uk.control.control_law import ControlLaw, ControlOptions, ForceLaw
 from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.exact import Exact
 from climber_uk.control.guard import UNGUARDED
@@ -44,8 +45,13 @@ NOISE = Link(
 )
 
 
-# Found by `--tune kanayama`.
-KANAYAMA = KanayamaGains(38.8, 8.32, 5.13, 1.06, 1.0)
+# Found by `tune.py`, with the name of the last column for `WEIGHTS`.
+WEIGHTS = Weights(33_300.0, 112_000.0, 23_900.0, 54.0, 62.7)
+KANAYAMA = Kanayama(8.03, 1.73, 1.24, 18.2, 112.0, 17.4, 185.0)
+SUPER_TWISTING = SuperTwisting(6.0, 0.5, 1.1, 5.0, 15.0, 5.0, 20.0)
+
+Make = Callable[..., Controller]
+MILLIMETRE = 1e-3
 
 
 def ours(
@@ -54,9 +60,10 @@ def ours(
     delay: float = 0.0,
     observer: Observer = OBSERVER,
     controller: type[Controller] = Controller,
+    other: ForceLaw | None = None,
 ) -> Controller:
     """The controller as the node runs it."""
-    law = ControlLaw(climber, gains, ControlOptions())
+    law = ControlLaw(climber, gains, ControlOptions(), other)
     timing = Timing(transport_delay=delay)
     return controller(Settings(law, observer, timing), Safety(), ANYWHERE, UNGUARDED)
 
@@ -81,48 +88,35 @@ def exact(
     return ours(climber, Exact(), delay, observer)
 
 
-def adaptive(
-    climber: Climber,
-    gains: Guidance = GUIDANCE,
-    delay: float = 0.0,
-    observer: Observer = OBSERVER,
-) -> Controller:
-    """Adaptive robust control in the observer's place."""
-    return ours(climber, gains, delay, replace(observer, bandwidth=0.0), AdaptiveRobust)
+def rival(law: ForceLaw | None, controller: type[Controller] = Controller) -> Make:
+    """A law in the constraints' place; one with a `controller` of its own has no observer."""
+
+    def make(
+        climber: Climber,
+        gains: Guidance = GUIDANCE,
+        delay: float = 0.0,
+        observer: Observer = OBSERVER,
+    ) -> Controller:
+        if controller is not Controller:
+            observer = replace(observer, bandwidth=0.0)
+        return ours(climber, gains, delay, observer, controller, law and replace(law))
+
+    return make
 
 
-def kanayama(
-    climber: Climber,
-    gains: Guidance = GUIDANCE,
-    delay: float = 0.0,
-    observer: Observer = OBSERVER,
-) -> Kanayama:
-    """A velocity-loop controller."""
-    return Kanayama(climber, KANAYAMA)
-
-
-KINDS = {
+KINDS: dict[str, Make] = {
     "UK": ours,
     "UK, no observer": without_observer,
     "UK, exact": exact,
-    "UK, adaptive": adaptive,
-    "Kanayama + PI": kanayama,
+    "LQR": rival(LQR(WEIGHTS)),
+    "Kanayama + PI": rival(KANAYAMA, Integrating),
+    "super-twisting": rival(SUPER_TWISTING, Integrating),
+    "UK, adaptive": rival(None, AdaptiveRobust),
 }
-Make = Callable[..., Controlling]
-MILLIMETRE = 1e-3
+if find_spec("casadi"):
+    from nmpc import NMPC
 
-
-def run_of(
-    trajectory: Trajectory,
-    start: State,
-    duration: float,
-    controlling: Controlling,
-    climber: Climber | Callable[[float], Climber],
-    link: Link = IDEAL,
-) -> Run:
-    """Run with the motors that the controller is made for."""
-    motors = getattr(controlling, "motors", as_commanded)
-    return simulate(trajectory, start, duration, controlling, climber, link, motors)
+    KINDS["NMPC"] = rival(NMPC(WEIGHTS))
 
 
 def lap(
@@ -134,7 +128,7 @@ def lap(
     duration: float = 20.0,
 ) -> float:
     """RMS [mm] on the paper's ellipse of a controller that believes in the paper's climber."""
-    run = run_of(ELLIPSE, IN_MOTION, duration, make(PAPER, delay=delay), climber, link)
+    run = simulate(ELLIPSE, IN_MOTION, duration, make(PAPER, delay=delay), climber, link)
     return run.rms(after) / MILLIMETRE
 
 
@@ -154,21 +148,21 @@ def without_twist(make: Make) -> float:
     controlling = make(PAPER, observer=Observer(velocity_source="pose"))
     link = replace(NOISE, with_twist=False)
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
-    return run_of(RAMPED, start, 10.0, controlling, PAPER, link).rms(after=2.0) / MILLIMETRE
+    return simulate(RAMPED, start, 10.0, controlling, PAPER, link).rms(after=2.0) / MILLIMETRE
 
 
 def slow_odometry(make: Make, duration: float = 57.0) -> float:
     """RMS [mm] on the figure of eight of climber.yaml, at 20 Hz."""
     controlling = make(BUILT, SLOW_GUIDANCE)
     return (
-        run_of(EIGHT, AT_REST, duration, controlling, BUILT, Link(period=0.05)).rms() / MILLIMETRE
+        simulate(EIGHT, AT_REST, duration, controlling, BUILT, Link(period=0.05)).rms() / MILLIMETRE
     )
 
 
 def at_the_end(make: Make) -> float:
     """Distance [mm] from the end of that figure of eight at 200 Hz."""
     controlling = make(BUILT, SLOW_GUIDANCE)
-    return run_of(EIGHT, AT_REST, 57.0, controlling, BUILT).distance[-1] / MILLIMETRE
+    return simulate(EIGHT, AT_REST, 57.0, controlling, BUILT).distance[-1] / MILLIMETRE
 
 
 def from_anywhere(make: Make) -> tuple[float, float]:
@@ -179,7 +173,7 @@ def from_anywhere(make: Make) -> tuple[float, float]:
         random = np.random.default_rng(seed)
         offset = np.array([*random.uniform(-0.5, 0.5, 2), random.uniform(-1, 1)])
         start = State(RAMPED.at(0.0).pose + offset, np.zeros(3))
-        run = run_of(RAMPED, start, 4.0, make(climber), climber)
+        run = simulate(RAMPED, start, 4.0, make(climber), climber)
         late.append(max(run.time[run.distance > 0.01], default=0.0))
         turned.append(np.abs(run.error[:, 2]).max())
     return max(late), np.degrees(max(turned))
@@ -187,28 +181,20 @@ def from_anywhere(make: Make) -> tuple[float, float]:
 
 def too_weak(make: Make) -> tuple[float, float, float]:
     """Torque limit at 70 % of the need from 5 to 7 s: off the path, lag and overshoot [m]."""
-    need = np.abs(run_of(ELLIPSE, IN_MOTION, 20.0, ours(PAPER), PAPER).torques).max()
+    need = np.abs(simulate(ELLIPSE, IN_MOTION, 20.0, ours(PAPER), PAPER).torques).max()
     weak = replace(PAPER, max_wheel_torque=0.7 * float(need))
     controlling = make(PAPER)
 
     def climber(time: float) -> Climber:
         now = weak if 5.0 <= time < 7.0 else PAPER
-        know_limit(controlling, now)
+        if controlling.law.climber is not now:
+            controlling.law = replace(controlling.law, climber=now)
         return now
 
-    run = run_of(ELLIPSE, IN_MOTION, 40.0, controlling, climber)
+    run = simulate(ELLIPSE, IN_MOTION, 40.0, controlling, climber)
     off, _ = cKDTree(ELLIPSE.path(400_000)[:, :2]).query(run.pose[:, :2])
     ahead, later = run.error[:, 0], run.time > 7.5
     return off.max(), -ahead[~later].min(), max(ahead[later].max(), 0.0)
-
-
-def know_limit(controlling: Controlling, climber: Climber) -> None:
-    """Tell a controller of a new torque limit."""
-    if isinstance(controlling, Controller):
-        if controlling.law.climber is not climber:
-            controlling.law = replace(controlling.law, climber=climber)
-    else:
-        controlling.climber = climber
 
 
 def interrupted(make: Make, duration: float = 20.0) -> tuple[float, int]:
@@ -218,17 +204,22 @@ def interrupted(make: Make, duration: float = 20.0) -> tuple[float, int]:
 
     def climber(_: float) -> Climber:
         nonlocal stops
-        stops += isinstance(controlling, Controller) and controlling.mode.is_fault
+        stops += controlling.mode.is_fault
         return PAPER
 
-    run = run_of(ELLIPSE, IN_MOTION, duration, controlling, climber, Link(loss=0.3, jitter=0.02))
+    run = simulate(ELLIPSE, IN_MOTION, duration, controlling, climber, Link(loss=0.3, jitter=0.02))
     return run.rms() / MILLIMETRE, stops
 
 
 def untold(make: Make, link: Link, gains: Guidance = SLOW_GUIDANCE) -> tuple[float, float]:
     """RMS [mm], and RMS change of a torque in a tick [N m], of what nobody told the controller."""
-    run = run_of(EIGHT, AT_REST, 57.0, make(BUILT, gains), BUILT, link)
+    run = simulate(EIGHT, AT_REST, 57.0, make(BUILT, gains), BUILT, link)
     return run.rms() / MILLIMETRE, run.chatter()
+
+
+def margins(make: Make, scenario: Scenario) -> tuple[float, float]:
+    """Longest delay and lag [ms] that nobody told the controller, and that it does not learn."""
+    return simulated_margins(scenario, lambda: make(scenario.believed, scenario.guidance))
 
 
 def links() -> dict[str, Link]:
@@ -258,6 +249,8 @@ ROWS: dict[str, tuple[str, Callable[[Make], object]]] = {
     "30 % lost, 20 ms jitter": ("mm, stops", interrupted),
     "100 starts: last time off, turned": ("s, deg", from_anywhere),
     "limit at 70 %: off, lag, overshoot": ("m", too_weak),
+    "delay, lag borne, climber.yaml": ("ms", partial(margins, scenario=BUILT_RUN)),
+    "delay, lag borne, paper.yaml": ("ms", partial(margins, scenario=PAPER_RUN)),
     **{
         f"{name}, {whose}": ("mm, N m", partial(untold, link=link, gains=gains))
         for whose, gains in (("climber.yaml", SLOW_GUIDANCE), ("default gains", GUIDANCE))
@@ -266,86 +259,24 @@ ROWS: dict[str, tuple[str, Callable[[Make], object]]] = {
 }
 
 
-def tuning_cost(make: Make) -> float:
-    """Sum of RMS [mm] over what every controller has to be good at, each cut at 1 m."""
-    late = Link(delay=0.005)
-    costs = [
-        lap(make, duration=6.0),
-        friction(make, duration=6.0),
-        lap(make, link=late, duration=6.0),
-        lap(make, link=NOISE, duration=6.0),
-        interrupted(make, duration=6.0)[0],
-        slow_odometry(make, duration=10.0),
-    ]
-    return float(sum(np.nan_to_num([min(cost, 1e3) for cost in costs], nan=1e3)))
-
-
-def tune(which: str) -> None:
-    """Print gains of a kind of controller, tuned by Nelder-Mead from its gains of now."""
-
-    def ours_by(gains: np.ndarray) -> Make:
-        k_x, k_y, speed_rate, frequency, bandwidth = gains
-        tuned = Guidance(
-            along_track_gain=k_x,
-            cross_track_gain=k_y,
-            speed_rate=speed_rate,
-            heading_frequency=frequency,
-        )
-        observer = Observer(bandwidth=bandwidth)
-        return lambda climber, _=None, delay=0.0: ours(climber, tuned, delay, observer)
-
-    def kanayama_by(gains: np.ndarray) -> Make:
-        return lambda climber, *_, **__: Kanayama(climber, KanayamaGains(*gains))
-
-    def adaptive_by(gains: np.ndarray) -> Make:
-        class Tuned(AdaptiveRobust):
-            drive_gains = AdaptiveGains(*gains[:3])
-            turn_gains = AdaptiveGains(*gains[3:])
-
-        off = Observer(bandwidth=0.0)
-        return lambda climber, guidance=GUIDANCE, delay=0.0: ours(
-            climber, guidance, delay, off, Tuned
-        )
-
-    adaptive_gains = [AdaptiveRobust.drive_gains, AdaptiveRobust.turn_gains]
-    make_by, gains = {
-        "ours": (ours_by, [3.0, 1.0, 10.0, 10.0, 80.0]),
-        "kanayama": (kanayama_by, [*vars(KANAYAMA).values()]),
-        "adaptive": (
-            adaptive_by,
-            [gain for part in adaptive_gains for gain in vars(part).values()],
-        ),
-    }[which]
-    best = minimize(
-        lambda logs: tuning_cost(make_by(np.exp(logs))),
-        np.log(gains),
-        method="Nelder-Mead",
-        options={"maxfev": 150, "xatol": 0.02, "fatol": 0.01},
-    )
-    print(which, [f"{gain:.3g}" for gain in np.exp(best.x)], f"{best.fun:.3g}", flush=True)
-
-
 def said(value: object) -> str:
     """Return one or several figures, short."""
     return " / ".join(f"{part:.3g}" for part in (value if isinstance(value, tuple) else (value,)))
 
 
 def main() -> None:
-    """Print the table, or tuned gains."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tune", choices=("ours", "kanayama", "adaptive"), help="gains instead")
     parser.add_argument("--only", default="", help="rows whose name contains this")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=[*KINDS], help="columns")
     options = parser.parse_args()
     np.seterr(all="ignore")  # a rival may diverge
-    if options.tune:
-        tune(options.tune)
-        return
-    print(f"{'':<46}{'':<10}" + "".join(f"{name:>22}" for name in KINDS))
+    print(f"{'':<46}{'':<10}" + "".join(f"{name:>22}" for name in options.kinds))
     for name, (unit, row) in ROWS.items():
         if options.only in name:
             print(f"{name:<46}{unit:<10}", end="", flush=True)
-            for make in KINDS.values():
-                print(f"{said(row(make)):>22}", end="", flush=True)
+            for kind in options.kinds:
+                print(f"{said(row(KINDS[kind])):>22}", end="", flush=True)
             print()
 
 
