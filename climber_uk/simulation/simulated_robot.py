@@ -36,6 +36,9 @@ class Physics:
     locomotion: str = parameter("wheeled", "", "what it runs on", choices=LOCOMOTION)
     wall: str = parameter("plane", "", "what it runs along", choices=WALLS)
     slip: bool = parameter(False, "", "whether wheels slip where their load does not suffice")
+    creep: float = parameter(
+        0.0, "", "what the climber sags on a vertical wall, by the way that it rolls", at_least=0
+    )
     pressure_loss_time: float = parameter(
         0.0, "s", "after the start, when the pump's pressure drops; 0: never", at_least=0
     )
@@ -111,6 +114,8 @@ class SimulatedRobot:
         state = plant.advance(self.state, torques, 1, push.on(self.state))
         rates = plant.wheel_rates(state)
         self.angles, self.rates = self.angles + (self.rates + rates) * step / 2, rates
+        if self.parts.physics.creep > 0:
+            state = self._sagged(state, rates, step)
         self.state, self.torques, self.push, self.plant = state, torques, push, plant
         self.steps += 1
 
@@ -122,6 +127,13 @@ class SimulatedRobot:
     def margins(self) -> tuple[float, float]:
         """Slip and tip margin (§7), now."""
         return self.plant.margins(self.state, self.torques, self.push.on(self.state))
+
+    def _sagged(self, state: State, rates: Array, step: float) -> State:
+        """State a little further down the wall, as wheels under load give way where they roll."""
+        climber, creep = self.plant.climber, self.parts.physics.creep
+        way = creep * climber.wheel_radius * float(np.abs(rates).mean()) * step
+        x, y = self.plant.wall.along(climber.inclination, float(state.pose[1]))
+        return replace(state, pose=state.pose + way * np.array([x, y, 0.0]))
 
     def _pump(self) -> float:
         """Pressure that the pump could reach without a leak, now [Pa]."""
