@@ -8,18 +8,18 @@ config/climber.yaml, 57 s; the sensors are those of config/field.yaml unless a r
 import argparse
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from identification_experiments import SCENARIOS
+from scipy.stats import chi2
 
 from climber_uk.closed_loop.simulate import sampled
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.timing import Timing
 from climber_uk.localization.gate import Fix
-from climber_uk.localization.localizer import Located, Localizer
+from climber_uk.localization.localizer import Localizer, Located
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
@@ -32,7 +32,7 @@ from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
 RUN = SCENARIOS["climber.yaml"]
-PERIOD, STEP = 0.005, 0.0025  # [s]
+PERIOD = 0.005  # [s] of control, sensors and plant
 MILLIMETRE = 1e-3
 # 0.1°/√s and 0.5°/s; 0.05 m/s² at 200 Hz
 IMU = ImuErrors(
@@ -43,7 +43,13 @@ IMU = ImuErrors(
 )
 ENCODERS = EncoderErrors(resolution=2 * math.pi / 4096, slip=0.01)
 FIXES = FixErrors(period=0.1, delay=0.1, position_noise=0.025)
-FILTER = LocalizationOptions(initial_y=3.0, initial_heading=math.pi / 4)
+FILTER = LocalizationOptions(
+    gyro_noise=IMU.gyro_noise,
+    acceleration_noise=IMU.acceleration_noise,
+    initial_y=3.0,
+    initial_heading=math.pi / 4,
+    way_noise=5e-4,
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,7 @@ class Case:
     gap: tuple[float, float] = (0.0, 0.0)  # [s] without fixes
     moved: tuple[float, float] = (math.inf, 0.0)  # [s] from which fixes are so much off [m]
     duration: float = 57.0  # [s]
-    turned: float = 0.0  # [rad] of the true heading at the start, away from the reference's
+    rests: bool = False  # at any heading, without a controller
     believes_truth: bool = False  # whether the controller gets perfect odometry
 
 
@@ -71,14 +77,12 @@ class Record:
     remarks: list[str] = field(default_factory=list)
     filter_time: float = 0.0  # [s] of the wall clock
 
-    def add(self, now: float, robot: SimulatedRobot, located: Located, estimate: Array) -> None:
+    def add(self, now: float, robot: SimulatedRobot, located: Located) -> None:
         """Add where the climber is and where it believes to be."""
         motion, covariance = located.motion, located.pose_covariance
         off = np.array([motion.x, motion.y, motion.heading]) - robot.state.pose
         off[2] = wrapped(float(off[2]))
-        inner = estimate[:3] - robot.state.pose
-        inner[2] = wrapped(float(inner[2]))
-        self.rows.append([now, *robot.state.pose, *off, *inner, *covariance.ravel()])
+        self.rows.append([now, *robot.state.pose, *off, *covariance.ravel()])
 
 
 class Loop:
@@ -89,10 +93,11 @@ class Loop:
         believed = replace(RUN.believed, inclination=case.inclination)
         law = ControlLaw(believed, RUN.guidance)
         self.controller = Controller(Settings(law, timing=Timing(control_period=PERIOD)))
-        pose = RUN.start.pose + np.array([0.0, 0.0, case.turned])
+        turned = np.random.default_rng(seed).uniform(-math.pi, math.pi) if case.rests else 0.0
+        pose = RUN.start.pose + np.array([0.0, 0.0, turned])
         start = State(pose, np.zeros(3))
         physics = Physics(creep=case.creep)
-        parts = Parts(Plant(believed, STEP), Motors(), Sensors(), physics)
+        parts = Parts(Plant(believed, PERIOD), Motors(), Sensors(), physics)
         self.robot = SimulatedRobot(parts, start, PERIOD)
         seeded = [
             replace(errors, seed=3 * seed + number)
@@ -106,22 +111,24 @@ class Loop:
 
     def run(self) -> "Loop":
         """Go through it."""
-        self.controller.on_reference(0, sampled(RUN.trajectory, self.case.duration))
-        for number in range(round(self.case.duration / PERIOD) + 1):
+        case = self.case
+        self.controller.on_reference(0, sampled(RUN.trajectory, case.duration))
+        for number in range(round(case.duration / PERIOD) + 1):
             now = number * PERIOD
             stamp = SECOND + round(now * SECOND)
             if number > 0:
                 self.robot.measure()
             located = self.locate(stamp, now)
             if located is not None:
-                self.record.add(now, self.robot, located, self.localizer.estimate.mean)
-                motion = self.robot.state.motion if self.case.believes_truth else located.motion
+                self.record.add(now, self.robot, located)
+                if case.rests:
+                    continue
+                motion = self.robot.state.motion if case.believes_truth else located.motion
                 answer = self.controller.on_odometry(stamp, stamp, motion)
                 if answer is not None:
                     self.torques = answer.torques
             self.sent.append(self.torques)
-            for _ in range(round(PERIOD / STEP)):
-                self.robot.advance(self.torques)
+            self.robot.advance(self.torques)
         return self
 
     def locate(self, stamp: int, now: float) -> Located | None:
@@ -146,40 +153,94 @@ class Loop:
         return located
 
 
-@dataclass(frozen=True)
-class Figures:
-    """Of one run, or of many of the same case."""
-
-    off: Array  # (n, 3) output less truth [m], [rad]
-    inner: Array  # (n, 3) the filter's estimate less truth
-    time: Array  # (n,) [s]
-    nees: Array  # (n,) of the output
-    away: Array  # (n,) true distance from the reference [m]
-    roughness: float  # RMS of a torque's change in a period [N m]
-    step: float  # largest step of the output in a period beyond the truth's [m]
-    share: float  # of a core that the filter takes at 200 Hz
-
-
-def figures(loop: Loop) -> Figures:
-    """Figures of a run."""
-    rows = np.array(loop.record.rows)
-    now, pose, off, inner = rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7:10]
-    covariance = rows[:, 10:].reshape(-1, 3, 3)
-    nees = np.einsum("ni,nij,nj->n", off, np.linalg.inv(covariance), off)
-    along, across, _ = tracking_error(pose, RUN.trajectory.at(now))
-    sent = np.array(loop.sent)
-    return Figures(
-        off,
-        inner,
-        now,
-        nees,
-        np.hypot(along, across),
-        float(np.sqrt(np.mean(np.diff(sent, axis=0) ** 2))),
-        float(np.hypot(*np.diff(off[:, :2], axis=0).T).max()),
-        loop.record.filter_time / (len(rows) * PERIOD),
-    )
+NO_FIXES = FixErrors()
+ROWS = {
+    "perfect odometry for the controller": Case(believes_truth=True),
+    "all of it": Case(),
+    "heading unknown, 1 s at rest": Case(rests=True, duration=1.0),
+    "fixes of 50 mm at 5 Hz, 200 ms late": Case(fixes=FixErrors(0.2, 0.2, 0.05)),
+    "fixes of 25 mm at 1 Hz, 100 ms late": Case(fixes=FixErrors(1.0, 0.1, 0.025)),
+    "no fixes from 20 to 50 s": Case(gap=(20.0, 50.0)),
+    "no fixes at all, 1 % creep": Case(fixes=NO_FIXES, creep=0.01),
+    "5 % of fixes off by 3 m": Case(fixes=replace(FIXES, outlier_share=0.05)),
+    "fixes off by 0.5 m from 25 s on": Case(moved=(25.0, 0.5)),
+    "IMU off by 0.02 g forwards": Case(imu=replace(IMU, forward_bias=0.2)),
+    "no IMU": Case(
+        imu=ImuErrors(), options=replace(FILTER, initial_heading_deviation=math.radians(2))
+    ),
+    "wall of 20°": Case(inclination=20.0),
+    "floor, heading known to 2° at the start": Case(
+        inclination=0.0, options=replace(FILTER, initial_heading_deviation=math.radians(2))
+    ),
+}
+HEAD = "mm rms, max | deg | mm/s in gap | mm true | N m | mm | NEES | fixes | core"
+# what the columns are, for --help
+COLUMNS = """mm: RMS and largest distance of the output from the truth; deg: RMS and, from 1 s on,
+largest error of the heading; mm/s: growth of the distance in the gap; mm: RMS and largest true
+distance from the reference; N m: RMS change of a torque in a period; mm: largest step of the output
+in a period; mean NEES of the pose, and share of the time in which that of all seeds is within its
+95 % bounds; fixes taken, refused, believed against the estimate (means); share of a core at 200 Hz.
+"""
 
 
 def rms(values: Array) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(values**2)))
+
+
+def figures(loops: list[Loop]) -> str:
+    """Line of the table: figures of the runs of one case."""
+    case = loops[0].case
+    rows = np.array([loop.record.rows for loop in loops])  # (seeds, n, ...)
+    now, pose, off = rows[0, :, 0], rows[..., 1:4], rows[..., 4:7]
+    covariance = rows[..., 7:].reshape(*rows.shape[:2], 3, 3)
+    nees = np.einsum("sni,snij,snj->sn", off, np.linalg.inv(covariance), off)
+    bounds = chi2.ppf((0.025, 0.975), 3 * len(loops)) / len(loops)
+    mean = nees.mean(axis=0)
+    distance = np.hypot(off[..., 0], off[..., 1])
+    desired = RUN.trajectory.at(now)
+    along, across, _ = tracking_error(pose, desired)
+    away = np.hypot(along, across)
+    sent = np.array([loop.sent for loop in loops])
+    step = np.hypot(*np.moveaxis(np.diff(off[..., :2], axis=1), 2, 0)).max()
+    counts = np.mean([loop.localizer.counts for loop in loops], axis=0)
+    said = [
+        f"{rms(distance) / MILLIMETRE:6.1f}{distance.max() / MILLIMETRE:7.1f}",
+        f"{np.degrees(rms(off[..., 2])):7.3f}{np.degrees(np.abs(off[:, now >= 1, 2]).max()):7.3f}",
+        f"{growth(distance, now, case) / MILLIMETRE:6.2f}",
+        f"{rms(away) / MILLIMETRE:6.1f}{away.max() / MILLIMETRE:7.1f}",
+        f"{rms(np.diff(sent, axis=1)):7.4f}",
+        f"{step / MILLIMETRE:6.2f}",
+        f"{nees.mean():6.2f}{((bounds[0] < mean) & (mean < bounds[1])).mean():6.0%}",
+        " / ".join(f"{count:.1f}" for count in counts),
+        f"{np.mean([loop.record.filter_time for loop in loops]) / (len(now) * PERIOD):5.1%}",
+    ]
+    return " |".join(said)
+
+
+def growth(distance: Array, now: Array, case: Case) -> float:
+    """Mean over the seeds of how fast the distance (seeds, n) grows in the gap [m/s]."""
+    begin, end = case.gap
+    if begin == end:
+        return math.nan
+    at = [np.searchsorted(now, time) for time in (begin, end)]
+    return float((distance[:, at[1]] - distance[:, at[0]]).mean() / (end - begin))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=COLUMNS, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, default=20, help="runs of each row (default: 20)")
+    parser.add_argument("--only", default="", help="rows whose name contains this")
+    options = parser.parse_args()
+    print(f"{'':<42}{HEAD}")
+    for name, case in ROWS.items():
+        if options.only in name:
+            loops = [Loop(case, seed).run() for seed in range(options.seeds)]
+            print(f"{name:<42}{figures(loops)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from climber_uk.localization.encoders import Rolled
 
 TIME = 0.1  # [s] τ
+SPACING = 0.02  # [s] from one weight to the next: in between they tell hardly anything new
 STALE = 0.25  # [s] without a sample, after which there is no IMU
 
 
@@ -43,8 +44,10 @@ class Imu:
     def __init__(self) -> None:
         self.stamp: int | None = None  # [ns] of the last sample
         self.period = 0.005  # [s] between two samples
-        self._rates: list[float] = []
-        self._last_rate = 0.0
+        self._samples: list[
+            tuple[float, float]
+        ] = []  # yaw rate, force forwards: since the last encoders
+        self._is_used = False
         self._known = self._unused = 0.0  # [s]
         self._forwards, self._left = Mean(), Mean()
         self._speed, self._centripetal, self._yaw_rate = Mean(), Mean(), Mean()
@@ -55,8 +58,11 @@ class Imu:
             if stamp <= self.stamp:
                 return
             self.period = min((stamp - self.stamp) * 1e-9, STALE)
-        self.stamp, self._last_rate = stamp, yaw_rate
-        self._rates.append(yaw_rate)
+        self.stamp = stamp
+        if self._is_used:
+            self._samples.clear()
+        self._is_used = False
+        self._samples.append((yaw_rate, forwards))
         self._known, self._unused = self._known + self.period, self._unused + self.period
         self._forwards.add(forwards, self.period)
         self._left.add(left, self.period)
@@ -65,18 +71,23 @@ class Imu:
         """Whether there is a sample not older than `STALE`, at `stamp` [ns]."""
         return self.stamp is not None and abs(stamp - self.stamp) < STALE * 1e9
 
-    def yaw_rate(self) -> float:
-        """Mean [rad/s] of the samples since the last call, else the last one."""
-        rates, self._rates = self._rates or [self._last_rate], []
-        return sum(rates) / len(rates)
+    def means(self) -> tuple[float, float]:
+        """Yaw rate [rad/s] and specific force forwards [m/s²]: means since the last call.
+
+        Without a sample since then, they are the last ones.
+        """
+        rates, forces = zip(*self._samples, strict=True)
+        del self._samples[:-1]
+        self._is_used = True
+        return sum(rates) / len(rates), sum(forces) / len(forces)
 
     def weight(self, rolled: Rolled, yaw_rate: float) -> Weight | None:
-        """Force of the weight after what was `rolled` at a `yaw_rate` [rad/s]; None: no sample."""
+        """Force of the weight after what was `rolled` at a `yaw_rate` [rad/s]; None: not yet."""
         speed = rolled.speed
         self._speed.add(speed, rolled.duration)
         self._centripetal.add(speed * yaw_rate, rolled.duration)
         self._yaw_rate.add(yaw_rate, rolled.duration)
-        if self._unused == 0:
+        if self._unused == 0 or self._unused + 1e-9 < min(SPACING, self._known):
             return None
         time, self._unused = self._unused, 0.0
         acceleration = (speed - self._speed.value) / TIME

@@ -65,11 +65,22 @@ def predicted(estimate: Estimate, travel: Travel, options: LocalizationOptions) 
     return Estimate(mean, covariance)
 
 
-def corrected(estimate: Estimate, innovation: Array, jacobian: Array, noise: Array) -> Estimate:
-    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 6)."""
+def corrected(
+    estimate: Estimate, innovation: Array, jacobian: Array, noise: Array, limit: float = math.inf
+) -> Estimate:
+    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 6).
+
+    One whose χ² is above `limit` counts for less, by as much as it is above.
+    """
     covariance = estimate.covariance
     crossed = jacobian @ covariance
-    gain = np.linalg.solve(crossed @ jacobian.T + noise, crossed).T
+    expected = crossed @ jacobian.T + noise
+    inverse = np.linalg.inv(expected)
+    excess = float(innovation @ inverse @ innovation) / limit
+    if excess > 1:
+        noise = noise * excess
+        inverse = np.linalg.inv(crossed @ jacobian.T + noise)
+    gain = crossed.T @ inverse
     kept = IDENTITY - gain @ jacobian
     after = kept @ covariance @ kept.T + gain @ noise @ gain.T
     return Estimate(estimate.mean + gain @ innovation, (after + after.T) / 2)
@@ -90,9 +101,7 @@ def with_gravity(
     """
     innovation = force - models.gravity(estimate.mean, late, along_wall)
     jacobian = models.gravity_jacobian(estimate.mean, late, along_wall)
-    noise = variance * np.eye(2)
-    knock = distance(estimate, innovation, jacobian, noise) / LARGEST_KNOCK
-    return corrected(estimate, innovation, jacobian, noise * max(1.0, knock))
+    return corrected(estimate, innovation, jacobian, variance * np.eye(2), LARGEST_KNOCK)
 
 
 def with_yaw_rate_at_rest(estimate: Estimate, yaw_rate: float, variance: float) -> Estimate:

@@ -8,10 +8,11 @@ import numpy as np
 from climber_uk.localization.encoders import Encoders, Rolled
 from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
 from climber_uk.localization.history import History, Sample
-from climber_uk.localization.imu import TIME, Imu, Mean, Weight
+from climber_uk.localization.imu import TIME, Imu, Weight
 from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
 from climber_uk.localization.models import BIAS, HEADING, SCALE, Travel, X, Y, turn
 from climber_uk.localization.options import LocalizationOptions
+from climber_uk.localization.output_speed import OutputSpeed
 from climber_uk.localization.smoothing import Smoothing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
@@ -60,7 +61,8 @@ class Localizer:
         self.located: Located | None = None
         self._early: list[Fix] = []  # that are ahead of the encoders
         self._disagrees = 0.0  # [s]
-        self._wheels_lag = Mean()  # [rad/s] by which the wheels' yaw rate is below the gyro's
+        self._output = OutputSpeed()
+        self._force = 0.0  # [m/s²] forwards, as the IMU tells
 
     @property
     def estimate(self) -> Estimate:
@@ -110,7 +112,7 @@ class Localizer:
     def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
         assert self.stamp is not None
         is_gyro = self.imu.is_there(self.stamp)
-        yaw_rate = self.imu.yaw_rate() if is_gyro else rolled.yaw_rate
+        yaw_rate, self._force = self.imu.means() if is_gyro else (rolled.yaw_rate, 0.0)
         travel = Travel(rolled.duration, rolled.distance, rolled.path, yaw_rate, is_gyro)
         weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
         return Sample(travel, weight if self.knows_heading else None, rolled.rests), weight
@@ -195,20 +197,20 @@ class Localizer:
             self.smoothing.corrected(before, self.estimate.mean[:3])
 
     def _locate(self, rolled: Rolled, travel: Travel) -> Located:
-        """What is published: the yaw rate is the gyro's, and quick changes of it the wheels'."""
+        """What is published."""
         assert self.stamp is not None
-        mean, covariance = self.estimate.mean, self.estimate.covariance
-        x, y, heading = (mean[:3] + self.smoothing.offset).tolist()
-        gyro = turn(float(mean[BIAS]), travel) / travel.duration
-        self._wheels_lag.add(gyro - rolled.yaw_rate, travel.duration)
-        yaw_rate = rolled.yaw_rate + self._wheels_lag.value
-        speed = rolled.speed * (1 - float(mean[SCALE]))
-        offset = self.smoothing.offset
+        mean, offset, duration = self.estimate.mean, self.smoothing.offset, travel.duration
+        x, y, heading = (mean[:3] + offset).tolist()
+        gyro = turn(float(mean[BIAS]), travel) / duration
+        yaw_rate = self._output.yaw_rate(rolled.yaw_rate, gyro, duration)
+        pull = self.options.gravity_along_wall * math.sin(float(mean[HEADING]))
+        acceleration = self._force - pull if travel.is_gyro else None
+        wheels = rolled.speed * (1 - float(mean[SCALE]))
+        speed = self._output.go_on(wheels, acceleration, duration)
         scale, bias = self.estimate.deviation(SCALE), self.estimate.deviation(BIAS)
-        noise = self.options.gyro_noise**2 / TIME
         return Located(
             self.stamp,
             Motion.at(x, y, heading, speed, yaw_rate),
-            covariance[:3, :3] + np.outer(offset, offset),
-            ((speed * scale) ** 2 + SPEED_NOISE**2, bias**2 + noise),
+            self.estimate.covariance[:3, :3] + np.outer(offset, offset),
+            ((speed * scale) ** 2 + SPEED_NOISE**2, bias**2 + self.options.gyro_noise**2 / TIME),
         )

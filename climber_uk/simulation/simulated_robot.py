@@ -131,7 +131,8 @@ class SimulatedRobot:
     def _sagged(self, state: State, rates: Array, step: float) -> State:
         """State a little further down the wall, as wheels under load give way where they roll."""
         climber, creep = self.plant.climber, self.parts.physics.creep
-        way = creep * climber.wheel_radius * float(np.abs(rates).mean()) * step
+        right, left = rates.tolist()
+        way = creep * climber.wheel_radius * (abs(right) + abs(left)) / 2 * step
         x, y = self.plant.wall.along(climber.inclination, float(state.pose[1]))
         return replace(state, pose=state.pose + way * np.array([x, y, 0.0]))
 
