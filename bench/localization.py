@@ -133,19 +133,19 @@ class Loop:
 
     def locate(self, stamp: int, now: float) -> Located | None:
         """Have the sensors measure, and the filter take it."""
-        case, sensors, state = self.case, self.sensors, self.robot.state
-        sample = sensors.imu.measure(state, self.robot.plant)
-        right, left = sensors.encoders.measure(self.robot.angles).tolist()
-        fixes = sensors.fixes.measure(stamp, state)
+        case, robot = self.case, self.robot
+        measured = self.sensors.measure(stamp, robot.state, robot.plant, robot.angles)
+        right, left = measured.angles.tolist()
         began = time.perf_counter()
-        for fix in fixes:
+        for fix in measured.fixes:
             measured_at = fix.stamp / SECOND - 1
             if not case.gap[0] <= measured_at < case.gap[1]:
                 off = np.array([case.moved[1] * (measured_at >= case.moved[0]), 0.0])
                 noise = case.fixes.position_noise**2 * np.eye(2)
                 self.localizer.on_fix(Fix(fix.stamp, (0, 1), fix.pose[:2] + off, noise))
-        if case.imu.enabled:
-            self.localizer.on_imu(stamp, sample.yaw_rate, *sample.force[:2].tolist())
+        if measured.imu is not None:
+            force = measured.imu.force[:2].tolist()
+            self.localizer.on_imu(stamp, measured.imu.yaw_rate, *force)
         located = self.localizer.on_encoders(stamp, right, left)
         self.record.filter_time += time.perf_counter() - began
         said, self.localizer.remarks = self.localizer.remarks, []

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from climber_uk.localization.imu import TIME, Weight
+from climber_uk.localization.imu import DELAY, Weight
 from climber_uk.localization.kalman import (
     Estimate,
     predicted,
@@ -40,7 +40,7 @@ class Sample:
         if weight is not None:
             force = np.array([weight.forwards, weight.left])
             variance = options.acceleration_noise**2 / weight.time
-            late = Late(weight.turned, TIME if travel.is_gyro else 0.0)
+            late = Late(weight.turned, DELAY if travel.is_gyro else 0.0)
             estimate = with_gravity(estimate, force, late, variance, options.gravity_along_wall)
         if self.rests and travel.is_gyro:
             variance = options.gyro_noise**2 / travel.duration

@@ -2,16 +2,17 @@
 
     f_x - v̇ = g_t sinθ    f_y - v ω = g_t cosθ
 
-v̇ is (v - v̄) / τ, v̄ being v through a low-pass of time constant τ. Force, v ω and θ go through the
-same one, so that all are equally late: θ̄ = θ - τ ω̄. Below 1/τ the low-pass leaves noise as it is,
-so that each sample counts as much as it does without.
+All go through the same low-pass, twice, so that they are equally late. A bar for each time:
+v̇ is (v̄ - v̿) / τ, and θ̿ = θ - τ (ω̄ + ω̿). What is slower than 1/τ the low-pass leaves as it is: each
+sample counts as much as it does without. Once would leave too much of the encoders' counts in v̇.
 """
 
 from typing import NamedTuple
 
 from climber_uk.localization.encoders import Rolled
 
-TIME = 0.1  # [s] τ
+TIME = 0.04  # [s] τ
+DELAY = 2 * TIME  # [s] of all that went through
 SPACING = 0.02  # [s] from one weight to the next: in between they tell hardly anything new
 STALE = 0.25  # [s] without a sample, after which there is no IMU
 
@@ -23,7 +24,7 @@ class Weight(NamedTuple):
     left: float
     turned: float  # [rad] by which the heading was less
     time: float  # [s] for which this stands
-    known: float  # [s] since the first sample, at most 2 τ: over which it is a mean
+    known: float  # [s] over which it is a mean: since the first sample, at most 4 τ
 
 
 class Mean:
@@ -38,6 +39,18 @@ class Mean:
         self.value += (value - self.value) * duration / self._time
 
 
+class LowPass:
+    """Two in a row."""
+
+    def __init__(self) -> None:
+        self.first, self.second = Mean(), Mean()
+
+    def add(self, value: float, duration: float) -> None:
+        """Take a value that holds for `duration` [s]."""
+        self.first.add(value, duration)
+        self.second.add(self.first.value, duration)
+
+
 class Imu:
     """Takes samples; `yaw_rate` and `weight` are since the last sample of the encoders."""
 
@@ -49,8 +62,8 @@ class Imu:
         ] = []  # yaw rate, force forwards: since the last encoders
         self._is_used = False
         self._known = self._unused = 0.0  # [s]
-        self._forwards, self._left = Mean(), Mean()
-        self._speed, self._centripetal, self._yaw_rate = Mean(), Mean(), Mean()
+        self._forwards, self._left = LowPass(), LowPass()
+        self._speed, self._centripetal, self._yaw_rate = LowPass(), LowPass(), LowPass()
 
     def add(self, stamp: int, yaw_rate: float, forwards: float, left: float) -> None:
         """Take yaw rate [rad/s] and specific force [m/s²] of a `stamp` [ns], all in the body's."""
@@ -71,6 +84,12 @@ class Imu:
         """Whether there is a sample not older than `STALE`, at `stamp` [ns]."""
         return self.stamp is not None and abs(stamp - self.stamp) < STALE * 1e9
 
+    def is_due(self, stamp: int) -> bool:
+        """Whether a sample of `stamp` [ns], or of a little before, is still to be expected."""
+        if self.stamp is None or not self.is_there(stamp):
+            return False
+        return (stamp - self.stamp) * 1e-9 >= 0.9 * self.period
+
     def means(self) -> tuple[float, float]:
         """Yaw rate [rad/s] and specific force forwards [m/s²]: means since the last call.
 
@@ -90,11 +109,12 @@ class Imu:
         if self._unused == 0 or self._unused + 1e-9 < min(SPACING, self._known):
             return None
         time, self._unused = self._unused, 0.0
-        acceleration = (speed - self._speed.value) / TIME
+        acceleration = (self._speed.first.value - self._speed.second.value) / TIME
+        turning = self._yaw_rate.first.value + self._yaw_rate.second.value
         return Weight(
-            self._forwards.value - acceleration,
-            self._left.value - self._centripetal.value,
-            TIME * self._yaw_rate.value,
+            self._forwards.second.value - acceleration,
+            self._left.second.value - self._centripetal.second.value,
+            TIME * turning,
             time,
-            min(self._known, 2 * TIME),
+            min(self._known, 4 * TIME),
         )

@@ -8,7 +8,7 @@ import numpy as np
 from climber_uk.localization.encoders import Encoders, Rolled
 from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
 from climber_uk.localization.history import History, Sample
-from climber_uk.localization.imu import TIME, Imu, Weight
+from climber_uk.localization.imu import DELAY, Imu, Weight
 from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
 from climber_uk.localization.models import BIAS, HEADING, SCALE, Travel, X, Y, turn
 from climber_uk.localization.options import LocalizationOptions
@@ -57,6 +57,7 @@ class Localizer:
         self.gate, self.smoothing = Gate(options), Smoothing(options)
         self.counts = Counts()
         self.stamp: int | None = None  # [ns] of the last sample of the encoders
+        self.last_was_taken = True  # of the fixes
         self.fixed: int | None = None  # [ns] stamp of the last fix that was taken
         self.located: Located | None = None
         self._early: list[Fix] = []  # that are ahead of the encoders
@@ -87,14 +88,17 @@ class Localizer:
     def on_encoders(self, stamp: int, right: float, left: float) -> Located | None:
         """Take the wheels' angles [rad] at `stamp` [ns]; None while too little is known.
 
-        What has no newer stamp gets the answer of before. Raises as `Encoders.roll` does.
+        What has no newer stamp gets the answer of before, if there was one. Raises as
+        `Encoders.roll` does.
         """
-        if self.stamp is not None and stamp <= self.stamp:
-            if self.stamp - stamp < BACK * SECOND:
-                return self.located
+        if self.stamp is not None and self.stamp - stamp >= BACK * SECOND:
             self.remarks.append("stamps went back: started anew")
             self._start()
-        duration = EARLIEST if self.stamp is None else (stamp - self.stamp) / SECOND
+        if self.stamp is not None and (
+            stamp < self.stamp or (stamp == self.stamp and self.located)
+        ):
+            return self.located
+        duration = max(EARLIEST, (stamp - (self.stamp or stamp)) / SECOND)
         self.stamp = stamp
         rolled = self.encoders.roll(right, left, duration)
         sample, weight = self._sample(rolled)
@@ -181,13 +185,14 @@ class Localizer:
         before = self.estimate.mean[:3]
         self.history.correct(number, lambda estimate: after(estimate, fix, innovation(estimate)))
         self._smooth(before)
-        self.fixed = fix.stamp
+        self.fixed, self.last_was_taken = fix.stamp, True
         taken, _, believed = self.counts
         self.counts = self.counts._replace(taken=taken + 1, believed=believed + verdict.believed)
         if verdict.believed:
             self.remarks.append(f"fix {verdict.said}")
 
     def _refuse(self, why: str) -> None:
+        self.last_was_taken = False
         self.counts = self.counts._replace(refused=self.counts.refused + 1)
         self.remarks.append(f"fix refused: {why}")
 
@@ -212,5 +217,5 @@ class Localizer:
             self.stamp,
             Motion.at(x, y, heading, speed, yaw_rate),
             self.estimate.covariance[:3, :3] + np.outer(offset, offset),
-            ((speed * scale) ** 2 + SPEED_NOISE**2, bias**2 + self.options.gyro_noise**2 / TIME),
+            ((speed * scale) ** 2 + SPEED_NOISE**2, bias**2 + self.options.gyro_noise**2 / DELAY),
         )

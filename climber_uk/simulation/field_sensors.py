@@ -77,6 +77,8 @@ class Imu:
     def __init__(self, errors: ImuErrors, period: float, start: State) -> None:
         self.errors, self.period, self._last = errors, period, start
         self._random = np.random.default_rng(errors.seed)
+        self.yaw_rate_variance = errors.gyro_noise**2 / period  # of a sample [(rad/s)²]
+        self.force_variance = errors.acceleration_noise**2 / period  # [(m/s²)²]
 
     def measure(self, state: State, plant: Plant) -> ImuSample:
         """Sample of a state."""
@@ -90,9 +92,12 @@ class Imu:
         )
         exact = np.array([along(heading, force), across(heading, force), off_wall])
         bias = np.array([errors.forward_bias, errors.left_bias, 0.0])
-        noise = self._random.normal(size=4) / math.sqrt(self.period)
-        yaw_rate = float(state.yaw_rate) + errors.gyro_bias + errors.gyro_noise * float(noise[3])
-        return ImuSample(yaw_rate, exact + bias + errors.acceleration_noise * noise[:3])
+        *noise, turning = self._random.normal(size=4).tolist()
+        yaw_rate = float(state.yaw_rate) + errors.gyro_bias
+        return ImuSample(
+            yaw_rate + math.sqrt(self.yaw_rate_variance) * turning,
+            exact + bias + math.sqrt(self.force_variance) * np.array(noise),
+        )
 
 
 class WheelEncoders:
@@ -108,11 +113,13 @@ class WheelEncoders:
     def measure(self, angles: Array) -> Array:
         """Angles (2,) [rad] that are told of those (2,) without slip (right, left)."""
         errors = self.errors
-        if errors.slip > 0:
+        if errors.slip == 0:
+            self._turned = angles
+        else:
             noise = errors.slip * math.sqrt(1 - self._kept**2) * float(self._random.normal())
             self._slip = self._kept * self._slip + noise
-        self._turned = self._turned + (angles - self._exact) * (1 + self._slip)
-        self._exact = angles
+            self._turned = self._turned + (angles - self._exact) * (1 + self._slip)
+            self._exact = angles
         if errors.resolution == 0:
             return self._turned
         counted: Array = errors.resolution * np.floor(self._turned / errors.resolution)
@@ -159,6 +166,15 @@ class Fixes:
         return np.array([*(pose[:2] + off), float(pose[2]) + errors.heading_noise * noise[2]])
 
 
+class Measured(NamedTuple):
+    """What the sensors tell at a time."""
+
+    stamp: int  # [ns]
+    angles: Array  # (2,) of the wheels, right, left [rad]
+    imu: ImuSample | None
+    fixes: list[PoseFix]  # that arrive now
+
+
 class FieldSensors:
     """All three of one climber."""
 
@@ -167,3 +183,9 @@ class FieldSensors:
     ) -> None:
         self.imu = Imu(imu, period, start)
         self.encoders, self.fixes = WheelEncoders(encoders, period), Fixes(fixes)
+
+    def measure(self, stamp: int, state: State, plant: Plant, angles: Array) -> Measured:
+        """Measure a state at `stamp` [ns], and its wheels' angles (2,); once in a period."""
+        sample = self.imu.measure(state, plant) if self.imu.errors.enabled else None
+        counted = self.encoders.measure(angles)
+        return Measured(stamp, counted, sample, self.fixes.measure(stamp, state))
