@@ -105,7 +105,7 @@ class Localizer:
         self.history.add(stamp, sample)
         self.smoothing.go_on(duration)
         if weight is not None:
-            self._watch_gravity(weight, sample.travel)
+            self._watch_gravity(weight)
         early, self._early = self._early, []
         for fix in early:
             self.on_fix(fix)
@@ -121,7 +121,7 @@ class Localizer:
         weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
         return Sample(travel, weight if self.knows_heading else None, rolled.rests), weight
 
-    def _watch_gravity(self, weight: Weight, travel: Travel) -> None:
+    def _watch_gravity(self, weight: Weight) -> None:
         """Take the heading from gravity where nothing else tells it, or all tells another one."""
         options, pull = self.options, self.options.gravity_along_wall
         if pull == 0:
@@ -135,9 +135,8 @@ class Localizer:
         off = wrapped(heading - float(self.estimate.mean[HEADING]))
         variance = options.acceleration_noise**2 / weight.time / pull**2
         variance += self.estimate.deviation(HEADING) ** 2
-        self._disagrees = (
-            self._disagrees + travel.duration if off**2 > LARGEST_KNOCK * variance else 0.0
-        )
+        disagrees = off**2 > LARGEST_KNOCK * variance
+        self._disagrees = self._disagrees + weight.time if disagrees else 0.0
         if self._disagrees > DISAGREES:
             self.remarks.append(
                 f"heading: gravity tells {math.degrees(off):.2g}° more for {DISAGREES} s: believed"

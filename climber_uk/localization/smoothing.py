@@ -26,11 +26,13 @@ class Smoothing:
 
     def go_on(self, duration: float) -> None:
         """Follow for `duration` [s]."""
-        options, offset = self.options, self.offset
-        way = math.hypot(offset[0], offset[1])
-        share = duration / options.pull_time
-        fastest = np.array([options.pull_speed * duration, options.pull_yaw_rate * duration])
-        along = min(share, fastest[0] / way if way > 0 else 1.0, 1.0)
-        angle = abs(float(offset[2]))
-        about = min(share, fastest[1] / angle if angle > 0 else 1.0, 1.0)
-        self.offset = offset * (1 - np.array([along, along, about]))
+        options, (x, y, angle) = self.options, self.offset.tolist()
+        share = min(duration / options.pull_time, 1.0)
+        along = bounded(share, math.hypot(x, y), options.pull_speed * duration)
+        about = bounded(share, abs(angle), options.pull_yaw_rate * duration)
+        self.offset = self.offset * (1 - np.array([along, along, about]))
+
+
+def bounded(share: float, size: float, most: float) -> float:
+    """`share`, or less where that of `size` is above `most`."""
+    return share if share * size <= most else most / size

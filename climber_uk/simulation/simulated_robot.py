@@ -113,9 +113,10 @@ class SimulatedRobot:
         torques = motors.torques(plant.climber, wheels, self.torques, commanded, step)
         state = plant.advance(self.state, torques, 1, push.on(self.state))
         rates = plant.wheel_rates(state)
-        self.angles, self.rates = self.angles + (self.rates + rates) * step / 2, rates
+        turned = (self.rates + rates) * step / 2
+        self.angles, self.rates = self.angles + turned, rates
         if self.parts.physics.creep > 0:
-            state = self._sagged(state, rates, step)
+            state = self._sagged(state, turned)
         self.state, self.torques, self.push, self.plant = state, torques, push, plant
         self.steps += 1
 
@@ -128,11 +129,11 @@ class SimulatedRobot:
         """Slip and tip margin (§7), now."""
         return self.plant.margins(self.state, self.torques, self.push.on(self.state))
 
-    def _sagged(self, state: State, rates: Array, step: float) -> State:
-        """State a little further down the wall, as wheels under load give way where they roll."""
+    def _sagged(self, state: State, turned: Array) -> State:
+        """State a little down the wall, as wheels under load give way while they turn (2,) [rad]."""
         climber, creep = self.plant.climber, self.parts.physics.creep
-        right, left = rates.tolist()
-        way = creep * climber.wheel_radius * (abs(right) + abs(left)) / 2 * step
+        right, left = turned.tolist()
+        way = creep * climber.wheel_radius * (abs(right) + abs(left)) / 2
         x, y = self.plant.wall.along(climber.inclination, float(state.pose[1]))
         return replace(state, pose=state.pose + way * np.array([x, y, 0.0]))
 
