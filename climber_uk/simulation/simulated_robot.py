@@ -130,7 +130,7 @@ class SimulatedRobot:
         return self.plant.margins(self.state, self.torques, self.push.on(self.state))
 
     def _sagged(self, state: State, turned: Array) -> State:
-        """State a little down the wall, as wheels under load give way while they turn (2,) [rad]."""
+        """State a little down the wall: wheels under load give way as they turn (2,) [rad]."""
         climber, creep = self.plant.climber, self.parts.physics.creep
         right, left = turned.tolist()
         way = creep * climber.wheel_radius * (abs(right) + abs(left)) / 2
