@@ -45,6 +45,7 @@ setup(
                 "trajectory_publisher": "nodes.trajectory_publisher",
                 "uk_torque_controller": "nodes.uk_torque_controller",
                 "plant_simulator": "nodes.plant_simulator",
+                "wall_odometry": "nodes.wall_odometry",
                 "markers": "nodes.markers",
                 "record_bag": "recording.record_bag",
                 "run_demo": "demo.run_demo",

@@ -18,6 +18,7 @@ BELOW = {
     "mechanics": {"parameters"},
     "control": MATHEMATICS,
     "simulation": MATHEMATICS,
+    "localization": MATHEMATICS,
     "messages": MATHEMATICS,
     "closed_loop": MATHEMATICS | {"control", "simulation"},
     "bags": MATHEMATICS | {"control", "messages"},
@@ -28,7 +29,7 @@ BELOW = {
     "campaign": DATA | {"system", "bags", "report"},
     "paper": DATA | {"system", "bags", "report"},
     "driver_check": DATA | {"system", "ros"},
-    "nodes": DATA | {"system", "ros"},
+    "nodes": DATA | {"localization", "system", "ros"},
     "recording": {"system", "ros", "bags"},
     "demo": DATA | {"system", "ros"},
 }
@@ -36,6 +37,7 @@ ROS_ALLOWED = {"ros", "nodes", "recording", "driver_check", "demo", "messages"}
 # what a node has no use for: importing it would make every start longer
 TOOLS = "closed_loop", "bags", "report", "identification", "campaign", "paper"
 UNUSED = {
+    "wall_odometry": ["control", "simulation", "mechanics.shapes", "mechanics.preview", *TOOLS],
     "trajectory_publisher": ["control", "simulation", "mechanics.adhesion", *TOOLS],
     "uk_torque_controller": ["simulation", "mechanics.shapes", "mechanics.contact", *TOOLS],
     "plant_simulator": ["control", "mechanics.shapes", "mechanics.preview", *TOOLS],

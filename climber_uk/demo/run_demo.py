@@ -27,13 +27,14 @@ from climber_uk.messages.topics import (
     DIAGNOSTICS,
     FORCE,
     JOINTS,
+    LOCALIZATION,
     NODES,
     PLANNER,
     PLANT,
     REFERENCE_PATH,
 )
 from climber_uk.parameters.declaration import parameter, parameters
-from climber_uk.parameters.parameter_file import read_file
+from climber_uk.parameters.parameter_file import given, read_file, read_sections
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser
@@ -199,7 +200,10 @@ def executable(name: str, *arguments: str) -> list[str]:
 
 
 def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dict[str, list[str]]:
-    """Commands of the nodes, by names of their logs; climbers share one plant, and its time."""
+    """Commands of the nodes, by names of their logs; climbers share one plant, and its time.
+
+    `wall_odometry` is one of them where the configuration has parameters for it.
+    """
 
     def ros(*parameters: str, namespace: str = "") -> list[str]:
         given = [part for parameter in parameters for part in ("-p", parameter)]
@@ -215,9 +219,9 @@ def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dic
         commands[prefix + PLANNER] = executable(
             PLANNER, *ros(use_sim_time, "autostart:=false", delay, namespace=climber)
         )
-        commands[prefix + CONTROLLER] = executable(
-            CONTROLLER, *ros(use_sim_time, namespace=climber)
-        )
+        localizes = given(read_sections(config), f"{climber}/{LOCALIZATION}")
+        for node in (CONTROLLER, LOCALIZATION) if localizes else (CONTROLLER,):
+            commands[prefix + node] = executable(node, *ros(use_sim_time, namespace=climber))
     commands[PLANT] = executable(
         PLANT,
         *(["--climbers", *climbers] if any(climbers) else []),

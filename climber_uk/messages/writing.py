@@ -30,6 +30,7 @@ from climber_uk.mechanics.quantities import State
 if TYPE_CHECKING:
     from climber_uk.mechanics.reference import Reference
 
+UNKNOWN = 1e-6  # variance of what a wall leaves no freedom: z, roll and pitch, in SI units
 ROUNDING_COVARIANCE = np.diag([1e-12] * 6).ravel()
 ROUNDING_COVARIANCE.setflags(write=False)  # messages share it
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -64,6 +65,18 @@ def odometry(state: State, stamp: int, odom_frame: str, base_frame: str) -> Odom
     linear.x, linear.y, angular.z = twist
     message.pose.covariance = message.twist.covariance = ROUNDING_COVARIANCE
     return message
+
+
+# paths of the numbers that `located_numbers` has, for those of `ODOMETRY` with covariances
+LOCATED = (*ODOMETRY, "pose.covariance", "twist.covariance")
+
+
+def planar_covariance(covariance: Array) -> list[float]:
+    """The 36 of a message from that (3, 3) of x, y and about z; of the others `UNKNOWN`."""
+    whole = np.diag([UNKNOWN] * 6)
+    whole[np.ix_((0, 1, 5), (0, 1, 5))] = covariance
+    numbers: list[float] = whole.ravel().tolist()
+    return numbers
 
 
 def odometry_numbers(state: State) -> tuple[float, ...]:

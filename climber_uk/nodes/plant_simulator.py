@@ -43,7 +43,7 @@ class PlantSimulator(ClimberNode):
         self.time.join(self)
         self.place_at_start()
 
-        self.topics = PlantTopics(self)
+        self.topics = PlantTopics(self, self.sensors, self.options.publish_odometry)
         self.read_torques = NumberReader(JointState, *reading.JOINT_STATE)
         self.subscription(JointState, TORQUES, self.on_torques, raw=True)
         self.subscription(WrenchStamped, PUSH, self.on_push)
@@ -83,6 +83,8 @@ class PlantSimulator(ClimberNode):
         self.commands: CommandBuffer[Array] = CommandBuffer(round(timeout * SECOND))
         self.pushes: CommandBuffer[Push] = CommandBuffer(round(self.options.push_timeout * SECOND))
         self.fallen = self.answered = False
+        self.sensors = plant_parts.field_sensors(self.parameters)
+        self.sense(self.time.stamp)
 
     def on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/reset: start again from the initial state; time goes on."""
@@ -184,6 +186,12 @@ class PlantSimulator(ClimberNode):
             )
             return
         self.robot.measure()
+        self.sense(self.time.stamp + self.time.period)
+
+    def sense(self, stamp: int) -> None:
+        """Have encoders, IMU and fixes measure at `stamp` [ns]."""
+        robot = self.robot
+        self.measured = self.sensors.measure(stamp, robot.state, robot.plant, robot.angles)
 
     def no_answer(self) -> None:
         """Report that no torque answers the last odometry."""
@@ -192,11 +200,20 @@ class PlantSimulator(ClimberNode):
     # Outputs
 
     def publish_odometry(self) -> None:
-        """Publish the odometry, which a torque is to answer."""
+        """Publish the odometry, or what is made one of, which a torque is to answer."""
         self.topics.publish_odometry(self.robot, self.asked)
+        if not self.options.publish_odometry:
+            self.publish_sensors()
+
+    def publish_sensors(self) -> None:
+        """Publish encoders, IMU and fixes; fixes only once."""
+        self.topics.publish_sensors(self.robot, self.measured)
+        self.measured = self.measured._replace(fixes=[])
 
     def publish_others(self) -> None:
         """Publish all other topics, and the margins."""
+        if self.options.publish_odometry:
+            self.publish_sensors()
         self.topics.publish_others(self.robot, self.time.stamp)
         load = self.robot.plant.wheel_load(self.robot.state)
         self.margins.take(*self.robot.margins(), load, self.time.stamp)

@@ -6,17 +6,31 @@ from climber_uk.mechanics.adhesion import Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.ros.parameters import NodeParameters
+from climber_uk.simulation.field_sensors import (
+    EncoderErrors,
+    FieldSensors,
+    FixErrors,
+    ImuErrors,
+)
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import VARIANTS, Parts, Physics
 
+FIELD_SENSORS: dict[str, type[Any]] = {
+    "imu.": ImuErrors,
+    "encoders.": EncoderErrors,
+    "fixes.": FixErrors,
+}
+
 
 def declare(parameters: NodeParameters) -> None:
     """Declare all parameters of a plant; raises as `NodeParameters.declare` does."""
     for kind in (SimulationOptions, Climber, Physics, Grip, Motors, Sensors, Alarm):
         parameters.declare(kind)
+    for prefix, kind in FIELD_SENSORS.items():
+        parameters.declare(kind, prefix)
     for variants in VARIANTS.values():
         for name, variant in variants.items():
             parameters.declare(variant, f"{name}.")
@@ -34,3 +48,10 @@ def parts(parameters: NodeParameters) -> Parts:
     contact = Contact(**chosen, grip=read(Grip))
     plant = Plant(read(Climber), step, contact, wall, physics.slip)
     return Parts(plant, read(Motors), sensors, physics, source)
+
+
+def field_sensors(parameters: NodeParameters) -> FieldSensors:
+    """Encoders, IMU and fixes of a climber that begins anew."""
+    options = parameters.read(SimulationOptions)
+    imu, encoders, fixes = (parameters.read(kind, at) for at, kind in FIELD_SENSORS.items())
+    return FieldSensors(imu, encoders, fixes, options.control_period, options.initial_state)

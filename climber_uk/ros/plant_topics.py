@@ -1,14 +1,18 @@
 """The topics that a simulated climber publishes: a robot's, and the true state."""
 
+import math
+
 import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import FluidPressure, JointState
+from sensor_msgs.msg import FluidPressure, Imu, JointState
 
 from climber_uk.mechanics.quantities import State
-from climber_uk.messages import writing
-from climber_uk.messages.topics import JOINTS, ODOMETRY, PRESSURE, TRUTH
+from climber_uk.messages import writing, writing_sensors
+from climber_uk.messages.topics import IMU, JOINTS, ODOMETRY, POSE, PRESSURE, TRUTH
 from climber_uk.ros.output import Output
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
+from climber_uk.simulation.field_sensors import FieldSensors, Measured
 from climber_uk.simulation.simulated_robot import SimulatedRobot
 
 try:
@@ -22,15 +26,27 @@ NO_STATE, NO_PAIR = State(np.zeros(3), np.zeros(3)), [0.0, 0.0]
 class PlantTopics:
     """Publishers of a simulated climber, in its node's namespace."""
 
-    def __init__(self, node: ClimberNode) -> None:
+    def __init__(self, node: ClimberNode, sensors: FieldSensors, has_odometry: bool) -> None:
         self.names, self.is_due = node.names, Throttle(PUBLISH_PERIOD)
         names = self.names
         joints = [names.left_wheel_joint, names.right_wheel_joint]
         state = JointState(name=joints, position=NO_PAIR, velocity=NO_PAIR, effort=NO_PAIR)
         odometry = writing.odometry(NO_STATE, 0, names.odom_frame, names.base_frame)
-        self.odometry = Output(node.publisher(Odometry, ODOMETRY), odometry, writing.ODOMETRY)
+        self.odometry: Output | None = None
+        if has_odometry:
+            self.odometry = Output(node.publisher(Odometry, ODOMETRY), odometry, writing.ODOMETRY)
         self.truth = Output(node.publisher(Odometry, TRUTH), odometry, writing.ODOMETRY)
         self.joints = Output(node.publisher(JointState, JOINTS), state, writing.JOINT_STATE)
+        self.imu = self.pose = None
+        if sensors.imu.errors.enabled:
+            variances = sensors.imu.yaw_rate_variance, sensors.imu.force_variance
+            sample = writing_sensors.imu(names.base_frame, *variances)
+            self.imu = Output(node.publisher(Imu, IMU), sample, writing_sensors.IMU)
+        if (fixes := sensors.fixes.errors).period > 0:
+            variances = fixes.position_noise**2, fixes.heading_noise**2
+            pose = writing_sensors.pose(names.odom_frame, *variances)
+            publisher = node.publisher(PoseWithCovarianceStamped, POSE)
+            self.pose = Output(publisher, pose, writing_sensors.POSE)
         pressure = node.publisher(FluidPressure, PRESSURE)
         self.pressure = Output(pressure, FluidPressure(), ["fluid_pressure"])
         self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
@@ -38,15 +54,26 @@ class PlantTopics:
     def publish_odometry(self, robot: SimulatedRobot, measured_at: int) -> None:
         """Publish the odometry that is due, with the stamp `measured_at` [ns]."""
         _, measured = robot.odometer.latest()
-        self.odometry.publish(measured_at, *writing.odometry_numbers(measured))
+        if self.odometry is not None:
+            self.odometry.publish(measured_at, *writing.odometry_numbers(measured))
+
+    def publish_sensors(self, robot: SimulatedRobot, measured: Measured) -> None:
+        """Publish what encoders, IMU and fixes have measured."""
+        if measured.imu is not None and self.imu is not None:
+            force, yaw_rate = measured.imu.force.tolist(), measured.imu.yaw_rate
+            self.imu.publish(measured.stamp, *force, yaw_rate)
+        if self.pose is not None:
+            for fix in measured.fixes:
+                x, y, heading = fix.pose.tolist()
+                self.pose.publish(fix.stamp, x, y, math.sin(heading / 2), math.cos(heading / 2))
+        if self.joints.is_heard:
+            pairs = measured.angles, robot.rates, robot.torques
+            self.joints.publish(measured.stamp, *(writing.left_right(pair) for pair in pairs))
 
     def publish_others(self, robot: SimulatedRobot, now: int) -> None:
-        """Publish true state, joints and transform at `now` [ns]; now and then the pressure."""
+        """Publish true state and transform at `now` [ns]; now and then the pressure."""
         if self.truth.is_heard:
             self.truth.publish(now, *writing.odometry_numbers(robot.state))
-        if self.joints.is_heard:
-            pairs = robot.angles, robot.rates, robot.torques
-            self.joints.publish(now, *(writing.left_right(pair) for pair in pairs))
         if self.transform is not None and self.transform.get_subscription_count():
             names = self.names
             odometry = writing.odometry(robot.state, now, names.odom_frame, names.base_frame)

@@ -13,6 +13,9 @@ class SimulationOptions:
     simulated_time: bool = parameter(
         False, "", "publish /clock, and step when the odometry is answered: lock-step"
     )
+    publish_odometry: bool = parameter(
+        True, "", "publish odom; false: wall_odometry makes it, of joint_states, imu and pose"
+    )
     real_time_factor: float = parameter(
         0.0, "", "fastest simulated time by wall-clock time; 0: no limit", at_least=0
     )

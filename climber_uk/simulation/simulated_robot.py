@@ -36,6 +36,9 @@ class Physics:
     locomotion: str = parameter("wheeled", "", "what it runs on", choices=LOCOMOTION)
     wall: str = parameter("plane", "", "what it runs along", choices=WALLS)
     slip: bool = parameter(False, "", "whether wheels slip where their load does not suffice")
+    creep: float = parameter(
+        0.0, "", "what the climber sags on a vertical wall, by the way that it rolls", at_least=0
+    )
     pressure_loss_time: float = parameter(
         0.0, "s", "after the start, when the pump's pressure drops; 0: never", at_least=0
     )
@@ -110,7 +113,10 @@ class SimulatedRobot:
         torques = motors.torques(plant.climber, wheels, self.torques, commanded, step)
         state = plant.advance(self.state, torques, 1, push.on(self.state))
         rates = plant.wheel_rates(state)
-        self.angles, self.rates = self.angles + (self.rates + rates) * step / 2, rates
+        turned = (self.rates + rates) * step / 2
+        self.angles, self.rates = self.angles + turned, rates
+        if self.parts.physics.creep > 0:
+            state = self._sagged(state, turned)
         self.state, self.torques, self.push, self.plant = state, torques, push, plant
         self.steps += 1
 
@@ -122,6 +128,14 @@ class SimulatedRobot:
     def margins(self) -> tuple[float, float]:
         """Slip and tip margin (§7), now."""
         return self.plant.margins(self.state, self.torques, self.push.on(self.state))
+
+    def _sagged(self, state: State, turned: Array) -> State:
+        """State a little down the wall: wheels under load give way as they turn (2,) [rad]."""
+        climber, creep = self.plant.climber, self.parts.physics.creep
+        right, left = turned.tolist()
+        way = creep * climber.wheel_radius * (abs(right) + abs(left)) / 2
+        x, y = self.plant.wall.along(climber.inclination, float(state.pose[1]))
+        return replace(state, pose=state.pose + way * np.array([x, y, 0.0]))
 
     def _pump(self) -> float:
         """Pressure that the pump could reach without a leak, now [Pa]."""

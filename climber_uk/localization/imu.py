@@ -1,0 +1,120 @@
+"""Yaw rate between two samples of the encoders, and the specific force that the weight makes.
+
+    f_x - v̇ = g_t sinθ    f_y - v ω = g_t cosθ
+
+All go through the same low-pass, twice, so that they are equally late. A bar for each time:
+v̇ is (v̄ - v̿) / τ, and θ̿ = θ - τ (ω̄ + ω̿). What is slower than 1/τ the low-pass leaves as it is: each
+sample counts as much as it does without. Once would leave too much of the encoders' counts in v̇.
+"""
+
+from typing import NamedTuple
+
+from climber_uk.localization.encoders import Rolled
+
+TIME = 0.04  # [s] τ
+DELAY = 2 * TIME  # [s] of all that went through
+SPACING = 0.02  # [s] from one weight to the next: in between they tell hardly anything new
+STALE = 0.25  # [s] without a sample, after which there is no IMU
+
+
+class Weight(NamedTuple):
+    """Specific force of a climber's weight, through the low-pass."""
+
+    forwards: float  # [m/s²]
+    left: float
+    turned: float  # [rad] by which the heading was less
+    time: float  # [s] for which this stands
+    known: float  # [s] over which it is a mean: since the first sample, at most 4 τ
+
+
+class Mean:
+    """Low-pass of first order, with the plain mean where it has only begun."""
+
+    def __init__(self) -> None:
+        self.value, self._time = 0.0, 0.0
+
+    def add(self, value: float, duration: float) -> None:
+        """Take a value that holds for `duration` [s]."""
+        self._time = min(self._time + duration, TIME + duration)
+        self.value += (value - self.value) * duration / self._time
+
+
+class LowPass:
+    """Two in a row."""
+
+    def __init__(self) -> None:
+        self.first, self.second = Mean(), Mean()
+
+    def add(self, value: float, duration: float) -> None:
+        """Take a value that holds for `duration` [s]."""
+        self.first.add(value, duration)
+        self.second.add(self.first.value, duration)
+
+
+class Imu:
+    """Takes samples; `yaw_rate` and `weight` are since the last sample of the encoders."""
+
+    def __init__(self) -> None:
+        self.stamp: int | None = None  # [ns] of the last sample
+        self.period = 0.005  # [s] between two samples
+        self._samples: list[
+            tuple[float, float]
+        ] = []  # yaw rate, force forwards: since the last encoders
+        self._is_used = False
+        self._known = self._unused = 0.0  # [s]
+        self._forwards, self._left = LowPass(), LowPass()
+        self._speed, self._centripetal, self._yaw_rate = LowPass(), LowPass(), LowPass()
+
+    def add(self, stamp: int, yaw_rate: float, forwards: float, left: float) -> None:
+        """Take yaw rate [rad/s] and specific force [m/s²] of a `stamp` [ns], all in the body's."""
+        if self.stamp is not None:
+            if stamp <= self.stamp:
+                return
+            self.period = min((stamp - self.stamp) * 1e-9, STALE)
+        self.stamp = stamp
+        if self._is_used:
+            self._samples.clear()
+        self._is_used = False
+        self._samples.append((yaw_rate, forwards))
+        self._known, self._unused = self._known + self.period, self._unused + self.period
+        self._forwards.add(forwards, self.period)
+        self._left.add(left, self.period)
+
+    def is_there(self, stamp: int) -> bool:
+        """Whether there is a sample not older than `STALE`, at `stamp` [ns]."""
+        return self.stamp is not None and abs(stamp - self.stamp) < STALE * 1e9
+
+    def is_due(self, stamp: int) -> bool:
+        """Whether a sample of `stamp` [ns], or of a little before, is still to be expected."""
+        if self.stamp is None or not self.is_there(stamp):
+            return False
+        return (stamp - self.stamp) * 1e-9 >= 0.9 * self.period
+
+    def means(self) -> tuple[float, float]:
+        """Yaw rate [rad/s] and specific force forwards [m/s²]: means since the last call.
+
+        Without a sample since then, they are the last ones.
+        """
+        rates, forces = zip(*self._samples, strict=True)
+        del self._samples[:-1]
+        self._is_used = True
+        return sum(rates) / len(rates), sum(forces) / len(forces)
+
+    def weight(self, rolled: Rolled, yaw_rate: float) -> Weight | None:
+        """Force of the weight after what was `rolled` at a `yaw_rate` [rad/s]; None: not yet."""
+        speed = rolled.speed
+        self._speed.add(speed, rolled.duration)
+        self._centripetal.add(speed * yaw_rate, rolled.duration)
+        self._yaw_rate.add(yaw_rate, rolled.duration)
+        if self._unused == 0 or self._unused + 1e-9 < min(SPACING, self._known):
+            return None
+        time, self._unused = self._unused, 0.0
+        acceleration = (self._speed.first.value - self._speed.second.value) / TIME
+        turning = self._yaw_rate.first.value + self._yaw_rate.second.value
+        return Weight(
+            self._forwards.second.value - acceleration,
+            self._left.second.value - self._centripetal.second.value,
+            TIME * turning,
+            time,
+            min(self._known, 4 * TIME),
+        )

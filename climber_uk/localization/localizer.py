@@ -1,0 +1,220 @@
+"""Where the climber is: takes samples of encoders and IMU, and fixes, in the order they come in."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from climber_uk.localization.encoders import Encoders, Rolled
+from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
+from climber_uk.localization.history import History, Sample
+from climber_uk.localization.imu import DELAY, Imu, Weight
+from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
+from climber_uk.localization.models import BIAS, HEADING, SCALE, Travel, X, Y, turn
+from climber_uk.localization.options import LocalizationOptions
+from climber_uk.localization.output_speed import OutputSpeed
+from climber_uk.localization.smoothing import Smoothing
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.quantities import Motion
+
+DISAGREES = 0.5  # [s] of gravity that tells another heading, after which it is believed
+BACK = 1.0  # [s] that stamps go back, from which on everything starts anew
+EARLIEST = 0.001  # [s] that the first sample of the encoders stands for
+MOST_EARLY = 20  # fixes that wait for the encoders
+SPEED_NOISE = 0.003  # [m/s] of a speed by encoders, deviation
+
+
+class Located(NamedTuple):
+    """What there is to publish of a stamp."""
+
+    stamp: int  # [ns]
+    motion: Motion
+    pose_covariance: Array  # (3, 3) of x, y, θ
+    twist_variances: tuple[float, float]  # of speed and yaw rate
+
+
+class Counts(NamedTuple):
+    """How many fixes were taken, refused, and believed against the estimate."""
+
+    taken: int = 0
+    refused: int = 0
+    believed: int = 0
+
+
+class Localizer:
+    """Filter, gate and output together; `remarks` collects what is to be said."""
+
+    def __init__(self, options: LocalizationOptions) -> None:
+        self.options = options
+        self.remarks: list[str] = []  # for whoever reads, and empties it
+        self._start()
+
+    def _start(self) -> None:
+        options = self.options
+        self.history = History(options, Estimate.start(options))
+        self.encoders, self.imu = Encoders(options), Imu()
+        self.gate, self.smoothing = Gate(options), Smoothing(options)
+        self.counts = Counts()
+        self.stamp: int | None = None  # [ns] of the last sample of the encoders
+        self.last_was_taken = True  # of the fixes
+        self.fixed: int | None = None  # [ns] stamp of the last fix that was taken
+        self.located: Located | None = None
+        self._early: list[Fix] = []  # that are ahead of the encoders
+        self._disagrees = 0.0  # [s]
+        self._output = OutputSpeed()
+        self._force = 0.0  # [m/s²] forwards, as the IMU tells
+
+    @property
+    def estimate(self) -> Estimate:
+        """The filter's, of the last sample of the encoders."""
+        return self.history.latest
+
+    @property
+    def knows_heading(self) -> bool:
+        """Whether the heading is known well enough to begin with."""
+        return self.estimate.deviation(HEADING) <= self.options.initial_heading_limit
+
+    @property
+    def knows_position(self) -> bool:
+        """Whether the position is known well enough to begin with."""
+        furthest = max(self.estimate.deviation(X), self.estimate.deviation(Y))
+        return furthest <= self.options.initial_position_limit
+
+    def on_imu(self, stamp: int, yaw_rate: float, forwards: float, left: float) -> None:
+        """Take yaw rate [rad/s] and specific force [m/s²] at `stamp` [ns], in the body's frame."""
+        self.imu.add(stamp, yaw_rate, forwards, left)
+
+    def on_encoders(self, stamp: int, right: float, left: float) -> Located | None:
+        """Take the wheels' angles [rad] at `stamp` [ns]; None while too little is known.
+
+        What has no newer stamp gets the answer of before, if there was one. Raises as
+        `Encoders.roll` does.
+        """
+        if self.stamp is not None and self.stamp - stamp >= BACK * SECOND:
+            self.remarks.append("stamps went back: started anew")
+            self._start()
+        if self.stamp is not None and (
+            stamp < self.stamp or (stamp == self.stamp and self.located)
+        ):
+            return self.located
+        duration = max(EARLIEST, (stamp - (self.stamp or stamp)) / SECOND)
+        self.stamp = stamp
+        rolled = self.encoders.roll(right, left, duration)
+        sample, weight = self._sample(rolled)
+        self.history.add(stamp, sample)
+        self.smoothing.go_on(duration)
+        if weight is not None:
+            self._watch_gravity(weight)
+        early, self._early = self._early, []
+        for fix in early:
+            self.on_fix(fix)
+        if self.located or (self.knows_heading and self.knows_position):
+            self.located = self._locate(rolled, sample.travel)
+        return self.located
+
+    def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
+        assert self.stamp is not None
+        is_gyro = self.imu.is_there(self.stamp)
+        yaw_rate, self._force = self.imu.means() if is_gyro else (rolled.yaw_rate, 0.0)
+        travel = Travel(rolled.duration, rolled.distance, rolled.path, yaw_rate, is_gyro)
+        weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
+        return Sample(travel, weight if self.knows_heading else None, rolled.rests), weight
+
+    def _watch_gravity(self, weight: Weight) -> None:
+        """Take the heading from gravity where nothing else tells it, or all tells another one."""
+        options, pull = self.options, self.options.gravity_along_wall
+        if pull == 0:
+            return
+        deviation = options.acceleration_noise / math.sqrt(weight.known) / pull
+        heading = math.atan2(weight.forwards, weight.left) + weight.turned
+        if not self.knows_heading:
+            if deviation <= options.initial_heading_limit:
+                self._believe(heading, deviation)
+            return
+        off = wrapped(heading - float(self.estimate.mean[HEADING]))
+        variance = options.acceleration_noise**2 / weight.time / pull**2
+        variance += self.estimate.deviation(HEADING) ** 2
+        disagrees = off**2 > LARGEST_KNOCK * variance
+        self._disagrees = self._disagrees + weight.time if disagrees else 0.0
+        if self._disagrees > DISAGREES:
+            self.remarks.append(
+                f"heading: gravity tells {math.degrees(off):.2g}° more for {DISAGREES} s: believed"
+            )
+            self._believe(heading, deviation)
+
+    def _believe(self, heading: float, deviation: float) -> None:
+        self._disagrees, before = 0.0, self.estimate.mean[:3]
+        near = float(before[HEADING]) + wrapped(heading - float(before[HEADING]))
+        last = len(self.history.entries) - 1
+        self.history.correct(last, lambda estimate: estimate.with_heading(near, deviation))
+        self._smooth(before)
+
+    def on_fix(self, fix: Fix) -> None:
+        """Take a fix, at its own stamp; remark on what is refused, or believed after all."""
+        if self.stamp is None or fix.stamp > self.stamp:
+            ahead = (fix.stamp - (self.stamp or fix.stamp)) / SECOND
+            if ahead > self.options.longest_delay:
+                self._refuse(f"{ahead:.3g} s ahead of the encoders")
+            else:
+                self._early = [*self._early, fix][-MOST_EARLY:]
+            return
+        number = self.history.at(fix.stamp)
+        if number is None:
+            age = (self.stamp - fix.stamp) / SECOND
+            self._refuse(f"{age:.3g} s old, older than longest_delay={self.options.longest_delay}")
+            return
+        entry, parts = self.history.entries[number], list(fix.parts)
+        values = fix.values - (entry.pose(fix.stamp) - entry.estimate.mean[:3])[parts]
+
+        def innovation(estimate: Estimate) -> Array:
+            off = values - estimate.mean[parts]
+            return np.array(
+                [
+                    wrapped(float(part)) if which == HEADING else part
+                    for which, part in zip(parts, off, strict=True)
+                ]
+            )
+
+        verdict = self.gate.judge(entry.estimate, fix, innovation(entry.estimate))
+        if not verdict.taken:
+            self._refuse(verdict.said)
+            return
+        after = told_anew if verdict.believed else corrected_by
+        before = self.estimate.mean[:3]
+        self.history.correct(number, lambda estimate: after(estimate, fix, innovation(estimate)))
+        self._smooth(before)
+        self.fixed, self.last_was_taken = fix.stamp, True
+        taken, _, believed = self.counts
+        self.counts = self.counts._replace(taken=taken + 1, believed=believed + verdict.believed)
+        if verdict.believed:
+            self.remarks.append(f"fix {verdict.said}")
+
+    def _refuse(self, why: str) -> None:
+        self.last_was_taken = False
+        self.counts = self.counts._replace(refused=self.counts.refused + 1)
+        self.remarks.append(f"fix refused: {why}")
+
+    def _smooth(self, before: Array) -> None:
+        """Let the output go on from where it was, once there is one."""
+        if self.located:
+            self.smoothing.corrected(before, self.estimate.mean[:3])
+
+    def _locate(self, rolled: Rolled, travel: Travel) -> Located:
+        """What is published."""
+        assert self.stamp is not None
+        mean, offset, duration = self.estimate.mean, self.smoothing.offset, travel.duration
+        x, y, heading = (mean[:3] + offset).tolist()
+        gyro = turn(float(mean[BIAS]), travel) / duration
+        yaw_rate = self._output.yaw_rate(rolled.yaw_rate, gyro, duration)
+        pull = self.options.gravity_along_wall * math.sin(float(mean[HEADING]))
+        acceleration = self._force - pull if travel.is_gyro else None
+        wheels = rolled.speed * (1 - float(mean[SCALE]))
+        speed = self._output.go_on(wheels, acceleration, duration)
+        scale, bias = self.estimate.deviation(SCALE), self.estimate.deviation(BIAS)
+        return Located(
+            self.stamp,
+            Motion.at(x, y, heading, speed, yaw_rate),
+            self.estimate.covariance[:3, :3] + np.outer(offset, offset),
+            ((speed * scale) ** 2 + SPEED_NOISE**2, bias**2 + self.options.gyro_noise**2 / DELAY),
+        )

@@ -1,0 +1,73 @@
+"""What the filter is told of sensors and wall: deviations, limits, and where it starts."""
+
+import math
+from functools import cached_property
+
+from climber_uk.mechanics.climber import DEGREE, GRAVITY
+from climber_uk.parameters.declaration import parameter, parameters
+
+
+@parameters
+class LocalizationOptions:
+    """Climber and wall, how good the sensors are, and what is known at the start."""
+
+    wheel_radius: float = parameter(0.027, "m", "wheel radius r", above=0, plausible=(0.005, 0.5))
+    half_track: float = parameter(
+        0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
+    )
+    inclination: float = parameter(
+        90.0, "deg", "of the wall: 0 floor, 90 vertical, 180 ceiling", at_least=0, at_most=180
+    )
+    gyro_noise: float = parameter(
+        0.002, "rad/√s", "of the yaw rate: deviation of its integral after a second", above=0
+    )
+    gyro_bias_deviation: float = parameter(0.02, "rad/s", "of the bias at the start", at_least=0)
+    gyro_bias_walk: float = parameter(1e-4, "rad/s/√s", "how much the bias wanders", at_least=0)
+    acceleration_noise: float = parameter(
+        0.005, "m/s/√s", "of specific force: deviation of its integral after a second", above=0
+    )
+    scale_deviation: float = parameter(
+        0.01, "", "of the encoders' distance: slip, and a wrong wheel radius", at_least=0
+    )
+    scale_time: float = parameter(10.0, "s", "in which that changes", above=0)
+    creep_deviation: float = parameter(
+        0.03, "", "of what the climber sags on a vertical wall, by the way rolled", at_least=0
+    )
+    way_noise: float = parameter(
+        0.001, "m/√m", "deviation of the position after a metre, else unexplained", at_least=0
+    )
+    turn_noise: float = parameter(
+        0.05, "rad/√rad", "deviation of a turn by encoders, used without an IMU", at_least=0
+    )
+    initial_x: float = parameter(0.0, "m", "x at the start")
+    initial_y: float = parameter(0.0, "m", "y at the start")
+    initial_heading: float = parameter(0.0, "rad", "heading at the start")
+    initial_position_deviation: float = parameter(
+        0.01, "m", "of both; above initial_position_limit: a fix is waited for", above=0
+    )
+    initial_heading_deviation: float = parameter(
+        math.pi, "rad", "of that; above initial_heading_limit: gravity or a fix tells", above=0
+    )
+    initial_position_limit: float = parameter(
+        0.2, "m", "deviation above which nothing is published at the start", above=0
+    )
+    initial_heading_limit: float = parameter(
+        0.1, "rad", "deviation above which nothing is published at the start", above=0
+    )
+    gate_probability: float = parameter(
+        0.999, "", "share of good fixes that pass the gate", above=0, at_most=0.999999
+    )
+    agreeing_fixes: int = parameter(
+        5, "", "fixes refused in a row that are believed if they agree", at_least=2
+    )
+    longest_delay: float = parameter(
+        1.0, "s", "age of a fix above which it is refused", above=0, plausible=(0.05, 10)
+    )
+    pull_time: float = parameter(0.3, "s", "in which the output follows a correction", above=0)
+    pull_speed: float = parameter(0.05, "m/s", "fastest that it follows", above=0)
+    pull_yaw_rate: float = parameter(0.1, "rad/s", "fastest that it follows", above=0)
+
+    @cached_property
+    def gravity_along_wall(self) -> float:
+        """g_t = g sin(inclination) [m/s²]."""
+        return GRAVITY * math.sin(self.inclination * DEGREE)

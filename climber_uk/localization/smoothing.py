@@ -1,0 +1,38 @@
+"""The output: the estimate, but for what corrections have moved it, which it follows at its pace.
+
+    o⁺ = o - clip(o Δt / T, ± v Δt)    o: output less estimate
+
+A controller that is fed a jump answers it with torque.
+"""
+
+import math
+
+import numpy as np
+
+from climber_uk.localization.options import LocalizationOptions
+from climber_uk.mechanics import Array
+
+
+class Smoothing:
+    """Keeps how far the output is behind the estimate."""
+
+    def __init__(self, options: LocalizationOptions) -> None:
+        self.options = options
+        self.offset: Array = np.zeros(3)  # of the output from the estimate [m], [rad]
+
+    def corrected(self, before: Array, after: Array) -> None:
+        """Let the output be where it was, though the estimate's pose (3,) has moved."""
+        self.offset = self.offset + before - after
+
+    def go_on(self, duration: float) -> None:
+        """Follow for `duration` [s]."""
+        options, (x, y, angle) = self.options, self.offset.tolist()
+        share = min(duration / options.pull_time, 1.0)
+        along = bounded(share, math.hypot(x, y), options.pull_speed * duration)
+        about = bounded(share, abs(angle), options.pull_yaw_rate * duration)
+        self.offset = self.offset * (1 - np.array([along, along, about]))
+
+
+def bounded(share: float, size: float, most: float) -> float:
+    """`share`, or less where that of `size` is above `most`."""
+    return share if share * size <= most else most / size

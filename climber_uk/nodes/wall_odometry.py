@@ -1,0 +1,205 @@
+"""Makes odometry of what climbers carry: wheels' encoders, an IMU, and fixes that come late.
+
+An odometry answers each message of the encoders. Until heading and position are known there is
+none: a controller then waits.
+"""
+
+import math
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, JointState
+
+from climber_uk.localization import models
+from climber_uk.localization.gate import Fix
+from climber_uk.localization.localizer import Localizer, Located
+from climber_uk.localization.options import LocalizationOptions
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.quantities import State
+from climber_uk.messages import reading_sensors, writing
+from climber_uk.messages.topics import IMU, JOINTS, LOCALIZATION, ODOMETRY, POSE
+from climber_uk.parameters.declaration import parameter, parameters
+from climber_uk.ros.output import Output
+from climber_uk.ros.running import BEST_EFFORT, WALL_CLOCK, ClimberNode, run
+
+PATIENCE = 0.05  # [s] of the wall clock that encoders wait for an IMU's sample, at least
+NOWHERE = State(np.zeros(3), np.zeros(3))
+
+
+@parameters
+class SensorFrames:
+    """Frames of the sensors, and how the IMU is mounted."""
+
+    imu_frame: str = parameter("", "", "frame of imu; empty: base_frame")
+    imu_yaw: float = parameter(
+        0.0, "rad", "from the climber's x to the IMU's, anticlockwise; both have z off the wall"
+    )
+    pose_frame: str = parameter("", "", "frame of pose, which is the wall's; empty: odom_frame")
+
+
+class WallOdometry(ClimberNode):
+    """Passes messages to a `Localizer`, and what it locates on."""
+
+    def __init__(self) -> None:
+        super().__init__(LOCALIZATION)
+        self.parameters.declare(LocalizationOptions)
+        self.parameters.declare(SensorFrames)
+        self.parameters.refuse_unknown()
+        self.options = self.parameters.read(LocalizationOptions)
+        self.frames = self.parameters.read(SensorFrames)
+        self.localizer = Localizer(self.options)
+        self.waiting: tuple[int, float, float] | None = None  # encoders, for the IMU
+        self.waited: tuple[int, float, float] | None = None  # the same, a `PATIENCE` ago
+        self.last_remark = ""
+
+        names = self.names
+        odometry = writing.odometry(NOWHERE, 0, names.odom_frame, names.base_frame)
+        self.odometry = Output(self.publisher(Odometry, ODOMETRY), odometry, writing.LOCATED)
+        self.subscription(JointState, JOINTS, self.on_joints, BEST_EFFORT)
+        self.subscription(Imu, IMU, self.on_imu, BEST_EFFORT)
+        self.subscription(PoseWithCovarianceStamped, POSE, self.on_pose, BEST_EFFORT)
+        self.create_timer(PATIENCE, self.lose_patience, clock=WALL_CLOCK)
+        self.start_diagnostics(self.values, alone_on=(ODOMETRY, JOINTS, IMU))
+
+    def summary(self) -> str:
+        """Wall, and what is known at the start, for the log."""
+        options = self.options
+        heading = "unknown"
+        if options.initial_heading_deviation <= options.initial_heading_limit:
+            heading = f"{options.initial_heading:.3g} rad"
+        pull = options.gravity_along_wall
+        return f"gravity along the wall {pull:.3g} m/s², heading at the start {heading}"
+
+    # Messages
+
+    def on_joints(self, message: JointState) -> None:
+        """Take the wheels' angles, once the IMU's sample of the same time is there."""
+        names = self.names
+        try:
+            angles = reading_sensors.wheel_angles(
+                message, names.left_wheel_joint, names.right_wheel_joint
+            )
+            stamp = reading_sensors.stamp_of(message)
+        except ValueError as error:
+            self.report(JOINTS, "refused", str(error))
+            return
+        self.go_on()  # with those before: the IMU is late
+        self.waiting = (stamp, *angles)
+        if not self.localizer.imu.is_due(stamp):
+            self.go_on()
+
+    def on_imu(self, message: Imu) -> None:
+        """Take yaw rate and specific force, turned into the climber's frame."""
+        try:
+            sample = reading_sensors.imu(message, self.frames.imu_frame or self.names.base_frame)
+        except ValueError as error:
+            self.report(IMU, "refused", str(error))
+            return
+        self.report(IMU, "")
+        cosine, sine = math.cos(self.frames.imu_yaw), math.sin(self.frames.imu_yaw)
+        x, y = sample.force
+        forwards, left = x * cosine - y * sine, x * sine + y * cosine
+        self.localizer.on_imu(sample.stamp, sample.yaw_rate, forwards, left)
+        if self.waiting is not None and not self.localizer.imu.is_due(self.waiting[0]):
+            self.go_on()
+
+    def on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        """Take the parts of a pose that are measured."""
+        try:
+            pose = reading_sensors.pose(message, self.frames.pose_frame or self.names.odom_frame)
+        except ValueError as error:
+            self.report(POSE, "refused", str(error))
+            return
+        self.report(POSE, "")
+        self.localizer.on_fix(Fix(*pose))
+        self.tell_remarks()
+
+    def lose_patience(self) -> None:
+        """Go on without the IMU where its sample has not come."""
+        if self.waited is self.waiting:
+            self.go_on()
+        self.waited = self.waiting
+
+    def go_on(self) -> None:
+        """Locate at the encoders that wait, and publish."""
+        if self.waiting is None:
+            return
+        waiting, self.waiting = self.waiting, None
+        try:
+            located = self.localizer.on_encoders(*waiting)
+            self.report(JOINTS, "")
+        except ValueError as error:
+            self.report(JOINTS, "refused", str(error))
+            return
+        self.tell_remarks()
+        self.tell_what_is_missing(waiting[0])
+        if located is not None:
+            self.publish(located)
+
+    # Outputs
+
+    def publish(self, located: Located) -> None:
+        """Publish an odometry."""
+        x, y, heading, *_, speed, yaw_rate = located.motion
+        speed_variance, yaw_variance = located.twist_variances
+        twist = np.diag([speed_variance, speed_variance, yaw_variance])
+        self.odometry.publish(
+            located.stamp,
+            *(x, y, math.sin(heading / 2), math.cos(heading / 2), speed, 0.0, yaw_rate),
+            writing.planar_covariance(located.pose_covariance),
+            writing.planar_covariance(twist),
+        )
+
+    def tell_remarks(self) -> None:
+        """Report what the localizer says of fixes and stamps; that of a good fix ends it."""
+        remarks, self.localizer.remarks = self.localizer.remarks, []
+        for remark in remarks:
+            self.last_remark = remark
+            subject, _, detail = remark.partition(": ")
+            self.report("localization", subject, detail, is_fault=False)
+        if not remarks and self.localizer.last_was_taken:
+            self.report("localization", "")
+
+    def tell_what_is_missing(self, stamp: int) -> None:
+        """Report an IMU that is not there, and what a start waits for."""
+        localizer, options = self.localizer, self.options
+        absent = not localizer.imu.is_there(stamp)
+        self.report("samples of imu", "none: yaw rate by the wheels" * absent, "", is_fault=False)
+        missing = []
+        if localizer.located is None and not localizer.knows_heading:
+            missing.append(f"heading to {options.initial_heading_limit:g} rad")
+        if localizer.located is None and not localizer.knows_position:
+            missing.append(f"position to {options.initial_position_limit:g} m")
+        self.report("start", "waits" * bool(missing), f"for {' and '.join(missing)}")
+
+    def values(self) -> dict[str, object]:
+        """Values for diagnostics."""
+        localizer, estimate = self.localizer, self.localizer.estimate
+        counts, stamp, fixed = localizer.counts, localizer.stamp, localizer.fixed
+        age = (stamp - fixed) / SECOND if stamp is not None and fixed is not None else math.inf
+
+        def with_deviation(part: int) -> str:
+            return f"{estimate.mean[part]:.4g} ± {estimate.deviation(part):.2g}"
+
+        return {
+            "x [m]": with_deviation(models.X),
+            "y [m]": with_deviation(models.Y),
+            "heading [rad]": with_deviation(models.HEADING),
+            "bias of the gyro [rad/s]": with_deviation(models.BIAS),
+            "scale error of the encoders": with_deviation(models.SCALE),
+            "creep": with_deviation(models.CREEP),
+            "gravity along the wall [m/s²]": self.options.gravity_along_wall,
+            "output less estimate [m, m, rad]": [f"{o:.3g}" for o in localizer.smoothing.offset],
+            "fixes taken": counts.taken,
+            "fixes refused": counts.refused,
+            "fixes believed against the estimate": counts.believed,
+            "last fix taken, age [s]": age,
+            "last innovation, of what may be": localizer.gate.ratio,
+            "last remark": self.last_remark,
+        }
+
+
+def main() -> None:
+    """Run the node."""
+    run(lambda: [WallOdometry()], __doc__)

@@ -1,0 +1,69 @@
+"""What is refused, and what is believed in the end."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from climber_uk.localization.gate import Fix, Gate, chi_square, quantile, told_anew
+from climber_uk.localization.kalman import Estimate
+from climber_uk.localization.options import LocalizationOptions
+
+OPTIONS = LocalizationOptions()
+ESTIMATE = Estimate.start(OPTIONS)
+NOISE = 0.025**2 * np.eye(2)
+
+
+def fix(x=0.0, y=0.0):
+    return Fix(0, (0, 1), np.array([x, y]), NOISE)
+
+
+def judged(gate, x, y=0.0):
+    return gate.judge(ESTIMATE, fix(x, y), np.array([x, y]))
+
+
+@given(probability=st.floats(0.01, 0.999999), parts=st.sampled_from([1, 2, 3]))
+def test_quantiles_are_scipys(probability, parts):
+    assert quantile(probability, parts) == pytest.approx(chi2.ppf(probability, parts), rel=1e-6)
+    assert chi_square(2.0, parts) == pytest.approx(chi2.cdf(2.0, parts))
+
+
+def test_good_fixes_pass_as_often_as_they_should():
+    random, gate = np.random.default_rng(3), Gate(LocalizationOptions(gate_probability=0.99))
+    spread = np.sqrt(NOISE[0, 0] + ESTIMATE.covariance[0, 0])
+    passed = [judged(gate, *random.normal(0, spread, 2)).taken for _ in range(4000)]
+    assert np.mean(passed) == pytest.approx(0.99, abs=0.005)
+
+
+def test_fixes_that_are_off_by_metres_each_another_way_are_never_believed():
+    random, gate = np.random.default_rng(4), Gate(OPTIONS)
+    for _ in range(500):
+        verdict = judged(gate, *random.normal(0, 3, 2))
+        assert not verdict.taken or (abs(gate.ratio) <= 1 and not verdict.believed)
+
+
+def test_as_many_as_agree_are_believed_and_that_is_said():
+    random, gate = np.random.default_rng(5), Gate(OPTIONS)
+    verdicts = [
+        judged(gate, 1.0 + random.normal(0, 0.025), random.normal(0, 0.025))
+        for _ in range(OPTIONS.agreeing_fixes)
+    ]
+    assert [verdict.taken for verdict in verdicts] == [False] * 4 + [True]
+    assert verdicts[-1].believed
+    assert "believed, as 5 in a row agree" in verdicts[-1].said
+    assert "times what may be" in verdicts[0].said
+
+
+def test_a_good_fix_between_makes_the_count_begin_anew():
+    gate = Gate(OPTIONS)
+    for _ in range(10):
+        assert not any(judged(gate, 1.0).taken for _ in range(OPTIONS.agreeing_fixes - 1))
+        assert judged(gate, 0.0).taken
+
+
+def test_an_estimate_that_is_told_anew_has_the_fix_and_its_noise():
+    after = told_anew(ESTIMATE, fix(1.0, 2.0), np.array([1.0, 2.0]))
+    np.testing.assert_allclose(after.mean[:2] - ESTIMATE.mean[:2], [1.0, 2.0])
+    np.testing.assert_allclose(after.covariance[:2, :2], NOISE)
+    np.testing.assert_allclose(after.covariance[2:, 2:], ESTIMATE.covariance[2:, 2:])
