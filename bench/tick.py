@@ -64,14 +64,16 @@ class WithMatrices(ControlLaw):
 
     solve: Callable[[Array, Array, Array, Array], Array] = as_the_paper
 
-    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
+    def closed_form(
+        self, prepared: Any, motion: Motion, friction: Any = 0.0
+    ) -> tuple[Any, Any, Any]:
         """See `ControlLaw.generic`."""
         climber, state, heading = self.climber, State.moving(motion), motion.heading
         demand = self.constraints.desired_acceleration(prepared, motion)
         direction = np.tanh(demand.speed / self.options.friction_speed)
         Q = climber.applied_force(heading, direction)
         Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
-        return float(along(heading, Qc)), float(Qc[2])
+        return float(along(heading, Qc)), float(Qc[2]), demand.forward
 
 
 def motions_on_the_way(number: int) -> list[Motion]:

@@ -14,11 +14,13 @@ class ByInverseDynamics(ControlLaw):
         """What gives v̇ and θ̈ without friction: forward [N], to the left [N], about z [N m]."""
         raise NotImplementedError
 
-    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
+    def closed_form(
+        self, prepared: Any, motion: Motion, friction: Any = 0.0
+    ) -> tuple[Any, Any, Any]:
         """See `ControlLaw`."""
         v_1, theta_2, speed = self.constraints.desired_acceleration(prepared, motion)
         drive, _, turn = self.needed(v_1, theta_2, motion)
         rubbing = (self.climber.seal_friction + friction) * tanh(
             speed / self.options.friction_speed
         )
-        return drive + rubbing, turn
+        return drive + rubbing, turn, v_1

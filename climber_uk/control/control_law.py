@@ -32,7 +32,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
-Solve = Callable[[Any, Motion, Any], tuple[Any, Any]]  # force and moment
+Solve = Callable[[Any, Motion, Any], tuple[Any, Any, Any]]  # force, moment, v̇
 
 
 @parameters(slots=True)
@@ -79,6 +79,8 @@ class Command(NamedTuple):
     demanded: Wrench
     lateral: Any  # [N] reaction of the wheels
     lost: Wrench  # drive and moment that limits took away; of many, `NOTHING` if none of any
+    motion: Motion  # for which it is computed
+    forward: Any  # acceleration [m/s²] along it that was asked for
 
     @property
     def torques(self) -> Array:
@@ -146,25 +148,28 @@ class ControlLaw:
         drive, yaw_moment = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
             predicted = predict(climber, motion, drive + r_F, yaw_moment + r_N, ahead, friction)
-            force, moment = solve(prepared, predicted, friction)
+            force, moment, v_1 = solve(prepared, predicted, friction)
             force, moment = force - r_F, moment - r_N
             drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
         lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
         lateral = climber.lateral_reaction(predicted)
-        return Command(Torques(tau_r, tau_l), Wrench(force, moment), lateral, lost)
+        demanded = Wrench(force, moment)
+        return Command(Torques(tau_r, tau_l), demanded, lateral, lost, predicted, v_1)
 
-    def closed_form(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
+    def closed_form(
+        self, prepared: Any, motion: Motion, friction: Any = 0.0
+    ) -> tuple[Any, Any, Any]:
         """Qc = M Aᵀ b - Q (docs/theory.md, §4.2) in the climber's frame.
 
-        Forward [N] and about z [N m]; floats, or arrays (N,) of many climbers. `friction` [N] is
-        that beyond the climber's.
+        Forward [N] and about z [N m], and v̇ [m/s²]; floats, or arrays (N,) of many climbers.
+        `friction` [N] is that beyond the climber's.
         """
         v_1, yaw_acceleration, speed = self.constraints.desired_acceleration(prepared, motion)
         mass, inertia, modelled, weight = self.climber.inertial
         rubbing = (modelled + friction) * tanh(speed / self.options.friction_speed)
-        return mass * v_1 + rubbing + weight * motion.sine, inertia * yaw_acceleration
+        return mass * v_1 + rubbing + weight * motion.sine, inertia * yaw_acceleration, v_1
 
-    def generic(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any]:
+    def generic(self, prepared: Any, motion: Motion, friction: Any = 0.0) -> tuple[Any, Any, Any]:
         """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
 
         Rows that constraints give themselves need no closed form.
@@ -178,15 +183,19 @@ class ControlLaw:
         direction = tanh(speed / self.options.friction_speed)
         Q = self.climber.applied_force(heading, direction)
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
-        return along(heading, Qc) + friction * direction, unpack(Qc)[2]
+        v_1 = along(heading, Q + Qc) / self.climber.mass
+        return along(heading, Qc) + friction * direction, unpack(Qc)[2], v_1
 
     def of_forces(
         self, target: ReferencePoint, motion: Motion, friction: Any = 0.0
-    ) -> tuple[Any, Any]:
-        """Force and moment of another law, which knows the climber's friction only."""
+    ) -> tuple[Any, Any, Any]:
+        """Force and moment of another law, which knows the climber's friction only, and v̇."""
         assert self.other is not None
         force, moment = self.other.wrench(self.climber, target, motion)
-        return force + friction * tanh(target.speed / self.options.friction_speed), moment
+        mass, _, rubbing, weight = self.climber.inertial
+        direction = tanh(target.speed / self.options.friction_speed)
+        v_1 = (force - rubbing * direction - weight * motion.sine) / mass
+        return force + friction * direction, moment, v_1
 
     def braking(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
