@@ -74,7 +74,8 @@ class WithMatrices(ControlLaw):
         direction = np.tanh(demand.speed / self.options.friction_speed)
         Q = climber.applied_force(heading, direction)
         Qc = self.solve(climber.mass_matrix, Q, *rows(state, demand))
-        return float(along(heading, Qc)), float(Qc[2]), demand.yaw_rate
+        wanted = demand.forward, demand.yaw_rate
+        return float(along(heading, Qc)), float(Qc[2]), *wanted
 
 
 def motions_on_the_way(number: int) -> list[Motion]:

@@ -43,8 +43,10 @@ CONTENTS = {
     topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
     topics.REFERENCE_PATH: "the whole path, for display",
-    topics.TORQUES: "`effort` [N m] by joint name; the stamp is that of the odometry it answers",
+    topics.TORQUES: "`effort` [N m] and `velocity` [rad/s] by joint name, of which motors "
+    "take one; the stamp is that of the odometry it answers",
     "effort_controller/commands": "the torques again, in the order of `effort_order`",
+    "cmd_vel": "the speeds again, of the climber, if `publish_cmd_vel`: forward, about z",
     topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
     topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels",
     topics.TRUTH: "the simulated climber without its sensors' errors",

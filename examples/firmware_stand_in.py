@@ -2,7 +2,8 @@
 
 It opens a pseudo-terminal, prints where, and speaks there the protocol of docs/hardware.md. It has
 the parameters of plant_simulator (no errors of sensors but rounding), and those of `Board`. With
-`simulated_time` a control period passes with each command, and /clock tells the board's time.
+`simulated_time` a control period passes with each command, and /clock tells the board's time. With
+`motors: velocity` it takes speeds.
 """
 
 import math
@@ -68,8 +69,10 @@ class FirmwareStandIn(ClimberNode):
         self.torque = self.board.motor_constant * self.board.gear_ratio  # [N m] at a wheel for 1 A
         self.period = round(self.options.control_period * SECOND)
         self.time, self.commanded_at = SECOND, 0  # [ns] since the board was switched on
-        self.commanded = np.zeros(2)  # [A]
+        self.commanded = np.zeros(2)  # [mA], or [counts/s] if it takes speeds
         self.flags, self.refused, self.rest = CUT, 0, b""
+        self.takes_speeds = parts.motors.take_speeds
+        self.count = 2 * math.pi / self.board.encoder_counts  # [rad]
         self.clock = self.publisher(Clock, "/clock") if self.options.simulated_time else None
         self.is_due = Throttle(TICK)
         self.port, self.line = pty.openpty()  # our end, and the one for the driver
@@ -114,30 +117,30 @@ class FirmwareStandIn(ClimberNode):
         before = self.refused
         for line in lines:
             try:
-                left, right = unpacked(line, "C")
+                left, right = unpacked(line, "V" if self.takes_speeds else "C")
             except ValueError:
                 self.refused += 1
                 continue
-            self.commanded, self.commanded_at = 1e-3 * np.array([left, right]), self.time
+            self.commanded, self.commanded_at = np.array([left, right]), self.time
         return len(lines) > self.refused - before
 
     def step(self) -> None:
         """Let a control period pass."""
         cut = self.time - self.commanded_at > self.board.watchdog_time * SECOND
         self.commanded = np.zeros(2) if cut else self.commanded
-        most = self.board.max_current
-        currents = np.clip(self.commanded, -most, most)
-        limited = bool((currents != self.commanded).any())
+        most = math.inf if self.takes_speeds else 1e3 * self.board.max_current
+        within = np.clip(self.commanded, -most, most)
+        limited = bool((within != self.commanded).any())
         self.flags = CUT * cut | LIMITED * limited
-        torques = (self.torque * SIGNS * currents)[::-1]
+        unit = self.count if self.takes_speeds else 1e-3 * self.torque
+        command = (unit * SIGNS * within)[::-1]
         for _ in range(self.options.steps):
-            self.robot.advance(torques)
+            self.robot.advance(command)
         self.time += self.period
 
     def tell(self) -> None:
         """Send a frame, and write down the truth; what the driver does not read is lost."""
-        count = 2 * math.pi / self.board.encoder_counts
-        counts = np.floor(SIGNS * self.robot.angles[::-1] / count).astype(int)
+        counts = np.floor(SIGNS * self.robot.angles[::-1] / self.count).astype(int)
         currents = np.round(1e3 * SIGNS * self.robot.torques[::-1] / self.torque).astype(int)
         now = self.time // 1000 % 2**32
         numbers = (now, *counts, *currents, self.flags, self.refused)

@@ -1,8 +1,9 @@
 """A driver for an imaginary motor board, to be copied and adapted, one part after the other.
 
 Part 1 speaks the board's protocol, part 2 makes odometry of its encoders, part 3 is the node: from
-torque to current, and what is to happen when something goes wrong. It needs rclpy and messages,
-nothing else. docs/hardware.md tells what every driver has to do, and this board's protocol.
+torque to current, or from rate to counts, and what is to happen when something goes wrong. It needs
+rclpy and messages, nothing else. docs/hardware.md tells what every driver has to do, and this
+board's protocol.
 """
 
 import binascii
@@ -38,6 +39,7 @@ PARAMETERS: dict[str, tuple[Any, tuple[float, float] | None, str]] = {  # defaul
     "encoder_counts": (4096, (4, 1e8), "counts in a turn of a wheel"),
     "motor_constant": (0.025, (1e-4, 10.0), "torque of a motor for a current [N m/A]"),
     "gear_ratio": (50.0, (1e-2, 1e4), "turns of a motor in a turn of its wheel"),
+    "motors": ("torque", None, "what the board takes, torque or velocity"),
     "max_current": (3.2, (1e-3, 1e3), "limit of each motor's current [A]"),
     "command_timeout": (0.1, (1e-3, 10.0), "age at which a torque is stale [s]"),
     "initial_x": (0.0, (-1e4, 1e4), "x at the start [m]"),
@@ -116,16 +118,15 @@ class Transport:
                 currents = forward(1e-3 * left_mA, 1e-3 * right_mA)
                 yield Frame(time, forward(left, right), currents, flags, refused)
 
-    def command(self, left: float, right: float) -> None:
-        """Send currents [A]."""
-        milliamperes = [round(1e3 * current) for current in forward(left, right)]
+    def command(self, kind: str, left: float, right: float) -> None:
+        """Send currents [mA], of kind C, or speeds [counts/s], of kind V."""
+        numbers = map(round, forward(left, right))
         with suppress(OSError):  # full or dead: the board's watchdog acts, and `frames` ends
-            os.write(self.port, packed("C {} {}".format(*milliamperes)))
+            os.write(self.port, packed("{} {} {}".format(kind, *numbers)))
 
     def stop(self) -> None:
-        """Send zero currents, and have `frames` end."""
+        """Have `frames` end, and wait until all is sent."""
         self.stopped = True
-        self.command(0.0, 0.0)
         with suppress(termios.error):  # it may be dead
             termios.tcdrain(self.port)
 
@@ -231,11 +232,14 @@ class Driver(Node):
         self.end, self.failure = end, ""
         value = {name: self.value(name, *rule) for name, rule in PARAMETERS.items()}
         self.radius, self.timeout = value["wheel_radius"], value["command_timeout"]
-        count = 2 * math.pi * self.radius / value["encoder_counts"]  # [m] that a wheel rolls in it
+        angle = 2 * math.pi / value["encoder_counts"]  # [rad] of a count
+        if value["motors"] not in ("torque", "velocity"):
+            raise ValueError(f"motors={value['motors']!r} must be torque or velocity")
+        self.takes_speeds, self.counts = value["motors"] == "velocity", 1 / angle
         self.torque = value["motor_constant"] * value["gear_ratio"]  # [N m] at a wheel for 1 A
         self.max_current = value["max_current"]
         start = value["initial_x"], value["initial_y"], value["initial_heading"]
-        self.reckoning = DeadReckoning(count, value["half_track"], start)
+        self.reckoning = DeadReckoning(self.radius * angle, value["half_track"], start)
         self.board_clock = BoardClock(self.get_parameter("use_sim_time").value)
         prefix = f"{self.get_namespace()}/".lstrip("/") if value["prefix_frames"] else ""
         self.odom_frame, self.base_frame = prefix + "odom", prefix + "base_link"
@@ -243,6 +247,7 @@ class Driver(Node):
         self.looked_at = 0  # [ns] of the last odometry by the last look
         self.acting = False  # whether that torque is sent, and not yet too old
         self.refused = 0  # lines that the board could not read
+        self.instead = "zero speed instead" if self.takes_speeds else "zero torque instead"
         self.troubles: dict[str, str] = {}
 
         self.odometry = self.create_publisher(Odometry, "odom", 10)
@@ -290,7 +295,7 @@ class Driver(Node):
         now = self.get_clock().now().nanoseconds
         self.stamp = stamp = self.board_clock.stamp(frame.time, now)
         if self.acting and stamp - self.answered > self.timeout * SECOND:
-            self.say("wheel_torques", f"none for {self.timeout:g} s; zero torque instead")
+            self.say("wheel_torques", f"none for {self.timeout:g} s; {self.instead}")
             self.let_go()  # when this driver has stopped, too, the board does it
         odometry, joints = Odometry(), JointState(name=[LEFT, RIGHT])
         time = Time(sec=stamp // SECOND, nanosec=stamp % SECOND)
@@ -306,22 +311,33 @@ class Driver(Node):
     # To the board
 
     def on_torques(self, message: JointState) -> None:
-        """Send the currents for torques, or zero if they are not fit to be applied."""
+        """Send what the board takes of a command, or zero if that is not fit to be applied."""
         stamp = message.header.stamp.sec * SECOND + message.header.stamp.nanosec
         fault = self.fault(message, stamp)
-        self.say("wheel_torques", fault and f"{fault}; zero torque instead")
+        self.say("wheel_torques", fault and f"{fault}; {self.instead}")
         if fault:
             self.let_go()
         elif stamp != self.answered:  # else it was sent twice
             self.answered, self.acting = stamp, True
-            torques = dict(zip(message.name, message.effort, strict=True))
-            self.transport.command(self.current(torques[LEFT]), self.current(torques[RIGHT]))
+            told = dict(zip(message.name, self.obeyed(message), strict=True))
+            self.send(told[LEFT], told[RIGHT])
+
+    def obeyed(self, message: JointState) -> Any:
+        """Torques [N m], or rates [rad/s] for a board that takes speeds."""
+        return message.velocity if self.takes_speeds else message.effort
+
+    def send(self, left: float, right: float) -> None:
+        """Send currents for torques [N m], or speeds for rates [rad/s]."""
+        if self.takes_speeds:
+            self.transport.command("V", self.counts * left, self.counts * right)
+        else:
+            self.transport.command("C", 1e3 * self.current(left), 1e3 * self.current(right))
 
     def fault(self, message: JointState, stamp: int) -> str:
-        """What is wrong with torques; '' if nothing is."""
-        if sorted(message.name) != [LEFT, RIGHT] or len(message.effort) != 2:
+        """What is wrong with a command; '' if nothing is."""
+        if sorted(message.name) != [LEFT, RIGHT] or len(self.obeyed(message)) != 2:
             return "not one for each wheel"
-        if not all(map(math.isfinite, message.effort)):
+        if not all(map(math.isfinite, self.obeyed(message))):
             return "not finite"
         return "stale" if abs(self.stamp - stamp) > self.timeout * SECOND else ""
 
@@ -330,9 +346,9 @@ class Driver(Node):
         return max(-self.max_current, min(torque / self.torque, self.max_current))
 
     def let_go(self) -> None:
-        """Send zero currents."""
+        """Send zero currents, or zero speeds."""
         self.acting = False
-        self.transport.command(0.0, 0.0)
+        self.send(0.0, 0.0)
 
     def look(self) -> None:
         """Log that there are no frames, and how many lines have not arrived as they were sent."""
@@ -344,6 +360,7 @@ class Driver(Node):
 
     def stop(self) -> None:
         """Stop the wheels, and the thread."""
+        self.let_go()
         self.transport.stop()
         self.listener.join()
 

@@ -23,4 +23,4 @@ class ByInverseDynamics(ControlLaw):
         rubbing = (self.climber.seal_friction + friction) * tanh(
             speed / self.options.friction_speed
         )
-        return drive + rubbing, turn, yaw_rate
+        return drive + rubbing, turn, v_1, yaw_rate

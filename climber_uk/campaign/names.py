@@ -42,7 +42,14 @@ PARAMETERS = {
 # Parameters of the nodes that have no effect in lock-step: names, topics, rates of publishing
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
-    *("stop_time", "effort_commands", "effort_order", "odom_frame", "base_frame"),
+    *(
+        "stop_time",
+        "effort_commands",
+        "effort_order",
+        "publish_cmd_vel",
+        "odom_frame",
+        "base_frame",
+    ),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames", "qos_overrides"),
 }
 # Parameters that may differ from run to run
@@ -62,6 +69,7 @@ REQUIRED = {
     f"{CONTROLLER}.least_pressure": 0.0,
     f"{CONTROLLER}.adhesion": "suction",
     f"{CONTROLLER}.controller": UDWADIA_KALABA,
+    f"{CONTROLLER}.motors": "torque",
     f"{CONTROLLER}.observer.velocity_source": "odometry",
     f"{PLANT}.friction": "coulomb",
     f"{PLANT}.adhesion": "suction",
@@ -71,6 +79,7 @@ REQUIRED = {
     f"{PLANT}.slip": False,
     f"{PLANT}.seal_radius": 0.0,
     f"{PLANT}.suction.pump_time": 0.0,
+    f"{PLANT}.motors": "torque",
     f"{PLANT}.torque_lag": 0.0,
     f"{PLANT}.torque_resolution": 0.0,
     f"{PLANT}.odometry_source": "truth",

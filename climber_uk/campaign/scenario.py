@@ -65,7 +65,7 @@ class Scenario:
         values = {**self.values, **own}
         plant = Node(PLANT, values)
         climber, number = plant.read(Climber), len(own[SEED])
-        law, observer, timing, _ = settings(Node(CONTROLLER, values), pressure=None)
+        law, observer, timing, *_ = settings(Node(CONTROLLER, values), pressure=None)
         return Loops(
             start=_start(plant.read(SimulationOptions), number),
             climber=climber,

@@ -37,10 +37,18 @@ class Link:
     sensors: Sensors = field(default_factory=Sensors)  # their noise is of the run's seed
     with_twist: bool = True
     torque_lag: float = 0.0  # [s] of the motors, of first order
+    servo: Motors | None = None  # that takes speeds; None: motors that take torques
 
     def parts(self, plant: Plant) -> Parts:
         """The plant with such motors, and sensors without the errors that `measured` adds."""
-        return Parts(plant, Motors(torque_lag=self.torque_lag), self.sensors.ideal, Physics())
+        motors = self.servo or Motors(torque_lag=self.torque_lag)
+        return Parts(plant, motors, self.sensors.ideal, Physics())
+
+    def command(self, answer: Answer, climber: Climber) -> Array:
+        """What the motors take of an answer (2,): torques [N m], or the wheels' rates [rad/s]."""
+        if self.servo is None:
+            return answer.torques
+        return np.array(climber.rim_rates(answer.speeds))
 
 
 class Controlling(Protocol):
@@ -124,8 +132,9 @@ def simulate(
             _, stamp, odometry = arriving.popleft()
             answer = controlling.on_odometry(now, stamp, odometry)
             if answer is not None:
-                acting = answer.torques if acting is None and start.velocity.any() else acting
-                commanded.append((step + late, answer.torques))
+                command = link.command(answer, current)
+                acting = command if acting is None and start.velocity.any() else acting
+                commanded.append((step + late, command))
         while commanded and commanded[0][0] <= step:
             _, acting = commanded.popleft()
         before, current = current, climber_at(step * link.step)

@@ -11,6 +11,7 @@ from climber_uk.control.guard import GuardOptions
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
+from climber_uk.control.speed_command import MotorBoard
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import Timing
 from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
@@ -42,7 +43,8 @@ class ControllerChoice:
 
 
 KINDS: list[tuple[type, str]] = [
-    *((kind, "") for kind in (ControllerChoice, Climber, ControlOptions, Timing, Safety, Approach)),
+    *((kind, "") for kind in (ControllerChoice, Climber, ControlOptions, MotorBoard)),
+    *((kind, "") for kind in (Timing, Safety, Approach)),
     *((kind, f"{name}.") for name, kind in [*CONSTRAINTS.items(), *FORCE_LAWS.items()]),
     (Observer, "observer."),
     (Pacing, "pacing."),
@@ -67,7 +69,8 @@ def settings(parameters: ParameterSource, pressure: float | None) -> Settings:
     other = choice.controller
     force_law = read(FORCE_LAWS[other], f"{other}.") if other != UDWADIA_KALABA else None
     law = ControlLaw(climber, constraints, options, force_law)
-    return Settings(law, read(Observer, "observer."), read(Timing), read(Pacing, "pacing."))
+    observer, pacing = read(Observer, "observer."), read(Pacing, "pacing.")
+    return Settings(law, observer, read(Timing), pacing, read(MotorBoard))
 
 
 def build_controller(parameters: ParameterSource, pressure: float | None) -> Controller:

@@ -35,7 +35,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
 TURN_SPEED = 0.05  # [rad/s] of a wanted yaw rate below which what resists turning fades
-Solve = Callable[..., tuple[Any, Any, Any]]  # force, moment, yaw rate wanted
+Solve = Callable[..., tuple[Any, Any, Any, Any]]  # force, moment, v̇, yaw rate wanted
 
 
 @parameters(slots=True)
@@ -85,6 +85,8 @@ class Command(NamedTuple):
     demanded: Wrench
     lateral: Any  # [N] reaction of the wheels
     lost: Wrench  # drive and moment that limits took away; of many, `NOTHING` if none of any
+    motion: Motion  # for which it is computed
+    forward: Any  # acceleration [m/s²] along it that was asked for
     yaw_rate: Any = 0.0  # wanted [rad/s]
 
     @property
@@ -155,12 +157,13 @@ class ControlLaw:
         for _ in range(2 if ahead else 1):
             force, moment = drive + r_F, yaw_moment + r_N
             predicted = predict(climber, motion, force, moment, ahead, friction, turning, aside)
-            force, moment, yaw_rate = solve(prepared, predicted, friction, turning, course)
+            force, moment, v_1, yaw_rate = solve(prepared, predicted, friction, turning, course)
             force, moment = force - r_F, moment - r_N
             drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
         lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
         lateral = climber.lateral_reaction(predicted)
-        return Command(Torques(tau_r, tau_l), Wrench(force, moment), lateral, lost, yaw_rate)
+        demanded, wheels = Wrench(force, moment), Torques(tau_r, tau_l)
+        return Command(wheels, demanded, lateral, lost, predicted, v_1, yaw_rate)
 
     def closed_form(
         self,
@@ -169,20 +172,20 @@ class ControlLaw:
         friction: Any = 0.0,
         turning: Any = 0.0,
         course: Course | None = None,
-    ) -> tuple[Any, Any, Any]:
+    ) -> tuple[Any, Any, Any, Any]:
         """Qc = M Aᵀ b - Q (docs/theory.md, §4.2) in the climber's frame.
 
-        Forward [N] and about z [N m], and the yaw rate wanted [rad/s]; floats, or arrays (N,) of
-        many climbers. `friction` [N] is that beyond the climber's, and `turning` [N m] resists.
+        Forward [N] and about z [N m]; and what is wanted: v̇ [m/s²] and the yaw rate [rad/s].
+        Floats, or arrays (N,) of many climbers. `friction` [N] is that beyond the climber's, and
+        `turning` [N m] resists.
         """
         v_1, yaw_acceleration, speed, yaw_rate = self._desired(prepared, motion, course)
-        if course is not None:
-            v_1 = v_1 - motion.yaw_rate * motion.speed * course.slope
+        sideways = 0.0 if course is None else motion.yaw_rate * motion.speed * course.slope
         mass, inertia, modelled, weight = self.climber.inertial
         rubbing = (modelled + friction) * tanh(speed / self.options.friction_speed)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
-        force = mass * v_1 + rubbing + weight * motion.sine
-        return force, inertia * yaw_acceleration + scrubbing, yaw_rate
+        force = mass * (v_1 - sideways) + rubbing + weight * motion.sine
+        return force, inertia * yaw_acceleration + scrubbing, v_1, yaw_rate
 
     def _desired(self, prepared: Any, motion: Motion, course: Course | None) -> DesiredAcceleration:
         """What constraints ask of a climber on its `course`, which they take for its heading.
@@ -205,7 +208,7 @@ class ControlLaw:
         friction: Any = 0.0,
         turning: Any = 0.0,
         course: Course | None = None,
-    ) -> tuple[Any, Any, Any]:
+    ) -> tuple[Any, Any, Any, Any]:
         """The same by its definition (8): Qc of M, Q and the rows A q̈ = b, split along the climber.
 
         Rows that constraints give themselves need no closed form; they know of no side slip.
@@ -223,15 +226,20 @@ class ControlLaw:
         Q = self.climber.applied_force(heading, direction)
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
-        return along(heading, Qc) + friction * direction, unpack(Qc)[2] + scrubbing, yaw_rate
+        v_1 = along(heading, Q + Qc) / self.climber.mass + ratio * motion.speed * motion.yaw_rate
+        force, moment = along(heading, Qc) + friction * direction, unpack(Qc)[2] + scrubbing
+        return force, moment, v_1, yaw_rate
 
     def of_forces(
-        self, target: ReferencePoint, motion: Motion, friction: Any = 0.0, *_: Any
-    ) -> tuple[Any, Any, Any]:
-        """Force and moment of another law, which knows the climber's friction only."""
+        self, target: ReferencePoint, motion: Motion, friction: Any = 0.0, *_unknown: Any
+    ) -> tuple[Any, Any, Any, Any]:
+        """Force and moment of another law, which knows the climber's friction only, and v̇."""
         assert self.other is not None
         force, moment = self.other.wrench(self.climber, target, motion)
-        return force + friction * tanh(target.speed / self.options.friction_speed), moment, 0.0
+        mass, _, rubbing, weight = self.climber.inertial
+        direction = tanh(target.speed / self.options.friction_speed)
+        v_1 = (force - rubbing * direction - weight * motion.sine) / mass
+        return force + friction * direction, moment, v_1, 0.0
 
     def braking(self, situation: ControlInput, braking_rate: float) -> Torques:
         """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""

@@ -24,13 +24,14 @@ from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safe_output import SafeOutput
 from climber_uk.control.safety import Calm, Mode, Safety, Trouble
+from climber_uk.control.speed_command import STANDING, MotorBoard
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import LONGEST_STEP, Ages, Timing
 from climber_uk.control.twist import OPPOSED_IF_TOO_FAST, TwistCheck
 from climber_uk.mechanics import SECOND, Array, pack
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import Motion, Torques
+from climber_uk.mechanics.quantities import Motion, Speeds, Torques
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
 CLOCK_STEP = round(0.2 * SECOND)  # [ns] back, from which time has started anew
@@ -40,11 +41,12 @@ FOLLOWING, APPROACHING, WAITING = Mode.FOLLOWING, Mode.APPROACHING, Mode.WAITING
 
 
 class Answer(NamedTuple):
-    """Torques for the odometry of `stamp`."""
+    """Torques for the odometry of `stamp`, and speeds for motors that take these."""
 
     stamp: int  # [ns]
     wheels: Torques
     command: Command | None  # what they came from; None: safe output
+    speeds: Speeds = STANDING
 
     @property
     def torques(self) -> Array:
@@ -59,6 +61,7 @@ class Settings(NamedTuple):
     observer: Observer = Observer()
     timing: Timing = Timing()
     pacing: Pacing = Pacing()
+    board: MotorBoard = MotorBoard()
 
 
 class Controller:
@@ -80,7 +83,7 @@ class Controller:
     ) -> None:
         """`adhesion` is for the guard; `gentle` are the constraints of what begins at rest."""
         self.safety = safety or Safety()
-        self._law, observer, timing, pacing = settings
+        self._law, observer, timing, pacing, self.board = settings
         self.estimator = Estimator(self._law.climber, observer, timing, self.safety)
         self.active = ActiveReference(pacing, approach or Approach(), gentle or Guidance())
         self.guard = Guard(guard or GuardOptions(), adhesion or Suction())
@@ -137,7 +140,8 @@ class Controller:
         """Go over to other settings: the constraints' gains gradually, so that no torque jumps."""
         if settings.law.constraints != self.law.constraints:
             self._retuned = self.estimator.stamp, self.constraints
-        self.law, self.estimator.observer, self.estimator.timing, self.active.pacing = settings
+        self.law, self.estimator.observer, self.estimator.timing, pacing, self.board = settings
+        self.active.pacing = pacing
 
     # What comes in
 
@@ -300,9 +304,11 @@ class Controller:
             self.active.pause(self._stamp)
             law, estimator = self._law, self.estimator
             torques = self._safe_output.send(mode, self._stamp, age, estimator, law)
+            speeds = STANDING
         else:
             torques = command.wheels
-        self.answer = Answer(self._stamp, torques, command)
+            speeds = self.board.speeds(self._law.climber, command, self.estimator.disturbance)
+        self.answer = Answer(self._stamp, torques, command, speeds)
         return self.answer
 
     def _find_mode(self, now: int) -> Trouble:
@@ -362,6 +368,8 @@ class Controller:
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
         active.go_on(target)
+        if not self.board.teaches(law.climber, point):
+            estimator.forget()
         wheels, fits, speeds = command.wheels, command.fits, (point.speed, command.yaw_rate)
         estimator.sent(ahead.begins, wheels, fits, *speeds)
         return target.mode, target.detail, command

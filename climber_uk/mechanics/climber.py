@@ -13,7 +13,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array, pack, unpack
 from climber_uk.mechanics.elementary import clipped, cos, everywhere, select, sin
-from climber_uk.mechanics.quantities import Bounds, Motion, State, Torques
+from climber_uk.mechanics.quantities import Bounds, Motion, Speeds, State, Torques
 from climber_uk.parameters.declaration import parameter, parameters
 
 GRAVITY = 9.81  # [m/s²]
@@ -134,7 +134,7 @@ class Climber:
         from_force, from_moment = half * force, half * moment / self.half_track
         return Torques(from_force + from_moment, from_force - from_moment)
 
-    def rim_rates(self, motion: Motion) -> tuple[Any, Any]:
+    def rim_rates(self, motion: Motion | Speeds) -> tuple[Any, Any]:
         """Turning rates (v ± d ω) / r of the wheels, right and left [rad/s]."""
         v, differential = motion.speed, self.half_track * motion.yaw_rate
         return (v + differential) / self.wheel_radius, (v - differential) / self.wheel_radius

@@ -65,6 +65,13 @@ class ReferencePoint(NamedTuple):
         return self.v_x * cos(self.heading) + self.v_y * sin(self.heading)
 
 
+class Speeds(NamedTuple):
+    """Speed and yaw rate of a climber, as of a `Motion`."""
+
+    speed: Any  # forward [m/s]
+    yaw_rate: Any  # [rad/s]
+
+
 class Wrench(NamedTuple):
     """Force and moment on a climber, in its body's frame."""
 

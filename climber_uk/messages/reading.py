@@ -63,16 +63,16 @@ class OdometryFields(NamedTuple):
 
 
 class JointFields(NamedTuple):
-    """What is read of a JointState."""
+    """What is read of a JointState: its efforts, or its velocities."""
 
     sec: int
     nanosec: int
-    efforts: Sequence[float]  # [N m]
+    values: Sequence[float]  # [N m], or [rad/s]
     names: Sequence[str]  # of their joints
 
     @classmethod
     def of(cls, message: "JointState") -> "JointFields":
-        """Those of a message."""
+        """Those of a message, with its efforts."""
         return cls(*_joint_state(message))
 
     @property
@@ -92,6 +92,7 @@ ODOMETRY = (
     ("header.frame_id", "child_frame_id"),
 )
 JOINT_STATE = (*STAMP, "effort"), ("name",)
+JOINT_RATES = (*STAMP, "velocity"), ("name",)
 _odometry, _joint_state = (attrgetter(*sum(paths, ())) for paths in (ODOMETRY, JOINT_STATE))
 
 
@@ -123,16 +124,18 @@ def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motio
     return Motion(x, y, heading, math.cos(heading), math.sin(heading), v_x, yaw_rate)
 
 
-def wheel_torques(fields: JointFields, left_joint: str, right_joint: str) -> Torques:
-    """Torques [N m]."""
-    names, efforts = list(fields.names), list(fields.efforts)
+def wheel_torques(
+    fields: JointFields, left_joint: str, right_joint: str, what: str = "efforts"
+) -> Torques:
+    """Torques [N m], or rates [rad/s]: `what` the fields' values are."""
+    names, values = list(fields.names), list(fields.values)
     if names not in ([left_joint, right_joint], [right_joint, left_joint]):
         raise ValueError(f"names {names} must be {left_joint!r} and {right_joint!r}")
-    if len(efforts) != 2:
-        raise ValueError(f"{len(efforts)} efforts must be 2")
-    left, right = efforts if names[0] == left_joint else reversed(efforts)
+    if len(values) != 2:
+        raise ValueError(f"{len(values)} {what} must be 2")
+    left, right = values if names[0] == left_joint else reversed(values)
     if not (math.isfinite(left) and math.isfinite(right)):
-        raise ValueError(f"efforts {efforts} must be finite")
+        raise ValueError(f"{what} {values} must be finite")
     return Torques(right, left)
 
 

@@ -47,8 +47,9 @@ ODOMETRY = (
     *("pose.pose.orientation.z", "pose.pose.orientation.w"),
     *("twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z"),
 )
-EFFORT = ("effort",)
+WHEEL_COMMAND = "velocity", "effort"
 JOINT_STATE = "position", "velocity", "effort"
+TWIST = "twist.linear.x", "twist.angular.z"
 VECTOR = "vector.x", "vector.y", "vector.z"
 TIME_REFERENCE = "time_ref.sec", "time_ref.nanosec"
 WRENCH = "wrench.force.x", "wrench.force.y", "wrench.torque.z"

@@ -1,6 +1,7 @@
 """Simulates a climber on its wall, in place of a robot: wheel torques in, odometry out."""
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
@@ -44,7 +45,9 @@ class PlantSimulator(ClimberNode):
         self.place_at_start()
 
         self.topics = PlantTopics(self, self.sensors, self.options.publish_odometry)
-        self.read_torques = NumberReader(JointState, *reading.JOINT_STATE)
+        self.take_speeds = self.robot.parts.motors.take_speeds
+        obeyed = reading.JOINT_RATES if self.take_speeds else reading.JOINT_STATE
+        self.read_torques = NumberReader(JointState, *obeyed)
         self.subscription(JointState, TORQUES, self.on_torques, raw=True)
         self.subscription(WrenchStamped, PUSH, self.on_push)
         self.create_service(Trigger, "~/reset", self.on_reset)
@@ -125,16 +128,18 @@ class PlantSimulator(ClimberNode):
         self.pushes.add(begin, Push(*wrench))
 
     def on_torques(self, serialized: bytes) -> None:
-        """Let torques act from now on; in lock-step only if they answer the last odometry."""
+        """Let a command act from now on; in lock-step only if it answers the last odometry."""
         names, stamp, told = self.names, None, NO_TORQUES
         try:
             fields = reading.JointFields(*self.read_torques(serialized))
             stamp = fields.stamp
-            told = reading.wheel_torques(fields, names.left_wheel_joint, names.right_wheel_joint)
+            wheels = names.left_wheel_joint, names.right_wheel_joint
+            what = "velocities" if self.take_speeds else "efforts"
+            told = reading.wheel_torques(fields, *wheels, what)
             self.report(TORQUES, "")
         except ValueError as error:
-            self.report(TORQUES, "refused, zero torque instead", str(error))
-        limit = self.robot.plant.climber.max_wheel_torque
+            self.report(TORQUES, f"refused, {self.instead} instead", str(error))
+        limit = inf if self.take_speeds else self.robot.plant.climber.max_wheel_torque
         torques = np.array([min(max(torque, -limit), limit) for torque in told])
         self.waits = self.waits and not any(told)
         if not self.options.simulated_time:
@@ -146,11 +151,16 @@ class PlantSimulator(ClimberNode):
             self.time.step_if_due()
 
     def command_at(self, time: int) -> Array:
-        """Torques (2,) [N m] that act at `time` [ns]: the latest, or 0 if these are too old."""
+        """Command (2,) in force at `time` [ns]: the latest, or 0 if it is too old."""
         torques, is_stale = self.commands.at(time)
         if not self.options.simulated_time:
-            self.report("torque command", "stale; zero torque instead" if is_stale else "")
+            self.report("torque command", f"stale; {self.instead} instead" if is_stale else "")
         return np.zeros(2) if torques is None else torques
+
+    @property
+    def instead(self) -> str:
+        """What the wheels get in the place of a bad command."""
+        return "standstill" if self.take_speeds else "zero torque"
 
     # Time
 

@@ -4,7 +4,7 @@ Inactive, it answers with its safe output: a climber on a wall needs torques at 
 """
 
 import numpy as np
-from geometry_msgs.msg import Vector3Stamped, WrenchStamped
+from geometry_msgs.msg import TwistStamped, Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.subscription import Subscription
@@ -55,7 +55,7 @@ LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points, which take a quarter 
 
 @parameters
 class NodeOptions:
-    """Torques for effort controllers of ros2_control."""
+    """The commands once more, for boards that take them in another form."""
 
     effort_commands: bool = parameter(False, "", "publish torques on effort_controller/commands")
     effort_order: str = parameter(
@@ -63,6 +63,9 @@ class NodeOptions:
         "",
         "order of these; wrong: the climber yaws away",
         choices=("left_right", "right_left"),
+    )
+    publish_cmd_vel: bool = parameter(
+        False, "", "publish the speeds on cmd_vel, for boards that take a twist"
     )
 
 
@@ -88,10 +91,13 @@ class UkTorqueController(ManagedNode):
         self.read_odometry = NumberReader(Odometry, *reading.ODOMETRY)
         self.read_reference = PreviewReader()
         joints = [self.names.left_wheel_joint, self.names.right_wheel_joint]
-        torques = JointState(name=joints, effort=[0.0, 0.0])
-        self.torques = Output(self.publisher(JointState, TORQUES), torques, writing.EFFORT)
+        torques = JointState(name=joints, velocity=[0.0, 0.0], effort=[0.0, 0.0])
+        self.torques = Output(self.publisher(JointState, TORQUES), torques, writing.WHEEL_COMMAND)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         zero, base_frame = (0.0, 0.0, 0.0), self.names.base_frame
+        twist = TwistStamped()
+        twist.header.frame_id = base_frame
+        self.twist = Output(self.publisher(TwistStamped, "cmd_vel"), twist, writing.TWIST)
         error = self.publisher(Vector3Stamped, "~/tracking_error")
         self.error = Output(error, writing.vector(zero, 0, base_frame), writing.VECTOR)
         wrench = writing.wrench(zero, 0, base_frame)
@@ -251,9 +257,12 @@ class UkTorqueController(ManagedNode):
             self.positions[controller.mode].publish(stamp, *divmod(position, SECOND))
 
     def publish_torques(self, answer: Answer) -> None:
-        """Publish torques with the stamp of the odometry that they answer."""
+        """Publish torques and speeds with the stamp of the odometry that they answer."""
         right, left = answer.wheels
-        self.torques.publish(answer.stamp, (left, right))
+        right_rate, left_rate = self.controller.law.climber.rim_rates(answer.speeds)
+        self.torques.publish(answer.stamp, (left_rate, right_rate), (left, right))
+        if self.options.publish_cmd_vel:
+            self.twist.publish(answer.stamp, *answer.speeds)
         if self.options.effort_commands:
             ordered = [left, right] if self.options.effort_order == "left_right" else [right, left]
             self.efforts.publish(Float64MultiArray(data=ordered))

@@ -87,6 +87,7 @@ class SimulatedRobot:
         self.push = UNPUSHED
         self.plant = self._at_pressure(parts.plant, self._final_pressure())
         self.rates = self.plant.wheel_rates(start)  # [rad/s] of the wheels: right, left
+        self.rates_before = self.rates  # a step ago
         climber = parts.plant.climber
         self.odometer = Odometer(parts.sensors, climber, period, start, parts.source)
 
@@ -106,15 +107,22 @@ class SimulatedRobot:
         self.plant = self._at_pressure(parts.plant, self.pressure)
 
     def advance(self, commanded: Array, push: Push = UNPUSHED) -> None:
-        """Go on by one step under commanded torques (2,) (right, left) [N m] and a push."""
+        """Go on by one step under a push and a command: torques (2,) (right, left) [N m].
+
+        Of motors that take speeds, the wheels' rates (2,) [rad/s].
+        """
         step, motors = self.parts.plant.step, self.parts.motors
         plant = self._at_pressure(self.plant, self._next_pressure(step))
         wheels = plant.as_wheels_tell(self.state)
-        torques = motors.torques(plant.climber, wheels, self.torques, commanded, step)
+        if motors.take_speeds:
+            last = self.torques, self.rates_before
+            torques = motors.servo(plant.climber, wheels, last, commanded, step)
+        else:
+            torques = motors.torques(plant.climber, wheels, self.torques, commanded, step)
         state = plant.advance(self.state, torques, 1, push.on(self.state))
         rates = plant.wheel_rates(state)
         turned = (self.rates + rates) * step / 2
-        self.angles, self.rates = self.angles + turned, rates
+        self.angles, self.rates_before, self.rates = self.angles + turned, self.rates, rates
         if self.parts.physics.creep > 0:
             state = self._sagged(state, turned)
         self.state, self.torques, self.push, self.plant = state, torques, push, plant

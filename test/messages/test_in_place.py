@@ -121,7 +121,11 @@ def test_damaged_bytes_are_refused_or_read(kind, data):
 
 WRITTEN = {
     "odometry": (Odometry(child_frame_id="base"), writing.ODOMETRY, False),
-    "torques": (JointState(name=["l", "right"], effort=[0.0, 0.0]), writing.EFFORT, True),
+    "torques": (
+        JointState(name=["l", "right"], velocity=[0.0] * 2, effort=[0.0] * 2),
+        writing.WHEEL_COMMAND,
+        True,
+    ),
     "wrench": (WrenchStamped(), writing.WRENCH, False),
     "vector": (Vector3Stamped(), writing.VECTOR, False),
     "pressure": (FluidPressure(), ("fluid_pressure",), False),

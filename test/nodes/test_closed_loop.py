@@ -81,17 +81,37 @@ SMALL = {  # a third of the size of climber.yaml's lap, in a third of its time
 }
 
 
-@pytest.fixture(scope="module")
-def climber_bag(runs):
-    text = (CONFIG / "climber.yaml").read_text()
-    for before, after in SMALL.items():
+def small_bag(runs, name, changed=SMALL):
+    """Bag of a run with a configuration, of which some text is changed."""
+    text = (CONFIG / name).read_text()
+    for before, after in changed.items():
         assert before in text
         text = text.replace(before, after)
-    config = runs.directory / "small.yaml"
+    config = runs.directory / f"small_{name}"
     config.write_text(text)
-    demo(runs, runs.directory / "climber", config, "--duration", "20")
+    output = runs.directory / f"run_of_{name}"
+    demo(runs, output, config, "--duration", "20")
     finished(runs)
-    return runs.directory / "climber" / "bag"
+    return output / "bag"
+
+
+@pytest.fixture(scope="module")
+def climber_bag(runs):
+    return small_bag(runs, "climber.yaml")
+
+
+def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay):
+    """In steps of 1 mm/s, with a dead band of 20 mm/s: below it a wheel stands."""
+    dead_band = {"velocity_dead_band: 0.0": "velocity_dead_band: 0.02"}
+    bag = small_bag(runs, "velocity.yaml", SMALL | dead_band)
+    run = read_run(bag)
+    assert run.time[-1] >= 20.0
+    assert np.sqrt(np.mean(run.distance**2)) < 3e-3
+    told = np.array(list(by_stamp(bag, "/wheel_torques", lambda m: list(m.velocity)).values()))
+    changes = 0.027 * np.diff(told, axis=0)
+    assert np.sqrt(np.mean(changes**2)) < 3e-3
+    assert np.abs(changes[-100:]).max() < 1e-6
+    assert not replay(bag, "--fail-above", "1e-9")["changed"]
 
 
 def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(paper_bags):

@@ -41,7 +41,7 @@ def line(content):
 def test_the_lines_in_the_documents_have_their_checksums():
     text = (CONFIG.parent / "docs" / "hardware.md").read_text()
     contents = re.findall(r"`\$(.*?)\*[0-9A-F]{4}`", text)
-    assert {content[0] for content in contents} == {"E", "C"}
+    assert {content[0] for content in contents} == {"E", "C", "V"}
     assert all(line(content).decode().strip() in text for content in contents)
 
 
@@ -55,6 +55,8 @@ def now(world):
 
 class Board:
     """A motor board that the test plays, and the driver that runs on it."""
+
+    kind = "C "  # of the commands that it takes
 
     def __init__(self, world, *parameters, namespace=""):
         self.world = world
@@ -89,13 +91,13 @@ class Board:
         return self.odometry[-1]
 
     def commands(self):
-        """Currents [mA] that have been received, left and right."""
+        """Currents [mA], or speeds [counts/s], that have been received, left and right."""
         if select.select([self.port], [], [], 0)[0]:
             self.received += os.read(self.port, 4096)
         lines = self.received.splitlines(keepends=True)
         contents = [text.decode().strip("$").partition("*")[0] for text in lines]
         assert lines == [line(content) for content in contents]
-        return [tuple(map(int, content.removeprefix("C ").split())) for content in contents]
+        return [tuple(map(int, content.removeprefix(self.kind).split())) for content in contents]
 
     def gets(self, *currents):
         """Wait for a command that has not been waited for."""
@@ -110,17 +112,32 @@ class Board:
 class Controlled(Board):
     """The same, with torques that the test commands."""
 
-    def __init__(self, world):
-        super().__init__(world)
+    def __init__(self, world, *parameters):
+        super().__init__(world, *parameters)
         self.torques = world.speak(JointState, "wheel_torques")
         self.tell(0, 0, 0, 0, 0, 0, again=True)
         self.world.wait(lambda: self.answer(1.25, 1.25) or self.commands(), "first command")
 
     def answer(self, *efforts, names=NAMES, age=0):
         """Torques for a new odometry, or for one that is `age` [ns] older."""
-        message = JointState(name=names, effort=efforts)
+        message = self.command(names, efforts)
         message.header.stamp = writing.time(stamp(self.tell(0, 0, 0, 0, 0, 0)) - age)
         self.torques.publish(message)
+
+    def command(self, names, values):
+        return JointState(name=names, effort=values)
+
+
+class TakesSpeeds(Controlled):
+    """The same, of a board that takes speeds."""
+
+    kind = "V "
+
+    def __init__(self, world):
+        super().__init__(world, "motors:=velocity", "encoder_counts:=1000")
+
+    def command(self, names, values):
+        return JointState(name=names, velocity=values, effort=[math.nan] * len(values))
 
 
 def test_odometry_is_what_the_encoders_say_when_they_say_it(world):
@@ -208,6 +225,23 @@ def test_torques_become_currents_and_those_that_are_unfit_become_zero(world):
         assert world.log(DRIVER).count(f"wheel_torques: {why}") == 2
 
 
+def test_speeds_become_counts_a_second_and_those_that_are_unfit_become_zero(world):
+    board = TakesSpeeds(world)
+    board.answer(math.pi, 2 * math.pi)
+    board.gets(500, -1000)  # 1000 counts in a turn; the right motor turns the other way
+    board.answer(math.nan, 1.0)
+    board.gets(0, 0)
+    board.says("wheel_torques: not finite; zero speed instead")
+    board.answer(math.pi, math.pi)
+    board.gets(500, -500)
+    late = "wheel_torques: none for 0.1 s; zero speed instead"
+    world.wait(lambda: board.tell(0, 0, 0, 0, 1, 0) and late in world.log(DRIVER), late)
+    board.gets(0, 0)
+    world.processes[DRIVER].send_signal(signal.SIGINT)
+    assert world.end(DRIVER, signal.SIGINT) == 0
+    assert board.commands()[-1] == (0, 0)
+
+
 def test_torques_that_do_not_come_any_more_are_dropped(world):
     board = Controlled(world)
     board.answer(1.25, 1.25)
@@ -246,6 +280,7 @@ def test_a_board_that_is_unplugged_is_told_in_one_line_and_a_failure(world):
         ("device:=/dev/null", "Inappropriate ioctl for device: '/dev/null'"),
         ("half_track:=-0.3", "half_track=-0.3 must be from 0.001 to 10"),
         ("wheel_radius:=.nan", "wheel_radius=nan must be from 0.001 to 1"),
+        ("motors:=speed", "motors='speed' must be torque or velocity"),
         ("max_current:=3", "'max_current' to '3' of type 'INTEGER', expecting type 'DOUBLE'"),
     ],
 )
@@ -260,14 +295,15 @@ def test_what_it_cannot_start_with_is_said_in_one_line(world, parameter, line):
 class StandIn:
     """The firmware's stand-in and the driver on it."""
 
-    def __init__(self, world, simulated=False, heading=math.pi / 4):
+    def __init__(self, world, simulated=False, heading=math.pi / 4, config="climber.yaml"):
+        self.config = config
         self.world, self.truth = world, world.directory / "truth.csv"
         world.start_node(
             BOARD,
             f"simulated_time:={str(simulated).lower()}",
             f"initial_heading:={heading}",
             f"truth:={self.truth}",
-            config="climber.yaml",
+            config=config,
         )
         said = world.wait(lambda: world.log(BOARD), "device")
         self.device = said.strip().removeprefix("device: ")
@@ -281,7 +317,7 @@ class StandIn:
         self.odometry = world.hear(Odometry, "odom", 20_000)
 
     def start_driver(self):
-        self.world.start_node(DRIVER, *self.driver, config="climber.yaml")
+        self.world.start_node(DRIVER, *self.driver, config=self.config)
 
     def rows(self):
         """Rows (n, 6) of the truth: time, x, y, heading, left and right torque."""
@@ -315,25 +351,27 @@ def test_the_board_cuts_the_torque_of_a_driver_that_dies_and_takes_up_with_the_n
     world.wait(is_driven, "torque")
 
 
-ELLIPSE = ["shape:=ellipse", "ellipse.semi_axis_x:=0.3", "ellipse.semi_axis_y:=0.2"]
+ELLIPSE = [
+    *("shape:=ellipse", "ellipse.semi_axis_x:=0.3", "ellipse.semi_axis_y:=0.2"),
+    *("origin_y:=2.8", "rest_to_rest.rate:=0.8"),
+]
 
 
 @pytest.mark.parametrize(
-    ("planner", "heading", "rate", "width"),
+    ("config", "planner", "heading", "rate", "width"),
     [
-        ([*ELLIPSE, "origin_y:=2.8", "rest_to_rest.rate:=0.8"], 0.0, 0.8, 0.6),
-        pytest.param([], math.pi / 4, 0.12, 3.0, marks=pytest.mark.soak),
+        ("climber.yaml", ELLIPSE, 0.0, 0.8, 0.6),
+        ("velocity.yaml", ELLIPSE, 0.0, 0.8, 0.6),
+        pytest.param("climber.yaml", [], math.pi / 4, 0.12, 3.0, marks=pytest.mark.soak),
     ],
-    ids=["ellipse", "climber.yaml"],
+    ids=["ellipse", "ellipse, by speeds", "climber.yaml"],
 )
-def test_in_the_plants_place_it_stays_within_5_mm_rms(world, planner, heading, rate, width):
+def test_in_the_plants_place_it_stays_within_5_mm_rms(world, config, planner, heading, rate, width):
     """Of the odometry, and of the truth; `pytest -rP` tells how much it is."""
-    board = StandIn(world, simulated=True, heading=heading)
+    board = StandIn(world, simulated=True, heading=heading, config=config)
     simulated = "use_sim_time:=true"
-    world.start_node(
-        "trajectory_publisher", simulated, "autostart:=false", *planner, config="climber.yaml"
-    )
-    world.start_node("uk_torque_controller", simulated, config="climber.yaml")
+    world.start_node("trajectory_publisher", simulated, "autostart:=false", *planner, config=config)
+    world.start_node("uk_torque_controller", simulated, config=config)
     previews = world.listen(MultiDOFJointTrajectory, "reference")
     diagnostics = world.listen(DiagnosticArray, "/diagnostics")
     world.wait(lambda: any(map(stamp, diagnostics)), "clock of the controller")

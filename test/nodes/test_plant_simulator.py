@@ -50,6 +50,32 @@ def test_in_simulated_time_it_steps_once_for_each_torque_that_answers_it(world):
     assert wrenched.twist.twist.angular.z == pytest.approx(turning * 0.02, rel=1e-9)
 
 
+def test_a_board_that_takes_speeds_reads_those_of_the_command(world):
+    motors = "motors:=velocity", "servo_time_constant:=0.0", "velocity_resolution:=0.027"
+    world.start_node("plant_simulator", "simulated_time:=true", "inclination:=0.0", *motors)
+    odometry = world.listen(Odometry, "odom")
+    answers = world.speak(JointState, "wheel_torques")
+
+    def twist_after(step, command):
+        now = 1_000_000_000 + step * 5_000_000
+        world.wait(lambda: odometry and stamp(odometry[-1]) == now, f"odometry {step}")
+        command.header.stamp = writing.time(now)
+        answers.publish(command)
+        world.wait(lambda: stamp(odometry[-1]) > now, f"odometry after {step}")
+        return odometry[-1].twist.twist
+
+    for step in range(20):
+        command = JointState(name=[RIGHT, LEFT], velocity=[4.4, 1.6], effort=[-9.0, -9.0])
+        twist = twist_after(step, command)
+    assert twist.linear.x == pytest.approx(0.027 * (4 + 2) / 2, abs=1e-6)
+    assert twist.angular.z == pytest.approx(0.027 * (4 - 2) / 0.6, abs=1e-6)
+    for step in range(20, 60):
+        twist = twist_after(step, torques(3.0, 3.0))  # which has no speeds
+    assert twist.linear.x == pytest.approx(0.0, abs=1e-6)
+    said = "refused, standstill instead (0 velocities must be 2)"
+    world.wait(lambda: said in world.log("plant_simulator"), "what is wrong")
+
+
 def test_in_simulated_time_a_start_in_motion_waits_while_time_goes_on(world):
     """A planner with a start delay needs the time; without it nobody would ever begin."""
     world.start_node("plant_simulator", "simulated_time:=true", "initial_speed:=1.0")

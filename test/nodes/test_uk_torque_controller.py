@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Vector3Stamped, WrenchStamped
+from geometry_msgs.msg import TwistStamped, Vector3Stamped, WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from nav_msgs.msg import Odometry
@@ -249,8 +249,47 @@ def test_the_torques_answer_the_odometry_and_effort_commands_say_the_same(world)
     left, right = answer.effort
     assert list(answer.name) == ["left_wheel_joint", "right_wheel_joint"]
     assert not answer.position
-    assert not answer.velocity
     world.wait(lambda: any(list(m.data) == [right, left] for m in efforts), "the same torques")
+
+
+def test_the_speeds_beside_the_torques_are_on_cmd_vel_as_well_if_that_is_on(world):
+    """Those of motors without a lag are those of the odometry, where it is where it should be."""
+    wheels = 0.05, 0.2  # radius, half the track
+    loop = Loop(
+        world,
+        *("publish_cmd_vel:=true", "motors:=velocity", "servo_time_constant:=0.0"),
+        *(f"wheel_radius:={wheels[0]}", f"half_track:={wheels[1]}", "odometry_timeout:=10.0"),
+        *("predict:=false", "measure_delay:=false", "learn_delay:=false"),
+    )
+    twists = world.listen(TwistStamped, "cmd_vel")
+    loop.plan()
+    loop.follows()
+    told = loop.tell()
+
+    def answers(messages):
+        return [m for m in messages if reading.nanoseconds(m.header.stamp) == told]
+
+    answer = world.wait(lambda: answers(loop.torques), "answer")[0]
+    twist = world.wait(lambda: answers(twists), "twist")[0]
+    assert twist.header.frame_id == "base_link"
+    v, omega = twist.twist.linear.x, twist.twist.angular.z
+    speed = np.hypot(*CIRCLE.at(0.0).velocity[:2])
+    assert (v, omega) == pytest.approx((speed, CIRCLE.at(0.0).velocity[2]), rel=1e-6)
+    left, right = (v - wheels[1] * omega) / wheels[0], (v + wheels[1] * omega) / wheels[0]
+    assert list(answer.velocity) == pytest.approx([left, right], rel=1e-12)
+    assert any(answer.effort)
+
+
+def test_the_safe_output_has_no_speeds(world):
+    loop = Loop(world, "motors:=velocity")
+    loop.plan()
+    loop.follows()
+    loop.until(
+        lambda effort: not any(effort),
+        "safe output",
+        spoil=lambda m: setattr(m, "child_frame_id", ""),
+    )
+    assert list(loop.torques[-1].velocity) == [0.0, 0.0]
 
 
 def test_a_second_climber_keeps_to_its_namespace(world):

@@ -1,0 +1,127 @@
+"""A motor board that takes speeds in the place of motors that take torques.
+
+`pytest -rP` tells how near they come, and how much commands change.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from climber_uk.closed_loop.simulate import Link, Run, simulate
+from climber_uk.control.build import build_controller
+from climber_uk.control.safety import Mode
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.trajectory_parameters import build_trajectory
+from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.simulation.motors import Motors
+from climber_uk.simulation.sensors import Sensors
+
+CONFIG = Path(__file__).parents[2] / "config" / "velocity.yaml"
+SMALL = {  # a third of the lap in a third of its time
+    "lemniscate.half_width": 0.5,
+    "lemniscate.half_height": 0.25,
+    "rest_to_rest.rate": 0.36,
+    "rest_to_rest.ramp_time": 1.0,
+}
+FORTH_AND_BACK = {
+    "shape": "line",
+    "line.length": 0.4,
+    "rest_to_rest.rate": 0.3,
+    "rest_to_rest.ramp_time": 1.0,
+    "rest_to_rest.runs": 4,
+}
+SERVO = Values(read_file(CONFIG, "/plant_simulator")).read(Motors)
+DEAD_BAND = replace(SERVO, velocity_dead_band=0.02)
+INNER = Link(step=0.001)  # [s] of the servo, too
+ENCODERS = Sensors(odometry_source="wheels", encoder_resolution=2 * np.pi / 4096)
+
+
+def drive(servo, path=SMALL, link=INNER, truth=lambda it: it, **parameters):
+    """Run of 24 s, whose last 4 s are rest; and the rims' speeds (n, 2) told [m/s]."""
+    path = {**read_file(CONFIG, "/trajectory_publisher"), **path}
+    trajectory = build_trajectory(Values(path).read)
+    given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
+    controller = build_controller(Values(given), None)
+    believed: Climber = controller.law.climber
+    told, answers = [], controller.on_odometry
+
+    def on_odometry(*odometry):
+        answer = answers(*odometry)
+        assert controller.mode is Mode.FOLLOWING, controller.detail
+        told.append(believed.rim_rates(answer.speeds))
+        return answer
+
+    controller.on_odometry = on_odometry
+    reference, link = trajectory.at(0.0), replace(link, servo=servo)
+    start = State(reference.pose, reference.velocity)
+    run: Run = simulate(trajectory, start, 24.0, controller, truth(believed), link)
+    told = believed.wheel_radius * np.array(told)
+    changes = ", ".join(f"{1e3 * change:.2f}" for change in hunting(told))
+    print(f"RMS {1e3 * run.rms():.3f} mm, maximum {1e3 * run.distance.max():.2f} mm")
+    print(f"RMS change of a command {changes} mm/s, on the whole and at rest")
+    return run, told
+
+
+def hunting(told):
+    """RMS of the change from one command to the next [m/s], on the whole and at rest."""
+    changes = np.diff(told, axis=0)
+    return [np.sqrt(np.mean(part**2)) for part in (changes, changes[-len(changes) // 6 :])]
+
+
+def test_climber_yaml_differs_in_its_motors_only():
+    for node, ours in {
+        "uk_torque_controller": {"motors", "servo_time_constant"},
+        "plant_simulator": {field for field in vars(SERVO) if not field.startswith("torque")}
+        | {"integration_step"},
+    }.items():
+        other, this = (
+            read_file(CONFIG.parent / f"{name}.yaml", f"/{node}")
+            for name in ("climber", "velocity")
+        )
+        changed = {name for name in this if this[name] != other.get(name)}
+        assert changed == ours
+        assert other.keys() <= this.keys()
+
+
+@pytest.mark.parametrize("path", [SMALL, FORTH_AND_BACK], ids=["eight", "forth and back"])
+def test_a_servo_in_steps_of_a_millimetre_a_second_follows(path):
+    run, told = drive(SERVO, path)
+    assert run.rms() < 1e-3
+    on_the_way, at_rest = hunting(told)
+    assert on_the_way < 3e-3
+    assert at_rest < 1e-6
+
+
+@pytest.mark.parametrize("path", [SMALL, FORTH_AND_BACK], ids=["eight", "forth and back"])
+def test_a_dead_band_costs_millimetres_and_makes_no_servo_hunt(path):
+    run, told = drive(DEAD_BAND, path)
+    assert run.rms() < 3e-3
+    on_the_way, at_rest = hunting(told)
+    assert on_the_way < 4e-3
+    assert at_rest < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("servo", "link"),
+    [
+        (replace(SERVO, servo_time_constant=0.0), INNER),
+        (replace(SERVO, servo_time_constant=0.01), INNER),
+        (replace(SERVO, servo_time_constant=0.04), INNER),
+        (SERVO, replace(INNER, delay=0.02)),
+        (SERVO, replace(INNER, period=0.02)),
+        (DEAD_BAND, replace(INNER, delay=0.005, sensors=ENCODERS)),
+    ],
+    ids=["at once", "10 ms", "40 ms", "20 ms of delay", "50 Hz", "encoders"],
+)
+def test_a_servo_that_is_other_than_told_is_learnt(servo, link):
+    run, _ = drive(servo, link=link)
+    assert run.rms() < 3e-3
+
+
+@pytest.mark.parametrize("change", [{"mass": 7.0}, {"seal_friction_coefficient": 0.1}], ids=str)
+def test_what_it_carries_and_rubs_against_is_the_servos_business(change):
+    run, _ = drive(SERVO, truth=lambda climber: replace(climber, **change))
+    assert run.rms() < 1e-3
