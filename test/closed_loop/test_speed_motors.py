@@ -134,16 +134,16 @@ def test_what_it_carries_and_rubs_against_is_the_servos_business(change):
 
 
 @pytest.mark.parametrize(
-    ("spoilt", "mode"),
+    "spoilt",
     [
-        (lambda rates: rates * [1.0, 0.0], Mode.DEAD_WHEEL),
-        (lambda rates: rates * [0.0, 1.0], Mode.DEAD_WHEEL),
-        (lambda rates: 0 * rates, Mode.STALLED),
-        (lambda rates: rates * [1.0, 0.0] + [0.0, 11.0], Mode.DEAD_WHEEL),
+        lambda rates: rates * [1.0, 0.0],
+        lambda rates: rates * [0.0, 1.0],
+        lambda rates: 0 * rates,
+        lambda rates: rates * [1.0, 0.0] + [0.0, 11.0],
     ],
     ids=["left", "right", "both", "left at a speed of its own"],
 )
-def test_the_guard_finds_a_wheel_that_does_not_obey(spoilt, mode):
+def test_the_guard_finds_a_wheel_that_does_not_obey(spoilt):
     trajectory, start, controller = loop({})
     believed, found = controller.law.climber, []
 
@@ -153,6 +153,7 @@ def test_the_guard_finds_a_wheel_that_does_not_obey(spoilt, mode):
 
     link = Link(servo=SERVO)
     run = simulate(trajectory, start, 7.0, controller, believed, link, motors)
-    assert mode in found[: round(6.5 / link.step)]
-    assert set(found) == {Mode.FOLLOWING, mode}
+    before, after = found[: round(6.0 / link.step)], found[round(6.5 / link.step) :]
+    assert set(before) == {Mode.FOLLOWING}
+    assert set(after) <= {Mode.DEAD_WHEEL, Mode.STALLED}
     assert np.hypot(*run.velocity[:, :2].T).max() < 0.4
