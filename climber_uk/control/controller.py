@@ -21,7 +21,7 @@ from climber_uk.control.control_law import CUT, Command, ControlLaw, check_finit
 from climber_uk.control.estimator import Estimator, Observed
 from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.guidance import Guidance
-from climber_uk.control.model import Observer
+from climber_uk.control.model import DisturbanceEstimate, Observer
 from climber_uk.control.safe_output import SafeOutput
 from climber_uk.control.safety import Calm, Mode, Safety, Trouble
 from climber_uk.control.speed_command import STANDING, MotorBoard
@@ -369,7 +369,7 @@ class Controller:
             return Mode.NO_SOLUTION, str(error), None
         active.go_on(target)
         if not self.board.teaches(law.climber, point):
-            estimator.forget()
+            estimator.learnt = DisturbanceEstimate()
         wheels, fits, speeds = command.wheels, command.fits, (point.speed, command.yaw_rate)
         estimator.sent(ahead.begins, wheels, fits, *speeds)
         return target.mode, target.detail, command

@@ -39,12 +39,19 @@ INNER = Link(step=0.001)  # [s] of the servo, too
 ENCODERS = Sensors(odometry_source="wheels", encoder_resolution=2 * np.pi / 4096)
 
 
+def loop(path, **parameters):
+    """A trajectory, where it begins, and a controller that will follow it."""
+    given = {**read_file(CONFIG, "/trajectory_publisher"), **path}
+    trajectory = build_trajectory(Values(given).read)
+    reference = trajectory.at(0.0)
+    ours = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
+    controller = build_controller(Values(ours), None)
+    return trajectory, State(reference.pose, reference.velocity), controller
+
+
 def drive(servo, path=SMALL, link=INNER, truth=lambda it: it, **parameters):
     """Run of 24 s, whose last 4 s are rest; and the rims' speeds (n, 2) told [m/s]."""
-    path = {**read_file(CONFIG, "/trajectory_publisher"), **path}
-    trajectory = build_trajectory(Values(path).read)
-    given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
-    controller = build_controller(Values(given), None)
+    trajectory, start, controller = loop(path, **parameters)
     believed: Climber = controller.law.climber
     told, answers = [], controller.on_odometry
 
@@ -55,8 +62,7 @@ def drive(servo, path=SMALL, link=INNER, truth=lambda it: it, **parameters):
         return answer
 
     controller.on_odometry = on_odometry
-    reference, link = trajectory.at(0.0), replace(link, servo=servo)
-    start = State(reference.pose, reference.velocity)
+    link = replace(link, servo=servo)
     run: Run = simulate(trajectory, start, 24.0, controller, truth(believed), link)
     told = believed.wheel_radius * np.array(told)
     changes = ", ".join(f"{1e3 * change:.2f}" for change in hunting(told))
@@ -125,3 +131,29 @@ def test_a_servo_that_is_other_than_told_is_learnt(servo, link):
 def test_what_it_carries_and_rubs_against_is_the_servos_business(change):
     run, _ = drive(SERVO, truth=lambda climber: replace(climber, **change))
     assert run.rms() < 1e-3
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        lambda rates: rates * [1.0, 0.0],
+        lambda rates: rates * [0.0, 1.0],
+        lambda rates: 0 * rates,
+        lambda rates: rates * [1.0, 0.0] + [0.0, 11.0],
+    ],
+    ids=["left", "right", "both", "left at a speed of its own"],
+)
+def test_the_guard_finds_a_wheel_that_does_not_obey(spoilt):
+    trajectory, start, controller = loop({})
+    believed, found = controller.law.climber, []
+
+    def motors(state, rates):
+        found.append(controller.mode)
+        return spoilt(rates) if len(found) > 6.0 / link.step else rates
+
+    link = Link(servo=SERVO)
+    run = simulate(trajectory, start, 7.0, controller, believed, link, motors)
+    before, after = found[: round(6.0 / link.step)], found[round(6.5 / link.step) :]
+    assert set(before) == {Mode.FOLLOWING}
+    assert set(after) <= {Mode.DEAD_WHEEL, Mode.STALLED}
+    assert np.hypot(*run.velocity[:, :2].T).max() < 0.4

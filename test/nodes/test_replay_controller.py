@@ -160,12 +160,13 @@ def test_log_times_will_do_where_times_of_publishing_were_left_0(bag, tmp_path, 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_torques_are_taken_by_the_names_of_the_wheels(bag, tmp_path, replay, order):
-    """In any order, and beside what else has a torque."""
+    """In any order, beside what else has a torque, and without speeds, as in older bags."""
 
     def change(sent):
         names, efforts = list(sent.name), list(sent.effort)
         sent.name = ["left_brush", *(names[i] for i in order)]
         sent.effort = np.array([9.0, *(efforts[i] for i in order)])
+        sent.velocity = np.array([])
 
     replay(copied(bag, tmp_path / "other", change=change), *EXACT)
 
