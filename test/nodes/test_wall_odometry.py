@@ -157,6 +157,5 @@ def test_the_climber_of_field_yaml_follows_its_path_by_what_its_sensors_tell(wor
     (report,) = (tmp_path / "report").glob("*.json")
     (found,) = [run["metrics"] for run in json.loads(report.read_text())["runs"]]
     assert found["truth_max_distance"] < 0.03
-    assert found["following"] == 100
-    assert found["safety_stops"] == found["errors"] == 0
+    assert found["safety_stops"] == found["odometry_unanswered"] == 0
     assert "refused" not in (run / f"{NODE}.log").read_text()
