@@ -18,6 +18,7 @@ from climber_uk.nodes.markers import Markers
 from climber_uk.nodes.plant_simulator import PlantSimulator
 from climber_uk.nodes.trajectory_publisher import TrajectoryPublisher
 from climber_uk.nodes.uk_torque_controller import UkTorqueController
+from climber_uk.nodes.wall_odometry import WallOdometry
 from climber_uk.report.metrics import GROUPS
 from climber_uk.ros.running import ClimberNode
 
@@ -25,6 +26,7 @@ NODES: list[Callable[[], ClimberNode]] = [
     TrajectoryPublisher,
     UkTorqueController,
     PlantSimulator,
+    WallOdometry,
     Markers,
     DriverNode,
 ]
@@ -49,6 +51,11 @@ CONTENTS = {
     "cmd_vel": "the speeds again, of the climber, if `publish_cmd_vel`: forward, about z",
     topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
     topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels",
+    topics.IMU: "yaw rate [rad/s] and specific force [m/s²], gravity in it: on a vertical "
+    "wall 9.81 upwards; the plant tells it if `imu.enabled`",
+    topics.POSE: "x, y [m] and heading of the climber, measured from outside at the stamp, however "
+    "late; parts with a variance of 1e4 m², π² rad² or more are not measured; the plant tells it "
+    "if `fixes.period` > 0",
     topics.TRUTH: "the simulated climber without its sensors' errors",
     topics.PUSH: "force [N] and moment [N m] on the simulated climber, in `odom` or `base_link`",
     "markers": "climber, reference, way, torques and force for RViz and Foxglove, in `odom`; 20 Hz",

@@ -140,7 +140,7 @@ def _read_base(path: Path) -> dict[str, Any]:
         for name, (value, is_shared) in here.items():
             if f"{node}.{name}" in PARAMETERS:
                 found[f"{node}.{name}"] = value
-            elif not is_shared and name.split(".")[0] not in names.NODES_ONLY:
+            elif not (is_shared or {name, name.split(".")[0]} & names.NODES_ONLY):
                 meant = similar(f"{node}.{name}", PARAMETERS)
                 raise ValueError(f"{path}: {node}.{name} is not a parameter of it{meant}")
     return found

@@ -12,6 +12,7 @@ from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
+from climber_uk.simulation.field_sensors import FIELD_SENSORS
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.sensors import Sensors
@@ -39,7 +40,8 @@ PARAMETERS = {
     **_names(PLANT, *((k, f"{name}.") for group in VARIANTS.values() for name, k in group.items())),
     **_names(PLANT, *ON_WALL),
 }
-# Parameters of the nodes that have no effect in lock-step: names, topics, rates of publishing
+# Parameters of the nodes that have no effect in lock-step: names, topics, rates of publishing, and
+# sensors that no odometry comes from
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
     *(
@@ -51,6 +53,7 @@ NODES_ONLY = {
         "base_frame",
     ),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames", "qos_overrides"),
+    *(at + field.name for at, kind in FIELD_SENSORS.items() for field in dataclasses.fields(kind)),
 }
 # Parameters that may differ from run to run
 VARIED = {
@@ -77,6 +80,8 @@ REQUIRED = {
     f"{PLANT}.wall": "plane",
     f"{PLANT}.plane.tilt": 0.0,
     f"{PLANT}.slip": False,
+    f"{PLANT}.creep": 0.0,
+    f"{PLANT}.publish_odometry": True,
     f"{PLANT}.seal_radius": 0.0,
     f"{PLANT}.suction.pump_time": 0.0,
     f"{PLANT}.motors": "torque",

@@ -161,8 +161,9 @@ class Localizer:
             return
         number = self.history.at(fix.stamp)
         if number is None:
-            age = (self.stamp - fix.stamp) / SECOND
-            self._refuse(f"{age:.3g} s old, older than longest_delay={self.options.longest_delay}")
+            age, longest = (self.stamp - fix.stamp) / SECOND, self.options.longest_delay
+            why = f"longest_delay={longest:g}" if age > longest else "the first of the encoders"
+            self._refuse(f"{age:.3g} s old, older than {why}")
             return
         entry, parts = self.history.entries[number], list(fix.parts)
         values = fix.values - (entry.pose(fix.stamp) - entry.estimate.mean[:3])[parts]

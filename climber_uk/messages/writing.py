@@ -74,10 +74,11 @@ LOCATED = (*ODOMETRY, "pose.covariance", "twist.covariance")
 
 def planar_covariance(covariance: Array) -> list[float]:
     """The 36 of a message from that (3, 3) of x, y and about z; of the others `UNKNOWN`."""
-    whole = np.diag([UNKNOWN] * 6)
-    whole[np.ix_((0, 1, 5), (0, 1, 5))] = covariance
-    numbers: list[float] = whole.ravel().tolist()
-    return numbers
+    whole = [0.0] * 36
+    whole[14] = whole[21] = whole[28] = UNKNOWN
+    whole[0:2], whole[6:8], whole[30:32] = covariance[:, :2].tolist()
+    whole[5], whole[11], whole[35] = covariance[:, 2].tolist()
+    return whole
 
 
 def odometry_numbers(state: State) -> tuple[float, ...]:

@@ -6,23 +6,12 @@ from climber_uk.mechanics.adhesion import Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.ros.parameters import NodeParameters
-from climber_uk.simulation.field_sensors import (
-    EncoderErrors,
-    FieldSensors,
-    FixErrors,
-    ImuErrors,
-)
+from climber_uk.simulation.field_sensors import FIELD_SENSORS, FieldSensors
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import VARIANTS, Parts, Physics
-
-FIELD_SENSORS: dict[str, type[Any]] = {
-    "imu.": ImuErrors,
-    "encoders.": EncoderErrors,
-    "fixes.": FixErrors,
-}
 
 
 def declare(parameters: NodeParameters) -> None:

@@ -5,7 +5,7 @@ All are of a simulated robot, off by default, and their noise is of one seed eac
 
 import math
 from collections import deque
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,6 +62,14 @@ class FixErrors:
     outlier_share: float = parameter(0.0, "", "share that is off", at_least=0, at_most=1)
     outlier_size: float = parameter(3.0, "m", "standard deviation of those", at_least=0)
     seed: int = parameter(0, "", "of the noise", at_least=0)
+
+
+# classes of parameters by what is before their names
+FIELD_SENSORS: dict[str, type[Any]] = {
+    "imu.": ImuErrors,
+    "encoders.": EncoderErrors,
+    "fixes.": FixErrors,
+}
 
 
 class ImuSample(NamedTuple):

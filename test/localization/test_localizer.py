@@ -147,9 +147,12 @@ def largest_step(told):
 
 
 def test_fixes_too_old_or_ahead_of_the_encoders_are_refused_and_those_a_little_ahead_wait():
-    told = Told().go_on(2.0)
+    told = Told().go_on(0.1)
+    told.fix(age=0.5)
+    assert "older than the first of the encoders" in told.localizer.remarks[-1]
+    told.go_on(2.0)
     told.fix(age=1.5)
-    assert "old, older than longest_delay=1.0" in told.localizer.remarks[-1]
+    assert "old, older than longest_delay=1" in told.localizer.remarks[-1]
     told.fix(age=-3.0)
     assert "ahead of the encoders" in told.localizer.remarks[-1]
     told.fix(age=-0.02)
