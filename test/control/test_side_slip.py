@@ -79,7 +79,9 @@ def drive(trajectory, duration, constraints=GAINS, observer=None, **slip):
     plant = Scrubbing(CLIMBER, trajectory.at(0.0).pose, **slip)
     distances, modes = [], set()
     for tick in range(round(duration / PERIOD)):
-        answer = controller.on_odometry(0, SECOND + round(tick * PERIOD * SECOND), plant.state.motion)
+        answer = controller.on_odometry(
+            0, SECOND + round(tick * PERIOD * SECOND), plant.state.motion
+        )
         modes.add(controller.mode)
         distances.append(plant.pose[:2] - trajectory.at(tick * PERIOD).pose[:2])
         plant.advance(answer.torques)
