@@ -222,7 +222,7 @@ class AdaptiveRobust(Learning):
     """
 
     # found by `tune.py adaptive`
-    gains = AdaptiveGains(2_000.0, 4.06, 4.57), AdaptiveGains(100.0, 3.55, 0.558)
+    gains = AdaptiveGains(6_300.0, 1.10, 5.87), AdaptiveGains(365.0, 5.14, 1.01)
 
     bounds: Array = np.zeros(2)
 
