@@ -222,7 +222,7 @@ class AdaptiveRobust(Learning):
     """
 
     # found by `tune.py adaptive`
-    gains = AdaptiveGains(2_000.0, 4.06, 4.57), AdaptiveGains(100.0, 3.55, 0.558)
+    gains = AdaptiveGains(6_300.0, 1.10, 5.87), AdaptiveGains(365.0, 5.14, 1.01)
 
     bounds: Array = np.zeros(2)
 
@@ -250,5 +250,5 @@ def constraint_errors(
     w = g * e_y
     w_1 = g * (motion.speed * sin(turned) - target.yaw_rate * e_x)
     heading = turning + w_1 / (1 + w**2) + gains.heading_frequency * (turned + arctan(w))
-    _, _, wanted = gains.desired_acceleration(gains.prepare(target), motion)
+    _, _, wanted, _ = gains.desired_acceleration(gains.prepare(target), motion)
     return motion.speed - float(wanted), float(heading)

@@ -45,10 +45,10 @@ NOISE = Link(
 )
 
 
-# Found by `tune.py`, with the name of the last column for `WEIGHTS`.
+# Found by `tune.py`, the weights by `tune.py LQR`.
 WEIGHTS = Weights(33_300.0, 112_000.0, 23_900.0, 54.0, 62.7)
 KANAYAMA = Kanayama(8.03, 1.73, 1.24, 18.2, 112.0, 17.4, 185.0)
-SUPER_TWISTING = SuperTwisting(6.0, 0.5, 1.1, 5.0, 15.0, 5.0, 20.0)
+SUPER_TWISTING = SuperTwisting(4.91, 0.573, 1.1, 4.63, 24.9, 5.29, 20.5)
 
 Make = Callable[..., Controller]
 MILLIMETRE = 1e-3

@@ -50,7 +50,7 @@ def cost(make: Make) -> float:
     late = Link(delay=0.005)
     rows = [
         lap(make, duration=LAP),
-        friction(make, duration=LAP),
+        friction(make, duration=3 * LAP),
         lap(make, link=late, duration=LAP),
         lap(make, link=NOISE, duration=LAP),
         interrupted(make, duration=LAP)[0],
