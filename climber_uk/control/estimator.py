@@ -213,8 +213,10 @@ class Estimator:
         time = (stamp - self.stamp) / SECOND
         reaction = self._delay + self.period / 2
         observed = Observed(before, motion, time, acted, self.disturbance, reaction)
+        has_twist = self.observer.velocity_source == "odometry" and isinstance(motion.x, float)
         bandwidth = self.observer.side_slip_bandwidth
-        if self._last_pose is not None and isinstance(motion.x, float) and bandwidth > 0:
+        # speeds that come from poses share their noise, which would be learnt
+        if self._last_pose is not None and has_twist and bandwidth > 0:
             poses = self._last_pose, motion
             self.slip = self.slip.learnt(self.climber, *poses, time, bandwidth)
         self._last_pose = motion
@@ -223,7 +225,7 @@ class Estimator:
         self._period_is_measured = True
         is_known = self._sent.are_known_since(self.stamp)
         shares = self.observer.shares(time, self._delay)
-        if self.observer.velocity_source == "odometry" and isinstance(motion.x, float):
+        if has_twist:
             motion = self._at_its_stamp(before, expected, motion, time)
             if self.timing.learn_delay and is_known:
                 self._learn_delay(acted[-1][0], expected, motion, time, shares)

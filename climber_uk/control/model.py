@@ -161,7 +161,8 @@ class Observer:
     side_slip_bandwidth: float = parameter(
         6.0,
         "1/s",
-        "how fast it is learnt from poses by how much wheels give way sideways; 0: they hold",
+        "how fast it is learnt by how much wheels give way sideways, from poses beside measured "
+        "speeds; 0: they hold",
         at_least=0,
         runtime=True,
     )
