@@ -90,8 +90,12 @@ REQUIRED = {
     f"{PLANT}.odometry_source": "truth",
     f"{PLANT}.odometry_delay": 0.0,
 }
-# Values that batches have in place of the defaults, which would give each run a timing of its own
-WITHOUT = {f"{CONTROLLER}.learn_delay": False, f"{CONTROLLER}.observer.twist": "instantaneous"}
+# Values that batches have in place of the defaults: neither a timing nor a side slip of their own
+WITHOUT = {
+    f"{CONTROLLER}.learn_delay": False,
+    f"{CONTROLLER}.observer.twist": "instantaneous",
+    f"{CONTROLLER}.observer.side_slip_bandwidth": 0.0,
+}
 
 
 def check_drawn(name: str, constraints: str) -> None:

@@ -172,7 +172,7 @@ def test_an_observer_that_is_off_forgets_in_a_fifth_of_a_second(source):
     learnt = DisturbanceEstimate(9.0, 1.0, friction=3.0)
     _, found = observer.corrected(CLIMBER, learnt, rolling, rolling, 0.2, (0.0, 0.0))
     left = np.exp(-1)
-    assert found == pytest.approx((9.0 * left, left, 0.0, 0.0, 3.0 * left))
+    assert found == pytest.approx((9.0 * left, left, 0.0, 0.0, 3.0 * left, 0.0))
 
 
 def test_what_friction_holds_teaches_nothing():

@@ -36,7 +36,8 @@ class Lockstep:
 
     def __init__(self, world):
         self.world, self.step = world, 0
-        world.start_node(NAME, "use_sim_time:=true")
+        # its poses are not where its twist leads: that would be learnt as a side slip
+        world.start_node(NAME, "use_sim_time:=true", "observer.side_slip_bandwidth:=0.0")
         self.torques = world.listen(JointState, "wheel_torques")
         self.odometry = world.speak(Odometry, "odom")
         self.clock = world.speak(Clock, "/clock")

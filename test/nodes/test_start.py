@@ -215,7 +215,7 @@ PAPER, CLIMBER = (
         (
             "uk_torque_controller",
             CLIMBER,
-            ["18 of ", "climber.yaml)", "at most 4 N m", "suction of 480 N", "safe output hold"],
+            ["19 of ", "climber.yaml)", "at most 4 N m", "suction of 480 N", "safe output hold"],
         ),
         (
             "uk_torque_controller",
