@@ -71,10 +71,14 @@ class BagRecorder(Node):
         self.unwanted = {self.resolve_topic_name(name) for name in options.exclude}
         self.recorded: dict[str, RecordedTopic] = {}
         self.refused: set[tuple[str, str]] = set()  # topics with types that are not recorded
-        self.bag = BagWriter(options.output, options.storage, running_distro())
         self.clock = LogClock()
         self.stopped = 0  # [ns] steady clock when asked to stop; 0: not yet
         self.stop_time = 0  # [ns] log time of that
+        # Before there is a bag that has to be closed. Our own handlers: those of rclpy would cut off
+        # what has arrived and is not yet recorded, and KeyboardInterrupt, a second one too, might
+        # come in the middle of a write.
+        on_end(self.stop)
+        self.bag = BagWriter(options.output, options.storage, running_distro())
 
     def run(self) -> None:
         """Record until `stop` is called, and then what had been published by that time."""
@@ -302,9 +306,6 @@ def topic_name(name: str) -> str:
 def record(options: Namespace) -> None:
     """Record until a signal to end."""
     recorder = BagRecorder(options)
-    # Our own handlers: those of rclpy would cut off what has arrived and is not yet recorded, and
-    # KeyboardInterrupt, a second one too, might come in the middle of a write.
-    on_end(recorder.stop)
     try:
         recorder.run()
     finally:
