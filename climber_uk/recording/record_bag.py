@@ -74,9 +74,9 @@ class BagRecorder(Node):
         self.clock = LogClock()
         self.stopped = 0  # [ns] steady clock when asked to stop; 0: not yet
         self.stop_time = 0  # [ns] log time of that
-        # Before there is a bag that has to be closed. Our own handlers: those of rclpy would cut off
-        # what has arrived and is not yet recorded, and KeyboardInterrupt, a second one too, might
-        # come in the middle of a write.
+        # Before there is a bag that has to be closed. Our own handlers: those of rclpy would cut
+        # off what has arrived and is not yet recorded, and KeyboardInterrupt, a second one too,
+        # might come in the middle of a write.
         on_end(self.stop)
         self.bag = BagWriter(options.output, options.storage, running_distro())
 
