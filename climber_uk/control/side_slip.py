@@ -19,6 +19,9 @@ LARGEST = 10.0  # times as large as that, at most
 FADE_SPEED = 0.02  # [m/s] of a reference below which its course is its heading
 SLOW_TO_LEARN = 0.05  # [m/s] below which poses tell less and less of ρ
 MOST_LEAD = 0.7  # [s]
+# [s] of the reference behind and ahead that are looked at. They have come in any case: if more
+# counted where it happens to be there, a run would not repeat itself
+HINDSIGHT, FORESIGHT = 1.0, 0.7
 FASTEST = 0.4  # B T, at most
 NEGLIGIBLE = 1e-5  # [rad] of a course off its heading
 # Gauss-Laguerre, of second order: the integral of exp(-u) f(u) from 0 on is about Σ weight f(node)
@@ -73,7 +76,11 @@ class SideSlip(NamedTuple):
         """
         cosine, sine = (before.cosine + now.cosine) / 2, (before.sine + now.sine) / 2
         aside = ((now.y - before.y) * cosine - (now.x - before.x) * sine) / time
-        v, scrubbing = abs(before.speed + now.speed) / 2, _scrubbing(climber, now)
+        mean, rate = (before.speed + now.speed) / 2, (before.yaw_rate + now.yaw_rate) / 2
+        # an arc that is driven ever faster, or bends ever more, is not even about its middle
+        faster, tighter = now.speed - before.speed, now.yaw_rate - before.yaw_rate
+        aside -= time / 12 * (rate * faster - mean * tighter)
+        v, scrubbing = abs(mean), _scrubbing(climber, now)
         most = v + climber.half_track * abs(now.yaw_rate)  # a pose that jumps is no side slip
         error = clipped(aside - self.creep * v - self.scrub * scrubbing, -most, most)
         by_creep, by_scrub = CREEP**2 * v, SCRUB**2 * scrubbing
@@ -112,7 +119,7 @@ def _ahead(target: ReferencePoint, at: At, lead: float) -> tuple[float, float, f
     lead = clipped(lead, -MOST_LEAD, MOST_LEAD)
     angle = rate = acceleration = 0.0
     for node, weight in NODES:
-        later = at(lead * node)
+        later = at(clipped(lead * node, -HINDSIGHT, FORESIGHT))
         angle += weight * wrapped(later.heading - target.heading)
         rate += weight * (later.yaw_rate - target.yaw_rate)
         acceleration += weight * (later.yaw_acceleration - target.yaw_acceleration)
