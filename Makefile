@@ -1,5 +1,6 @@
 # Everything sets itself up: a virtual environment with pinned wheels, on x86-64 Linux with
 # Python 3.11 to 3.13. On a ROS 2 installation use colcon instead; see README.md.
+# `make help` tells what there is: each target with its line that begins with `##`.
 
 PYTHON ?= python3
 CLIMBERS ?=
@@ -11,38 +12,48 @@ CAMPAIGN ?= config/campaign.yaml
 CAMPAIGN_OUTPUT ?= demo_output/$(basename $(notdir $(CAMPAIGN)))
 VENV := .venv
 BIN := $(VENV)/bin
+# What has been installed: for nodes, recorder and analysis; for tests, campaigns and benches too
 SET_UP := $(VENV)/set-up
+TOOLS := $(VENV)/tools
+PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: demo paper campaign docs bench test lint unit coverage soak colcon clean
+.PHONY: demo help paper campaign docs bench test lint unit coverage soak colcon clean
 
+## run the nodes, and tell how well; CONFIG=config/climber.yaml, CLOCK=wall, CLIMBERS=4
 demo: $(SET_UP)
 	@exec $(BIN)/run_demo --with-parent --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
 		$(if $(CLIMBERS),--climbers $(CLIMBERS))
 	@$(BIN)/analyze_bag $(OUTPUT)/bag --params $(CONFIG) --output $(OUTPUT)
 
+help:
+	@awk '/^##/ {line = substr($$0, 4)} /^[a-z]+:/ && line {split($$1, name, ":"); \
+		printf "make %-10s %s\n", name[1], line; line = ""}' $(MAKEFILE_LIST)
+
+## the paper's figures and numbers
 paper: $(SET_UP)
 	@$(BIN)/reproduce_paper --output $(PAPER_OUTPUT)
 
-# What was finished is kept: the same again goes on
-campaign: $(SET_UP)
+## many runs with random climbers; the same again goes on where it was
+campaign: $(TOOLS)
 	@$(BIN)/campaign $(CAMPAIGN) --output $(CAMPAIGN_OUTPUT)
 
-# The references of parameters, topics, services and metrics
+## the references of parameters, topics, services and metrics
 docs: $(SET_UP)
 	$(BIN)/python docs/generate.py
 
-# Beside MuJoCo and Pinocchio, which are installed for it
+## speed and accuracy beside others', which are installed for it
 bench: $(VENV)/bench
 	@$(BIN)/python bench/all.py
 
-$(VENV)/bench: $(SET_UP) bench/requirements.txt
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint requirements.txt \
-		--requirement bench/requirements.txt
+$(VENV)/bench: $(TOOLS) bench/requirements.txt
+	$(PIP) --constraint requirements.txt --requirement bench/requirements.txt
 	touch $@
 
+## all that CI runs: lint, unit, colcon
 test: lint unit colcon
 
-lint: $(SET_UP)
+## ruff and mypy
+lint: $(TOOLS)
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
@@ -53,22 +64,23 @@ TESTS := -m pytest --numprocesses 4 --dist worksteal
 # Of many hundred processes each would compile the package again
 KEEPING_BYTECODE := env -u PYTHONDONTWRITEBYTECODE
 
-unit: $(SET_UP)
+## the tests, in four processes
+unit: $(TOOLS)
 	$(KEEPING_BYTECODE) $(BIN)/python $(TESTS)
 
-# Which lines of the package the same tests go through, in all processes that they start
-coverage: $(SET_UP)
+## which lines of the package the tests go through, in all processes that they start
+coverage: $(TOOLS)
 	rm -f .coverage .coverage.*
 	$(KEEPING_BYTECODE) $(BIN)/coverage run $(TESTS)
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --sort cover --fail-under 95
 
-# Longer tests than CI has time for
-soak: $(SET_UP)
+## longer tests than CI has time for
+soak: $(TOOLS)
 	$(BIN)/python -m pytest -m soak
 
-# As in a ROS workspace: both ways to build, without a warning, and each node, started from there
-colcon: $(SET_UP)
+## as in a ROS workspace: build without a warning, and each node, started from there
+colcon: $(TOOLS)
 	rm -rf build install log
 	. $(BIN)/activate && for how in "--symlink-install" ""; do rm -rf build install log && \
 		$(KEEPING_BYTECODE) colcon build --packages-select climber_uk $$how \
@@ -81,11 +93,19 @@ colcon: $(SET_UP)
 	rm -rf build install log
 
 $(SET_UP): requirements.txt setup.py
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --requirement requirements.txt
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
-		evo==1.38.1 --editable . # evo without pandas and seaborn, 90 MB that the tests do not need
-	touch $(SET_UP)
+	@echo "Setting up $(VENV), once: ROS 2, numpy, scipy, matplotlib (about 150 MB to fetch, 500 on the disk)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) --no-compile --constraint requirements.txt setuptools
+	@$(PIP) --no-compile --constraint requirements.txt --no-build-isolation --editable .[ros,analysis]
+	@touch $@
 
+$(TOOLS): requirements.txt setup.py
+	$(PYTHON) -m venv $(VENV)
+	$(PIP) --requirement requirements.txt
+	$(PIP) --no-deps --no-build-isolation \
+		evo==1.38.1 --editable . # evo without pandas and seaborn, 90 MB that the tests do not need
+	touch $(SET_UP) $@
+
+## remove what the others made
 clean:
 	rm -rf $(VENV) build install log demo_output

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from climber_uk.report import reporting
+from climber_uk.report.tables import text
 
 
 def main() -> None:
@@ -13,7 +14,7 @@ def main() -> None:
     parser.add_argument("others", type=Path, nargs="+", help="what is compared with it")
     options = parser.arguments()
     bags = [options.first, *options.others]
-    sys.exit(reporting.report("compare_bags", "Comparison of runs", bags, options))
+    sys.exit(reporting.report("compare_bags", "Comparison of runs", bags, options, text))
 
 
 if __name__ == "__main__":

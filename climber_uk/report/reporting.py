@@ -2,7 +2,7 @@
 
 import sys
 from argparse import ArgumentTypeError, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import Case
 from climber_uk.report.outputs import check_writable, output, printable
 from climber_uk.report.page import page
-from climber_uk.report.tables import Column, text, to_csv, to_json
+from climber_uk.report.tables import Column, to_csv, to_json
 from climber_uk.system.command_line import Parser, between
 
 OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
@@ -79,8 +79,14 @@ def _condition(text: str) -> Condition:
         raise ArgumentTypeError(str(error)) from None
 
 
-def report(command: str, title: str, bags: Sequence[Path], options: Namespace) -> int:
-    """Print and write the metrics of some bags; return the exit status."""
+def report(
+    command: str,
+    title: str,
+    bags: Sequence[Path],
+    options: Namespace,
+    text: Callable[[Sequence[Column]], str],
+) -> int:
+    """Print `text` of some bags and write their metrics; return the exit status."""
     try:
         with output(bags[0], OUTPUTS[command], options.output) as directory:
             if options.figures:

@@ -38,6 +38,6 @@ class Margins:
         """Publish a status of the lowest margins since the last one."""
         slip, tip = self.lowest
         self.level, self.lowest = self.alarm.level(min(slip, tip)), self.last
-        said = f"lowest: slip margin {slip:.2f}, tip margin {tip:.2f}"
+        said = f"lowest: slip margin {slip:.2f} (below 1 it slips), tip margin {tip:.2f} (tips)"
         values = {"slip margin": slip, "tip margin": tip}
         self.node.publish_status("margins", STATUS_LEVELS[self.level], said, values)

@@ -15,6 +15,7 @@ from made_bag import a_run, write
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.topics import Topics
 from climber_uk.report import analyze_bag, compare_bags
+from climber_uk.report.cards import WIDTH, verdict
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import METRICS, Case
 from climber_uk.report.tables import Column, plain
@@ -71,7 +72,7 @@ class Page(HTMLParser):
 
 
 def test_a_table_a_page_csv_and_json_are_made(bags, run, tmp_path):
-    status, out, err = run(bags / "first", "--figures", tmp_path / "figures")
+    status, out, err = run(bags / "first", "--all", "--figures", tmp_path / "figures")
     assert (status, err) == (0, [])
     assert "  rms_along_track            4  mm" in [re.sub(" {9,}", " " * 12, line) for line in out]
     assert out[-1] == str(tmp_path / "figures" / "modes.png")
@@ -149,7 +150,7 @@ def test_a_bag_that_cannot_be_read_is_one_line(bags, run, name):
 def test_what_was_lost_is_said_and_the_rest_is_told(bags, run, tmp_path):
     data = (bags / "first" / "first_0.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[:-40])
-    status, out, err = run(tmp_path / "cut.mcap")
+    status, out, err = run(tmp_path / "cut.mcap", "--all")
     assert status == 0
     assert err == [
         f"analyze_bag: {tmp_path}/cut.mcap: cut.mcap: cut off, read up to the last whole message"
@@ -162,7 +163,7 @@ def test_parameters_come_from_the_file_of_the_nodes(bags, run, tmp_path):
     (tmp_path / "nodes.yaml").write_text(
         "/**/uk_torque_controller:\n  ros__parameters:\n    max_wheel_torque: 1.0\n"
     )
-    _, out, _ = run(bags / "first", "--params", tmp_path / "nodes.yaml")
+    _, out, _ = run(bags / "first", "--all", "--params", tmp_path / "nodes.yaml")
     assert ["saturation", "100", "%"] in [line.split() for line in out]
 
 
@@ -199,7 +200,7 @@ def test_what_begins_like_a_formula_is_marked_as_text(name):
 def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_path):
     made = a_run(200)
     made.add_truth(made.pose + np.array([0.3, 0, 0]))
-    status, out, _ = run(made.write(tmp_path / "bag"))
+    status, out, _ = run(made.write(tmp_path / "bag"), "--all")
     assert status == 0
     rows = [line.split() for line in out]
     tracking = rows.index(["Tracking"])
@@ -212,6 +213,38 @@ def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_pat
     status, _, err = run(tmp_path / "bag", "--fail-if", "truth_max_distance>0.1")
     assert status == 1
     assert "truth_max_distance is 0.3 > 0.1" in err[-1]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({}, "It followed its path, at most 4 mm off."),
+        ({"truth_max_distance": 0.3}, "It followed its path, at most 300 mm off."),
+        ({"settling_time": np.nan}, "It did not settle on its path, at most 4 mm off."),
+        ({"following": 0.0}, "It did not follow its reference."),
+        ({"safety_stops": 1.0}, "It stopped for safety (1 stop)."),
+        ({"safety_stops": 2.0}, "It stopped for safety (2 stops)."),
+        ({"lowest_slip_margin": 0.5}, "on a real wall its wheels would slip"),
+        ({"lowest_tip_margin": 0.5, "lowest_slip_margin": 0.5}, "on a real wall it would tip over"),
+    ],
+)
+def test_the_verdict_says_what_became_of_the_run(bags, change, sentence):
+    (first,), _ = read_runs(bags / "first", Topics())
+    column = Column("a", "bag", Case(first))
+    fine = {"safety_stops": 0.0, "following": 99.0}
+    column.__dict__["values"] = {**column.values, **fine, **change}  # a cached property
+    assert sentence in verdict(column)
+
+
+def test_at_a_glance_each_side_and_what_nodes_warned_of_are_in_few_lines(bags, run, tmp_path):
+    status, out, err = run(bags / "first")
+    assert (status, err) == (0, [])
+    assert all(len(line) <= WIDTH + 8 for line in out)
+    titles = [line[2:19].strip() for line in out]
+    assert {"Tracking", "Hold on the wall", "Safety", "Timing"} <= set(titles)
+    assert len([line for line in out if "no odometry" in line]) == 2
+    assert out[-4] == "It stopped for safety (1 stop)."
+    assert out[-3] == str(tmp_path / "out" / "report.html")
 
 
 def test_comparing_one_bag_is_refused(bags, run):

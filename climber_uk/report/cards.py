@@ -1,0 +1,113 @@
+"""A run at a glance: five cards, a verdict in a sentence, and what the nodes reported."""
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from climber_uk.bags.events import ERROR, OK, WARNING
+from climber_uk.mechanics.adhesion import Alarm
+from climber_uk.report.tables import Column
+
+WIDTH = 98  # of lines in a terminal
+FEW = 8  # events in a terminal
+STOPS = {0.0: "no stop", 1.0: "1 stop"}
+MARKS = {OK: " ", WARNING: "!", ERROR: "✗"}
+
+
+class Card(NamedTuple):
+    """What matters of one side of a run."""
+
+    title: str
+    main: str
+    note: str
+    level: int
+
+
+def cards(column: Column) -> list[Card]:
+    """Cards of a run, without those of which nothing is known."""
+    return [card for metric, card in _cards(column) if math.isfinite(column.values[metric])]
+
+
+def _cards(column: Column) -> Iterator[tuple[str, Card]]:
+    """Each with the metric without which there is none."""
+    values, shown = column.values, column.shown
+    is_settled = math.isfinite(values["settling_time"])
+    settled = f"settled after {shown('settling_time')}" if is_settled else "not settled"
+    by_odometry = f"{shown('rms_distance')} RMS", f"at most {shown('max_distance')}"
+    main, note = by_odometry
+    if math.isfinite(values["truth_rms_distance"]):
+        main = f"{shown('truth_rms_distance')} RMS, truly"
+        note = f"at most {shown('truth_max_distance')}; by the odometry {', '.join(by_odometry)}"
+    level = OK if is_settled else WARNING
+    yield "rms_distance", Card("Tracking", main, f"{note}; {settled}", level)
+    saturated = values["saturation"] > 0
+    note = f"saturated {shown('saturation')} of the time; {shown('energy_per_metre')}"
+    level = WARNING if saturated else OK
+    yield "peak_torque", Card("Motors", f"{shown('peak_torque')} peak", note, level)
+    note = (
+        f"{shown('lowest_tip_margin')} tip margin; below 1 it slips, it tips: it slipped "
+        f"{shown('slip_share')} of the time"
+    )
+    main, level = f"{shown('lowest_slip_margin')} slip margin", _hold(column)
+    yield "lowest_slip_margin", Card("Hold on the wall", main, note, level)
+    stops, errors = values["safety_stops"], values["errors"]
+    main = STOPS.get(stops, f"{shown('safety_stops')} stops")
+    note = f"followed {shown('following')} of the time; {shown('errors')} errors of nodes"
+    level = ERROR if stops > 0 or errors > 0 else OK
+    yield "safety_stops", Card("Safety", main, note, level)
+    lost = values["odometry_lost"] + values["odometry_unfit"]
+    note = f"99 %: {shown('latency_p99')}; {lost:.0f} odometry messages lost or unfit"
+    level = WARNING if lost > 0 else OK
+    yield "latency_p50", Card("Timing", f"{shown('latency_p50')} latency", note, level)
+
+
+def _hold(column: Column) -> int:
+    """Level of the margins."""
+    values = column.values
+    lowest = min(values["lowest_slip_margin"], values["lowest_tip_margin"])
+    return max(Alarm().level(lowest), WARNING if values["slip_share"] > 0 else OK)
+
+
+def verdict(column: Column) -> str:
+    """What became of a run, in a sentence."""
+    values, shown = column.values, column.shown
+    of = "truth_" if math.isfinite(values["truth_max_distance"]) else ""
+    far = f"at most {shown(f'{of}max_distance')} off"
+    stops = values["safety_stops"]
+    if stops > 0:
+        said = f"It stopped for safety ({STOPS.get(stops, f'{stops:.0f} stops')})"
+    elif values["following"] == 0:
+        said = "It did not follow its reference"
+    elif math.isfinite(values["settling_time"]):
+        said = f"It followed its path, {far}"
+    else:
+        said = f"It did not settle on its path, {far}"
+    if values["lowest_tip_margin"] < 1:
+        return f"{said}; on a real wall it would tip over: more suction, or less weight."
+    if values["lowest_slip_margin"] < 1:
+        return f"{said}; on a real wall its wheels would slip: more suction, or slower."
+    return f"{said}."
+
+
+def text(columns: Sequence[Column]) -> str:
+    """Cards, verdict and events of runs as lines for a terminal."""
+    return "\n\n".join("\n".join(_lines(column, len(columns) > 1)) for column in columns)
+
+
+def _lines(column: Column, is_named: bool) -> Iterator[str]:
+    if is_named:
+        yield column.label
+    for title, main, note, level in cards(column):
+        indented = textwrap.wrap(note, WIDTH - 44) or [""]
+        yield f"{MARKS[level]} {title:<18}{main:<24}{indented[0]}".rstrip()
+        yield from (" " * 44 + line for line in indented[1:])
+    reported = [(time, event) for time, event in column.case.run.events if event.level > OK]
+    for time, event in reported[:FEW]:
+        where = f"{MARKS[event.level]} {time:8.3f} s  "
+        yield from textwrap.wrap(
+            f"{event.node}: {event.text}", WIDTH, initial_indent=where, subsequent_indent=" " * 14
+        )
+    if len(reported) > FEW:
+        yield f"  and {len(reported) - FEW} more: see the page"
+    yield verdict(column)
