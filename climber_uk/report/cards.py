@@ -5,12 +5,12 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from climber_uk.bags.events import ERROR, OK, WARNING
+from climber_uk.bags.events import ERROR, OK, WARNING, Event
 from climber_uk.mechanics.adhesion import Alarm
 from climber_uk.report.tables import Column
 
 WIDTH = 98  # of lines in a terminal
-FEW = 8  # events in a terminal
+FEW = 8  # different things that nodes reported, in a terminal
 STOPS = {0.0: "no stop", 1.0: "1 stop"}
 MARKS = {OK: " ", WARNING: "!", ERROR: "✗"}
 
@@ -102,12 +102,17 @@ def _lines(column: Column, is_named: bool) -> Iterator[str]:
         indented = textwrap.wrap(note, WIDTH - 44) or [""]
         yield f"{MARKS[level]} {title:<18}{main:<24}{indented[0]}".rstrip()
         yield from (" " * 44 + line for line in indented[1:])
-    reported = [(time, event) for time, event in column.case.run.events if event.level > OK]
-    for time, event in reported[:FEW]:
+    reported: dict[tuple[str, str], list[tuple[float, Event]]] = {}
+    for time, event in column.case.run.events:
+        if event.level > OK:
+            what = event.text if event.kind == "log" else event.kind
+            reported.setdefault((event.node, what), []).append((time, event))
+    for events in list(reported.values())[:FEW]:
+        time, event = max(events, key=lambda timed: timed[1].level)  # the first of the worst
+        more = f" (and {len(events) - 1} more)" if len(events) > 1 else ""
         where = f"{MARKS[event.level]} {time:8.3f} s  "
-        yield from textwrap.wrap(
-            f"{event.node}: {event.text}", WIDTH, initial_indent=where, subsequent_indent=" " * 14
-        )
+        said = f"{event.node}: {event.text}{more}"
+        yield from textwrap.wrap(said, WIDTH, initial_indent=where, subsequent_indent=" " * 14)
     if len(reported) > FEW:
         yield f"  and {len(reported) - FEW} more: see the page"
     yield verdict(column)
