@@ -37,6 +37,7 @@ class PlantSimulator(ClimberNode):
     def __init__(self, namespace: str = "", time: PlantTime | None = None) -> None:
         super().__init__(PLANT, namespace)
         plant_parts.declare(self.parameters)
+        self.be_exclusive()
         self.parameters.refuse_unknown("the paper's climber, at rest")
         self.options = self.parameters.read(SimulationOptions)
         self.margins = Margins(self, self.parameters.read(Alarm))
@@ -133,6 +134,8 @@ class PlantSimulator(ClimberNode):
         try:
             fields = reading.JointFields(*self.read_torques(serialized))
             stamp = fields.stamp
+            if self.exclusive:
+                self.check_alone(TORQUES)
             wheels = names.left_wheel_joint, names.right_wheel_joint
             what = "velocities" if self.take_speeds else "efforts"
             told = reading.wheel_torques(fields, *wheels, what)

@@ -77,6 +77,7 @@ class UkTorqueController(ManagedNode):
         parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
         for kind, prefix in [*KINDS, (NodeOptions, ""), (Grip, ""), (Alarm, ""), *parts]:
             self.parameters.declare(kind, prefix)
+        self.be_exclusive()
         self.parameters.refuse_unknown("the paper's scenario, up to 20 N m a wheel")
         self.options = self.parameters.read(NodeOptions)
         self.margins = Margins(self, self.parameters.read(Alarm))
@@ -173,6 +174,8 @@ class UkTorqueController(ManagedNode):
     def on_odometry(self, serialized: bytes) -> None:
         """Answer an odometry with torques, or a bad one with the safe output."""
         try:
+            if self.exclusive:
+                self.check_alone(ODOMETRY)
             fields = reading.OdometryFields(*self.read_odometry(serialized))
             motion = reading.motion_of(fields, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
@@ -183,6 +186,8 @@ class UkTorqueController(ManagedNode):
     def on_reference(self, serialized: bytes) -> None:
         """Check and keep a reference; answer an odometry that waits for it."""
         try:
+            if self.exclusive:
+                self.check_alone(REFERENCE)
             if len(serialized) > LARGEST_REFERENCE:
                 raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
             preview = self.read_reference(serialized, self.names.odom_frame)

@@ -30,6 +30,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.messages.names import Names
 from climber_uk.messages.topics import DIAGNOSTICS
+from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.parameters import QOS, NodeParameters
 from climber_uk.ros.transport import use_udp
@@ -50,6 +51,18 @@ EPILOG = (
 )
 ROS_OPTIONS = {"--params-file", "-p", "--param", "-r", "--remap"}
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@parameters
+class Sharing:
+    """Whether others may publish what a node obeys."""
+
+    exclusive: bool = parameter(
+        False,
+        "",
+        "refuse what comes on a topic that this node obeys while it has more publishers than one; "
+        "one that was killed counts for some 20 s more",
+    )
 
 
 class Ration:
@@ -99,6 +112,7 @@ class ClimberNode(Node):
         self._troubles: dict[str, tuple[str, bool]] = {}
         self._lines: dict[str, Ration] = {}  # that are logged on each subject
         self._alone_on: Sequence[str] = ()
+        self.exclusive = False  # whether what it obeys has to come from one publisher
         self._values: Callable[[], Mapping[str, object]] = dict
         self._diagnostics: Publisher | None = None
 
@@ -108,6 +122,19 @@ class ClimberNode(Node):
     def summary(self) -> str:
         """What this node does, in a few numbers, for the log."""
         return ""
+
+    def be_exclusive(self) -> None:
+        """Declare and read the parameter `exclusive`."""
+        self.parameters.declare(Sharing)
+        self.exclusive = self.parameters.read(Sharing).exclusive
+
+    def check_alone(self, topic: str) -> None:
+        """Raise `ValueError` if a topic has more publishers than one.
+
+        The graph knows of a publisher before its first message comes.
+        """
+        if self.count_publishers(topic) > 1:
+            raise ValueError(f"exclusive is set, and {topic} has more publishers than one")
 
     def introduce(self) -> None:
         """Log in a line where the parameters are from, and the summary; warn of doubtful ones."""

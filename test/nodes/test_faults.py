@@ -271,6 +271,32 @@ def test_a_flood_of_other_torques_is_survived_and_reported_once(world):
         assert said(world, name, WHOSE) == [CROWDED, "ok again"]
 
 
+def test_a_second_publisher_gets_nothing_done_where_the_first_is_to_be_the_only_one(world):
+    theirs = -3.9, 3.9  # [N m] left, right
+    exclusive = {name: [*given, "exclusive:=true"] for name, given in WALL_CLOCK.items()}
+    climb = Climb(world, {**exclusive, PLANNER: WALL_CLOCK[PLANNER]})
+    climb.is_under_way()
+    flood = world.speak(JointState, "wheel_torques")
+    names, begin = climb.torques[-1].name, len(climb.joints)
+
+    def is_told():
+        flood.publish(JointState(name=names, effort=theirs))
+        return len(climb.joints) > begin + 200 and said(world, PLANT, "wheel_torques")
+
+    world.wait(is_told, "word of it")
+    world.node.destroy_publisher(flood)
+    obeyed = [tuple(m.effort) for m in climb.joints[begin:]]
+    assert obeyed.count(theirs) <= 1
+    assert obeyed.count((0.0, 0.0)) > 100
+    assert said(world, PLANT, "wheel_torques")[0].startswith("refused, zero torque instead")
+    climb.is_on_path()
+    odometry = world.speak(Odometry, "odom")
+    refused = "bad odometry (exclusive is set, and odom has more publishers than one)"
+    climb.is_told(CONTROLLER, refused)
+    world.node.destroy_publisher(odometry)
+    climb.is_on_path()
+
+
 def test_simulated_time_without_a_clock_gets_the_safe_output_until_there_is_one(world):
     world.start_node(CONTROLLER, *LOCK_STEP[CONTROLLER], config="climber.yaml")
     torques = world.listen(JointState, "wheel_torques")
