@@ -18,6 +18,7 @@ from climber_uk.messages import reading
 pytestmark = pytest.mark.nodes
 
 CONTROLLER, PLANT, PLANNER = "uk_torque_controller", "plant_simulator", "trajectory_publisher"
+SHARED = "exclusive is set, and {} has more publishers than one"
 CROWDED, WHOSE = "more than one", "publishers of wheel_torques"
 LIMIT = 4.0  # [N m] of the configuration
 ON_PATH = 0.02  # [m]
@@ -275,7 +276,7 @@ def test_a_second_publisher_gets_nothing_done_where_the_first_is_to_be_the_only_
     theirs = -3.9, 3.9  # [N m] left, right
     exclusive = {name: [*given, "exclusive:=true"] for name, given in WALL_CLOCK.items()}
     climb = Climb(world, {**exclusive, PLANNER: WALL_CLOCK[PLANNER]})
-    climb.is_under_way()
+    world.wait(lambda: climb.is_moving() and climb.torques, "motion")
     flood = world.speak(JointState, "wheel_torques")
     names, begin = climb.torques[-1].name, len(climb.joints)
 
@@ -288,13 +289,12 @@ def test_a_second_publisher_gets_nothing_done_where_the_first_is_to_be_the_only_
     obeyed = [tuple(m.effort) for m in climb.joints[begin:]]
     assert obeyed.count(theirs) <= 1
     assert obeyed.count((0.0, 0.0)) > 100
-    assert said(world, PLANT, "wheel_torques")[0].startswith("refused, zero torque instead")
-    climb.is_on_path()
+    refused = "refused, zero torque instead ({})".format(SHARED.format("wheel_torques"))
+    climb.recovers(PLANT, refused, "wheel_torques")
     odometry = world.speak(Odometry, "odom")
-    refused = "bad odometry (exclusive is set, and odom has more publishers than one)"
-    climb.is_told(CONTROLLER, refused)
+    climb.is_told(CONTROLLER, refused := "bad odometry ({})".format(SHARED.format("odom")))
     world.node.destroy_publisher(odometry)
-    climb.is_on_path()
+    climb.recovers(CONTROLLER, refused)
 
 
 def test_simulated_time_without_a_clock_gets_the_safe_output_until_there_is_one(world):
