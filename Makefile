@@ -52,11 +52,12 @@ $(VENV)/bench: $(TOOLS) bench/requirements.txt
 ## all that CI runs: lint, unit, colcon
 test: lint unit colcon
 
-## ruff and mypy
+## ruff, mypy and the spelling
 lint: $(TOOLS)
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
+	$(BIN)/codespell *.md docs climber_uk config examples launch bench test
 
 # Four processes for two cores, as tests of nodes often wait; each has a ROS domain for each test.
 # They begin with a quarter of the tests each, in their order; one that is ready helps another.
