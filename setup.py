@@ -54,6 +54,7 @@ setup(
                 "compare_bags": "report.compare_bags",
                 "identify": "identification.identify",
                 "replay_controller": "replay.replay_controller",
+                "animate_bag": "report.animate_bag",
                 "export_tum": "report.export_tum",
                 "reproduce_paper": "paper.reproduce_paper",
                 "campaign": "campaign.command",
