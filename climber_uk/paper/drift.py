@@ -1,4 +1,4 @@
-"""Drift off the path in 1000 s of integration: (26), (30), Baumgarte and projection.
+"""Drift off the path in 1000 s: (26), (30), Baumgarte, Braun and Goldfarb, and projection.
 
 The rows are those of `ConsistentSystem`. They determine q̈ whatever M and Q are, here in closed
 form and on floats, which is a hundred times faster than the general solution that it equals.
@@ -103,6 +103,30 @@ def corrected_to(projection: Projection) -> Derivative:
     return derivative
 
 
+def embedded(rate: float) -> Derivative:
+    """(30) with what Braun and Goldfarb embed: violations are taken off at `rate` [1/s].
+
+    A virtual impulse brings the position back, a virtual force the integrated v; theirs are as
+    strong as one step undoes, 1/h.
+    """
+    a, b = SEMI_AXES
+
+    def derivative(
+        S: float, C: float, x: float, y: float, heading: float, x_1: float, y_1: float, omega: float
+    ) -> Floats:
+        velocity = path_velocity(S, C, heading)
+        acceleration = uncorrected(S, C, x, y, heading, *velocity)[3:]
+        forces = zip(acceleration, velocity, (x_1, y_1, omega), strict=True)
+        return (
+            velocity[0] + rate * (a * S - x),
+            velocity[1] + rate * (b * C - y),
+            velocity[2],
+            *(of + rate * (must_be - is_now) for of, must_be, is_now in forces),
+        )
+
+    return derivative
+
+
 def corrected_literally(
     S: float, C: float, x: float, y: float, heading: float, x_1: float, y_1: float, omega: float
 ) -> Floats:
@@ -118,11 +142,13 @@ METHODS: dict[str, tuple[Derivative, bool]] = {
     "uncorrected (26)": (uncorrected, False),
     "corrected (30)": (corrected_to(path_velocity), False),
     "Baumgarte": (stabilised(5.0, 10.0), False),
+    "Braun & Goldfarb": (embedded(100.0), False),
     "position projection": (uncorrected, True),
     "(30), rows at v": (corrected_literally, False),
     "(30), forward and no-slip rows": (corrected_to(forward_velocity), False),
 }
-COMPARED = tuple(METHODS)[:4]
+COMPARED = tuple(METHODS)[:5]
+WITHOUT_PROJECTION = COMPARED[:4]
 
 
 def runge_kutta(method: str, step: float, duration: float, start: Array = START) -> Drift:

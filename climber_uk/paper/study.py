@@ -121,10 +121,10 @@ def drifts(extent: StudyExtent) -> Jobs:
         for method in drift.COMPARED:
             todo["step", method, step] = drift.runge_kutta, (method, step, extent.drift_time)
     for tolerance in extent.drift_tolerances:
-        for method in drift.COMPARED[:3]:
+        for method in drift.WITHOUT_PROJECTION:
             long = method, tolerance, extent.drift_time
             todo["tolerance", method, tolerance] = drift.dormand_prince, long
-    for method in list(drift.METHODS)[4:]:
+    for method in list(drift.METHODS)[len(drift.COMPARED) :]:
         coarsest = max(extent.drift_steps)
         long = method, coarsest, extent.drift_time
         todo["variant", method, coarsest] = drift.runge_kutta, long

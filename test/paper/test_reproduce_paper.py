@@ -212,8 +212,21 @@ def test_an_error_at_the_start_stays_under_30_and_goes_away_when_stabilised():
     runs = {m: drift.runge_kutta(m, 0.005, 20.0, start) for m in drift.COMPARED}
     assert runs["corrected (30)"].error[-1] == pytest.approx(0.1, abs=1e-6)
     assert runs["Baumgarte"].error[-1] < 1e-6
+    assert runs["Braun & Goldfarb"].error[-1] < 1e-6
     assert runs["position projection"].error[-1] < 1e-6
     assert runs["uncorrected (26)"].error[-1] > 1
+
+
+def test_embedded_corrections_are_none_on_the_path_and_take_violations_off_at_their_rate():
+    closed, rate = drift.embedded(10.0), 10.0
+    corrected = drift.METHODS["corrected (30)"][0]
+    for time, y in zip(*near_the_path(20, 0.05), strict=True):
+        S, C = np.sin(time), np.cos(time)
+        on = np.array(drift.projected(S, C, y[2]))
+        np.testing.assert_allclose(closed(S, C, *on), corrected(S, C, *on), atol=1e-9)
+        off = np.subtract(y, on)
+        more = np.subtract(closed(S, C, *y.tolist()), corrected(S, C, *y.tolist()))
+        np.testing.assert_allclose(more, -rate * off * [1, 1, 0, 1, 1, 1], atol=1e-9)
 
 
 def test_a_tighter_tolerance_drifts_less():
@@ -257,8 +270,8 @@ def test_without_rclpy_the_nodes_are_skipped_with_a_reason(monkeypatch):
 def test_every_job_of_the_full_extent_has_a_key_of_its_own_and_is_complete():
     full = study.jobs(study.FULL)
     kinds = [key[0] for key in full]
-    assert kinds.count("tolerance") == 30
-    assert kinds.count("step") == 12
+    assert kinds.count("tolerance") == 40
+    assert kinds.count("step") == 15
     assert ("nodes",) in full
     quick = dataclasses.replace(study.FULL, nodes=False)
     assert ("nodes",) not in study.jobs(quick)
