@@ -42,7 +42,10 @@ def _cards(column: Column) -> Iterator[tuple[str, Card]]:
     level = OK if is_settled else WARNING
     yield "rms_distance", Card("Tracking", main, f"{note}; {settled}", level)
     saturated = values["saturation"] > 0
-    note = f"saturated {shown('saturation')} of the time; {shown('energy_per_metre')}"
+    note = (
+        f"saturated {shown('saturation')} of the time; {shown('energy_per_metre')}; changes by "
+        f"{shown('rms_torque_change')} a period"
+    )
     level = WARNING if saturated else OK
     yield "peak_torque", Card("Motors", f"{shown('peak_torque')} peak", note, level)
     note = (

@@ -57,9 +57,10 @@ def _losses(column: Column) -> str:
     return f'<div class="losses"><h3>To know of {escape(column.bag)}</h3><ul>{items}</ul></div>'
 
 
-def _figure(name: str, image: bytes) -> str:
-    data = b64encode(image).decode()
-    return f'<img alt="{name}" src="data:image/png;base64,{data}">'
+def _figure(name: str, png: bytes) -> str:
+    data = b64encode(png).decode()
+    image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
+    return f'<label class="figure"><input type="checkbox">{image}</label>'
 
 
 def _events(column: Column) -> str:
@@ -71,7 +72,7 @@ def _events(column: Column) -> str:
     )
     more = f"<p>{len(reported) - MOST_EVENTS} more are in the JSON file.</p>"
     return (
-        f"<h3>{escape(column.label)}</h3><table>{rows}</table>"
+        f'<h3>{escape(column.label)}</h3><div class="wide"><table>{rows}</table></div>'
         f"{more if len(reported) > MOST_EVENTS else ''}"
         if reported
         else ""
@@ -95,4 +96,4 @@ def _table(columns: Sequence[Column]) -> str:
                 f"<tr><td><code>{row.metric.name}</code><small>{meaning}</small></td>"
                 f"{numbers}<td>{row.unit}</td>{ratios}</tr>"
             )
-    return f"<table>{''.join(parts)}</table>"
+    return f'<div class="wide"><table>{"".join(parts)}</table></div>'

@@ -62,7 +62,7 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
-        if tag not in ("meta", "img", "br"):
+        if tag not in ("meta", "img", "br", "input"):
             self.open.append(tag)
         self.images += tag == "img"
         self.fetched += [v for k, v in attributes if k in ("src", "href") and v[:5] != "data:"]
