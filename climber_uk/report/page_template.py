@@ -49,7 +49,7 @@ tr.ok td:first-child { border-left: 4px solid #2a9d4a; }
 @media (max-width: 600px) {
   body { margin: 1em auto; padding: 0 0.6em; font-size: 14px; }
   td, th { padding: 3px 4px; }
-  td { overflow-wrap: anywhere; }
+  td { overflow-wrap: break-word; }
 }
 </style>
 </head>
