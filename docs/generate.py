@@ -19,6 +19,7 @@ from climber_uk.nodes.plant_simulator import PlantSimulator
 from climber_uk.nodes.trajectory_publisher import TrajectoryPublisher
 from climber_uk.nodes.uk_torque_controller import UkTorqueController
 from climber_uk.nodes.wall_odometry import WallOdometry
+from climber_uk.parameters.declaration import bounds
 from climber_uk.report.metrics import GROUPS
 from climber_uk.ros.running import ClimberNode
 
@@ -126,16 +127,14 @@ def first_sentence(kind: type) -> str:
 def row(prefix: str, field: "dataclasses.Field[Any]") -> str:
     """Line of the table for a field."""
     rule = field.metadata
-    bounds = [f"> {rule['above']:g}"] if rule["above"] is not None else []
-    bounds += [f"≥ {rule['at_least']:g}"] if rule["at_least"] is not None else []
-    bounds += [f"≤ {rule['at_most']:g}"] if rule["at_most"] is not None else []
-    bounds += [f"`{choice}`" for choice in rule["choices"] or ()]
+    values = [bound.replace(">=", "≥").replace("<=", "≤") for bound in bounds(rule)]
+    values += [f"`{choice}`" for choice in rule["choices"] or ()]
     default = str(field.default).lower() if isinstance(field.default, bool) else field.default
     cells = (
         f"`{prefix}{field.name}`",
         f"`{default}`" if default != "" else "",
         rule["unit"],
-        ", ".join(bounds),
+        ", ".join(values),
         "yes" if rule["runtime"] else "",
         rule["description"],
     )

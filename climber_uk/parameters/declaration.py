@@ -91,6 +91,12 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
         _check_number(rule, f"{field.name}={number!r} must be", number, unit)
 
 
+def bounds(rule: Mapping[str, Any]) -> list[str]:
+    """Bounds of a `parameter`, in words."""
+    signs = {"above": ">", "at_least": ">=", "at_most": "<="}
+    return [f"{sign} {rule[name]:g}" for name, sign in signs.items() if rule[name] is not None]
+
+
 def _check_number(rule: Mapping[str, Any], said: str, value: Any, unit: str) -> None:
     if isinstance(value, bool) or not (isinstance(value, Real) and math.isfinite(value)):
         raise ValueError(f"{said} a finite number{unit}")

@@ -15,7 +15,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from climber_uk.parameters.declaration import check_value
+from climber_uk.parameters.declaration import bounds, check_value
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.parameters.plausibility import doubt
@@ -73,7 +73,7 @@ class NodeParameters:
                 if (given := self._given(name, prefix, field)) is not None:
                     check_value(field, given)
                     self.remarks += [prefix + said for said in [doubt(field, given)] if said]
-                self._node.declare_parameter(name, field.default, _descriptor(field))
+                self._node.declare_parameter(name, field.default, descriptor(field))
             except ValueError as error:
                 raise ValueError(f"{prefix}{error}") from None
             except ParameterException:
@@ -179,24 +179,22 @@ def _as_float(given: Parameter, field: Field) -> Parameter:
     return given
 
 
-def _descriptor(field: Field) -> ParameterDescriptor:
+def descriptor(field: Field) -> ParameterDescriptor:
     """Descriptor with what `parameter` says of a field: description, unit, bounds, choices."""
     rule = field.metadata
     unit = f" [{rule['unit']}]" if rule["unit"] else ""
-    descriptor = ParameterDescriptor(
+    choices = [f"one of {', '.join(rule['choices'])}"] if rule["choices"] else []
+    told = ParameterDescriptor(
         description=rule["description"] + unit,
         read_only=not rule["runtime"],
-        additional_constraints=f"one of {', '.join(rule['choices'])}" if rule["choices"] else "",
+        additional_constraints=" and ".join(choices + bounds(rule)),
     )
-    lowest = rule["at_least"] if rule["above"] is None else rule["above"]
-    if lowest is None and rule["at_most"] is None:
-        return descriptor
+    lowest, highest = rule["at_least"], rule["at_most"]
+    if lowest is None or highest is None:
+        return told  # a range has two ends, both of them within
     if isinstance(field.default, int):
-        highest = 2**31 - 1 if rule["at_most"] is None else rule["at_most"]
-        descriptor.integer_range = [IntegerRange(from_value=int(lowest), to_value=int(highest))]
+        told.integer_range = [IntegerRange(from_value=int(lowest), to_value=int(highest))]
     else:
-        most = sys.float_info.max
-        least = -most if lowest is None else float(lowest)
-        most = most if rule["at_most"] is None else float(rule["at_most"])
-        descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=most)]
-    return descriptor
+        ends = FloatingPointRange(from_value=float(lowest), to_value=float(highest))
+        told.floating_point_range = [ends]
+    return told

@@ -1,0 +1,45 @@
+"""What `ros2 param describe` tells of a parameter."""
+
+import dataclasses
+
+import pytest
+
+from climber_uk.parameters.declaration import check_value, parameter, parameters
+from climber_uk.ros.parameters import descriptor
+
+
+@parameters
+class Several:
+    """Bounds of all kinds."""
+
+    open: float = parameter(1.0, "m", "more than none", above=0)
+    half: float = parameter(1.0, "m", "none, or more", at_least=0)
+    share: float = parameter(0.5, "", "of all", above=0, at_most=1)
+    closed: float = parameter(0.5, "rad", "between", at_least=-1, at_most=1, runtime=True)
+    count: int = parameter(3, "", "of them", at_least=1, at_most=9)
+    free: float = parameter(0.0, "m", "anywhere")
+    kind: str = parameter("a", "", "of it", choices=("a", "b"))
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "ends"),
+    [
+        ("open", "> 0", None),
+        ("half", ">= 0", None),
+        ("share", "> 0 and <= 1", None),
+        ("closed", ">= -1 and <= 1", (-1.0, 1.0)),
+        ("count", ">= 1 and <= 9", (1, 9)),
+        ("free", "", None),
+        ("kind", "one of a, b", None),
+    ],
+)
+def test_bounds_are_told_in_words_and_as_a_range_only_where_both_ends_are_taken(name, words, ends):
+    field = next(field for field in dataclasses.fields(Several) if field.name == name)
+    told = descriptor(field)
+    assert told.additional_constraints == words
+    ranges = [*told.floating_point_range, *told.integer_range]
+    assert [(each.from_value, each.to_value) for each in ranges] == ([ends] if ends else [])
+    for end in ends or ():
+        check_value(field, end)
+    assert told.read_only == (name != "closed")
+    assert told.description.startswith(field.metadata["description"])
