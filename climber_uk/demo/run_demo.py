@@ -5,6 +5,7 @@ They run on this computer, in a ROS domain of their own unless ROS_DOMAIN_ID is 
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -25,10 +26,10 @@ from climber_uk.messages import reading
 from climber_uk.messages.topics import (
     CONTROLLER,
     DIAGNOSTICS,
-    FORCE,
     JOINTS,
     LOCALIZATION,
     NODES,
+    PARAMETERS,
     PLANNER,
     PLANT,
     REFERENCE_PATH,
@@ -41,8 +42,10 @@ from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
-# One topic of each node that only the recorder subscribes, once it has discovered the node
-RECORDED = REFERENCE_PATH, FORCE, JOINTS
+# One topic of each node that is published before the trajectory starts. The first two are latched:
+# the recorder subscribes them last, so what comes after their message is not lost.
+RECORDED = REFERENCE_PATH, PARAMETERS, JOINTS
+COUNT = re.compile(r"^ +name: (\S+)$.*?^ +message_count: (\d+)$", re.MULTILINE | re.DOTALL)
 FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
 START_TIMEOUT = 60.0  # [s]
@@ -97,12 +100,11 @@ class Demo(ClimberNode):
             if FELL in status.message:
                 self.fall = status.message
 
-    def recorder_has_found_all(self) -> bool:
-        """Whether the recorder subscribes every node, and the services to start are there."""
-        topics = [f"{climber}/{topic}" for climber in self.climbers for topic in RECORDED]
-        return all(starter.service_is_ready() for starter in self.starters) and all(
-            self.count_publishers(topic) and self.count_subscribers(topic) for topic in topics
-        )
+    def records_all(self, bag: Path) -> bool:
+        """Whether messages of every node are recorded, and the services to start are there."""
+        wanted = {f"{climber}/{topic}" for climber in self.climbers for topic in RECORDED}
+        ready = all(starter.service_is_ready() for starter in self.starters)
+        return ready and wanted <= recorded_topics(bag)
 
     def wait(self, condition: Callable[[], bool], what: str) -> None:
         """Spin until `condition()`.
@@ -120,9 +122,9 @@ class Demo(ClimberNode):
             if time.monotonic() > until:
                 raise RuntimeError(f"waited {START_TIMEOUT:.0f} s in vain for {what}")
 
-    def start(self, simulated: bool) -> None:
-        """Start every trajectory, once all nodes are connected; raises as `wait` does."""
-        self.wait(self.recorder_has_found_all, "the recorder to find the nodes")
+    def start(self, simulated: bool, bag: Path) -> None:
+        """Start every trajectory, once all nodes are recorded; raises as `wait` does."""
+        self.wait(lambda: self.records_all(bag), "the recorder to find the nodes")
         for climber in [] if simulated else self.climbers:  # in lock-step none answers before
             answered: list[JointState] = []
             topic = f"{climber}/wheel_torques"
@@ -187,6 +189,13 @@ def running(
 def patience(signals: Sequence[int], hurried: float) -> float:
     """Time [s] for processes to end: `hurried` if more than one signal has come."""
     return hurried if len(signals) > 1 else STOP_TIMEOUT
+
+
+def recorded_topics(bag: Path) -> set[str]:
+    """Topics of which a bag that is being written has messages, by its metadata.yaml."""
+    metadata = bag / "metadata.yaml"
+    counts = COUNT.findall(metadata.read_text()) if metadata.is_file() else []
+    return {name for name, count in counts if int(count)}
 
 
 def log_of(name: str, logs: Path) -> Path:
@@ -289,7 +298,7 @@ def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequen
         demo = Demo(climbers, signals, arguments)
         with running(commands, options.output, signals) as demo.processes:
             print(f"{options.config} in ROS domain {os.environ['ROS_DOMAIN_ID']}")
-            demo.start(simulated)
+            demo.start(simulated, bag)
             demo.run()
     except Interrupted:
         said = "interrupted"

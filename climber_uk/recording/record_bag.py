@@ -43,6 +43,7 @@ DISCOVERY_PERIOD = 0.2  # [s]
 TAKE_PERIOD = 0.01  # [s]
 GRACE = 0.1  # [s] after a stop, for messages on their way
 REPAIR = 3.5  # [s] in which lost messages are sent again: Fast DDS offers them every 3 s
+LATCHED = DurabilityPolicy.TRANSIENT_LOCAL
 A_FEW = 5  # messages of a topic that is not published all the time
 RCLPY = {"3": "humble", "4": "iron", "7": "jazzy", "9": "kilted"}  # distributions by its version
 
@@ -101,10 +102,13 @@ class BagRecorder(Node):
         self.report_losses()
 
     def discover(self) -> None:
-        """Subscribe new topics, and adapt the subscriptions to their publishers' offers."""
-        for name, types in self.get_topic_names_and_types():
-            if not self.is_wanted(name):
-                continue
+        """Subscribe new topics, and adapt the subscriptions to their publishers' offers.
+
+        Of a node's topics the latched ones come last: each node learns of subscriptions in their
+        order, so that one that has sent its latched message has heard of all others.
+        """
+        found = [topic for topic in self.get_topic_names_and_types() if self.is_wanted(topic[0])]
+        for name, types in sorted(found, key=self.is_new_and_latched):
             if name not in self.bag:  # else its type is settled
                 self.choose_type(name, types)
             if name in self.recorded:
@@ -112,6 +116,11 @@ class BagRecorder(Node):
                 if offers := self.offers(name, self.recorded[name].type_name):
                     self.introduce(name)
                     self.adapt(name, offers)
+
+    def is_new_and_latched(self, topic: tuple[str, list[str]]) -> bool:
+        """Whether a topic, given with its types, is latched and not subscribed yet."""
+        ends = [] if topic[0] in self.recorded else self.get_publishers_info_by_topic(topic[0])
+        return any(end.qos_profile.durability == LATCHED for end in ends)
 
     def is_wanted(self, name: str) -> bool:
         """Whether to record a topic: one of `--topics`, or without these any that is not hidden."""

@@ -18,7 +18,7 @@ from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
 from climber_uk.messages import topics
 from climber_uk.report.grip import draw_grip, grip_asked
-from climber_uk.report.plotting import plt
+from climber_uk.report.plotting import plt, write_png
 
 Curves = tuple[Array, Array]  # times (n,) [s] and values (n, k)
 WIDTH = 9.0  # [in]
@@ -62,8 +62,7 @@ def _figures(runs: Runs) -> Iterable[tuple[str, Figure]]:
 
 def _png(figure: Figure) -> bytes:
     stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=110)
-    plt.close(figure)
+    write_png(figure, stream, dpi=110)
     return stream.getvalue()
 
 

@@ -70,13 +70,11 @@ class Ration:
 
     def __init__(self, number: int, period: float) -> None:
         self.period, self.times = period, deque([-math.inf] * number)
-        self.refused = 0  # since the last one that was allowed
 
     def __call__(self) -> bool:
         """Whether one more is allowed now."""
         now = WALL_CLOCK.now().nanoseconds / SECOND
         if now - self.times[0] < self.period:
-            self.refused += 1
             return False
         self.times.popleft()
         self.times.append(now)
@@ -111,6 +109,7 @@ class ClimberNode(Node):
         self.names = self.parameters.read(Names).within(self.get_namespace())
         self._troubles: dict[str, tuple[str, bool]] = {}
         self._lines: dict[str, Ration] = {}  # that are logged on each subject
+        self._unlogged: dict[str, tuple[str, int]] = {}  # detail, and how many came before it
         self._alone_on: Sequence[str] = ()
         self.exclusive = False  # whether what it obeys has to come from one publisher
         self._values: Callable[[], Mapping[str, object]] = dict
@@ -176,16 +175,21 @@ class ClimberNode(Node):
         """Log a trouble of a subject, or that it is over (''), when it changes.
 
         In diagnostics it is an error if `is_fault`, else a warning. Of troubles that come and go
-        faster than `LINES` in `LINES_PERIOD`, most are only counted.
+        faster than `LINES` in `LINES_PERIOD`, most are only counted; the last one is logged later.
         """
         if trouble == self._troubles.get(subject, ("", True))[0]:
             return
         self._troubles[subject] = trouble, is_fault
-        ration = self._lines.setdefault(subject, Ration(LINES, LINES_PERIOD))
-        if not ration():
+        _, before = self._unlogged.get(subject, ("", -1))
+        self._unlogged[subject] = detail, before + 1
+        self._log(subject)
+
+    def _log(self, subject: str) -> None:
+        """Log how things are with a subject, unless there have been too many lines on it."""
+        if not self._lines.setdefault(subject, Ration(LINES, LINES_PERIOD))():
             return
-        more = f" [{ration.refused} changes were not logged]" if ration.refused else ""
-        ration.refused = 0
+        (detail, before), (trouble, _) = self._unlogged.pop(subject), self._troubles[subject]
+        more = f" [{before} changes were not logged]" if before else ""
         if trouble:
             self.get_logger().warning(f"{subject}: {trouble}{detail and f' ({detail})'}{more}")
         else:
@@ -204,7 +208,12 @@ class ClimberNode(Node):
         self.create_timer(1.0, self.check_publishers, clock=WALL_CLOCK)
 
     def check_publishers(self) -> None:
-        """Report topics that have more publishers than one, and publish diagnostics."""
+        """Report topics that have more publishers than one, and publish diagnostics.
+
+        Also what could not be logged when it was reported.
+        """
+        for subject in list(self._unlogged):
+            self._log(subject)
         for topic in self._alone_on:
             is_crowded = self.count_publishers(topic) > 1
             self.report(

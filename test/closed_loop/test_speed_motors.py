@@ -20,10 +20,10 @@ from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.sensors import Sensors
 
 CONFIG = Path(__file__).parents[2] / "config" / "velocity.yaml"
-SMALL = {  # a third of the lap in a third of its time
-    "lemniscate.half_width": 0.5,
-    "lemniscate.half_height": 0.25,
-    "rest_to_rest.rate": 0.36,
+SMALL = {  # a fifth of the lap in a fifth of its time
+    "lemniscate.half_width": 0.3,
+    "lemniscate.half_height": 0.15,
+    "rest_to_rest.rate": 0.6,
     "rest_to_rest.ramp_time": 1.0,
 }
 FORTH_AND_BACK = {
@@ -31,7 +31,7 @@ FORTH_AND_BACK = {
     "line.length": 0.4,
     "rest_to_rest.rate": 0.3,
     "rest_to_rest.ramp_time": 1.0,
-    "rest_to_rest.runs": 4,
+    "rest_to_rest.runs": 2,
 }
 SERVO = Values(read_file(CONFIG, "/plant_simulator")).read(Motors)
 DEAD_BAND = replace(SERVO, velocity_dead_band=0.02)
@@ -50,7 +50,7 @@ def loop(path, **parameters):
 
 
 def drive(servo, path=SMALL, link=INNER, truth=lambda it: it, **parameters):
-    """Run of 24 s, whose last 4 s are rest; and the rims' speeds (n, 2) told [m/s]."""
+    """Run of 14 s, whose last 2.5 s are rest; and the rims' speeds (n, 2) told [m/s]."""
     trajectory, start, controller = loop(path, **parameters)
     believed: Climber = controller.law.climber
     told, answers = [], controller.on_odometry
@@ -63,7 +63,7 @@ def drive(servo, path=SMALL, link=INNER, truth=lambda it: it, **parameters):
 
     controller.on_odometry = on_odometry
     link = replace(link, servo=servo)
-    run: Run = simulate(trajectory, start, 24.0, controller, truth(believed), link)
+    run: Run = simulate(trajectory, start, 14.0, controller, truth(believed), link)
     told = believed.wheel_radius * np.array(told)
     changes = ", ".join(f"{1e3 * change:.2f}" for change in hunting(told))
     print(f"RMS {1e3 * run.rms():.3f} mm, maximum {1e3 * run.distance.max():.2f} mm")

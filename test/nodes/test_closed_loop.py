@@ -3,13 +3,14 @@
 import os
 import signal
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
 from bag_contents import read_messages
 from evo.core import metrics
 from evo.tools import file_interface
-from world import CONFIG, World, executable, inhabitants
+from world import CONFIG, TIMEOUT, World, executable, inhabitants
 
 from climber_uk.bags.recorded_run import read_run
 from climber_uk.mechanics import SECOND
@@ -42,10 +43,12 @@ def is_under_way(world):
 def hold_up_the_recorder(world):
     """Stop it for a while, once the run has begun, as a busy machine may."""
     is_under_way(world)
-    (recorder,) = [number for number, said in inhabitants(world.domain) if "record_bag" in said]
-    os.kill(recorder, signal.SIGSTOP)
-    time.sleep(0.1)
-    os.kill(recorder, signal.SIGCONT)
+    recorders = [number for number, said in inhabitants(world.domain) if "record_bag" in said]
+    for recorder in recorders:  # none where all is over already
+        with suppress(ProcessLookupError):
+            os.kill(recorder, signal.SIGSTOP)
+            time.sleep(0.1)
+            os.kill(recorder, signal.SIGCONT)
 
 
 def by_stamp(bag, topic, content):
@@ -64,21 +67,22 @@ def runs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper_bags(runs):
-    """The whole, and its first 10 s again."""
+    """A lap and a bit, and its first 6 s again."""
     bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
-    for bag, how_long in zip(bags, [[], ["--duration", "10"]], strict=True):
-        demo(runs, bag.parent, "paper.yaml", *how_long)
+    for bag, duration in zip(bags, ["10", "6"], strict=True):
+        demo(runs, bag.parent, "paper.yaml", "--duration", duration)
         hold_up_the_recorder(runs)
         finished(runs)
     return bags
 
 
-SMALL = {  # a third of the size of climber.yaml's lap, in a third of its time
-    "half_width: 1.5": "half_width: 0.5",
-    "half_height: 0.75": "half_height: 0.25",
-    "rate: 0.12": "rate: 0.36",
+SMALL = {  # a fifth of the size of climber.yaml's lap, in a fifth of its time
+    "half_width: 1.5": "half_width: 0.3",
+    "half_height: 0.75": "half_height: 0.15",
+    "rate: 0.12": "rate: 0.6",
     "ramp_time: 3.0": "ramp_time: 1.0",
 }
+DURATION = 14.0  # [s] of that lap, and of rest after it
 
 
 def small_bag(runs, name, changed=SMALL):
@@ -90,7 +94,7 @@ def small_bag(runs, name, changed=SMALL):
     config = runs.directory / f"small_{name}"
     config.write_text(text)
     output = runs.directory / f"run_of_{name}"
-    demo(runs, output, config, "--duration", "20")
+    demo(runs, output, config, "--duration", str(DURATION))
     finished(runs)
     return output / "bag"
 
@@ -105,7 +109,7 @@ def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay)
     dead_band = {"velocity_dead_band: 0.0": "velocity_dead_band: 0.02"}
     bag = small_bag(runs, "velocity.yaml", SMALL | dead_band)
     run = read_run(bag)
-    assert run.time[-1] >= 20.0
+    assert run.time[-1] >= DURATION
     assert np.sqrt(np.mean(run.distance**2)) < 3e-3
     told = np.array(list(by_stamp(bag, "/wheel_torques", lambda m: list(m.velocity)).values()))
     changes = 0.027 * np.diff(told, axis=0)
@@ -117,7 +121,7 @@ def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay)
 def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(paper_bags):
     bags = paper_bags
     run = read_run(bags[0])
-    assert run.time[-1] >= 20.0
+    assert run.time[-1] >= 10.0
     assert len(run.time) == round(run.time[-1] * 200) + 1  # not one is missing
     assert np.sqrt(np.mean(run.distance**2)) <= 0.05e-3
     assert run.distance.max() <= 0.15e-3
@@ -133,7 +137,7 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
     }.items():
         first, second = (by_stamp(bag, topic, content) for bag in bags)
         common = sorted(first.keys() & second.keys())
-        assert len(common) >= 2000
+        assert len(common) >= 1200
         assert all(first[stamp] == second[stamp] for stamp in common)
 
 
@@ -141,13 +145,13 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     run = read_run(climber_bag)
     assert run.margins.values[:, :2].min() > 2.8
     assert np.abs(run.error[:, 1]).max() < 2e-3
-    assert run.time[-1] >= 20.0
+    assert run.time[-1] >= DURATION
     assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
 
 
 def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):
-    for bag, answers in ((paper_bags[0], 3990), (climber_bag, 3990)):
+    for bag, answers in ((paper_bags[0], 1990), (climber_bag, 2790)):
         numbers = replay(bag, "--fail-above", "1e-9")
         recorded = numbers["answers"]["recorded"] - 1  # one may be from before there was a clock
         assert numbers["answers"]["in both"] >= recorded >= answers
@@ -186,7 +190,7 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
     )
     # these sensors have no errors; the recorder may have ended between the two
     number = min(odometry.num_poses, truth.num_poses)
-    assert number >= 4000
+    assert number >= 2000
     for one in ("timestamps", "positions_xyz", "orientations_quat_wxyz"):
         np.testing.assert_array_equal(getattr(odometry, one)[:number], getattr(truth, one)[:number])
     run = read_run(paper_bags[0])
@@ -267,7 +271,7 @@ def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6")
     finished(world)
     run = read_run(tmp_path / "run" / "bag")
-    assert 5 < run.time[-1] < 10
+    assert 5 < run.time[-1] < 20  # that of the configuration
     assert run.distance[run.time > 4.0].max() < 0.05
     assert np.abs(run.error[:, 1]).max() < 0.05
 
@@ -277,7 +281,7 @@ def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_pat
     is_under_way(world)
     assert len([*inhabitants(world.domain)]) == 5
     os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C in a terminal does
-    assert process.wait(60) != 0
+    assert process.wait(TIMEOUT) != 0
     said = world.log("run_demo")
     assert "interrupted" in said
     assert "Traceback" not in said
@@ -286,7 +290,7 @@ def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_pat
 
 
 def test_what_a_demo_cannot_start_with_is_said_in_one_line(world, tmp_path):
-    assert demo(world, tmp_path / "run", "nothing.yaml").wait(60) == 1
+    assert demo(world, tmp_path / "run", "nothing.yaml").wait(TIMEOUT) == 1
     (said,) = world.log("run_demo").splitlines()
     assert said.startswith("run_demo: No such file or directory: ")
     del world.processes["run_demo"]

@@ -5,7 +5,7 @@ import pytest
 import yaml
 from bag_contents import read_messages
 from extension import block, install
-from world import CONFIG, executable
+from world import CONFIG, TIMEOUT, executable
 
 from climber_uk.bags.recorded_run import read_run
 
@@ -77,6 +77,6 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
 def test_a_name_that_two_parts_have_is_refused_in_one_line(world, tmp_path):
     install(tmp_path, {"climber_uk.walls": {"fading": "my_climber:Fading"}})
     world.environment["PYTHONPATH"] = str(tmp_path)
-    assert world.start_node("plant_simulator").wait(60) != 0
+    assert world.start_node("plant_simulator").wait(TIMEOUT) != 0
     (line,) = world.log("plant_simulator").splitlines()
     assert "fading.surplus is a parameter of two parts" in line

@@ -23,12 +23,12 @@ CROWDED, WHOSE = "more than one", "publishers of wheel_torques"
 LIMIT = 4.0  # [N m] of the configuration
 ON_PATH = 0.02  # [m]
 QUICK_APPROACH = ["approach_speed:=0.3", "approach_yaw_rate:=1.5"]
-WALL_CLOCK = {  # patient: what is slow here is the machine
-    PLANT: ["command_timeout:=1.0"],
+WALL_CLOCK = {  # patient, and not often: what is slow here is the machine
+    PLANT: ["command_timeout:=1.0", "control_period:=0.02"],
     # a torque that is held up acts for too long: the guard is right, and has to forgive it, and the
     # climber to come back from wherever it is then
     CONTROLLER: [
-        *("odometry_timeout:=1.0", "reference_timeout:=1.0"),
+        *("odometry_timeout:=1.0", "reference_timeout:=1.0", "control_period:=0.02"),
         *("guard.attempts:=1000", "max_start_distance:=1000.0", *QUICK_APPROACH),
     ],
     PLANNER: ["rest_to_rest.ramp_time:=1.0"],
@@ -38,6 +38,9 @@ LOCK_STEP = {
     CONTROLLER: ["use_sim_time:=true", *QUICK_APPROACH],
     PLANNER: ["use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"],
 }
+
+
+UNLOGGED = re.compile(r" \[\d+ changes were not logged\]$")
 
 
 def said(world, name, subject="safe output"):
@@ -52,6 +55,7 @@ def is_told_and_over(lines, text):
     Other troubles may have come and gone: on the wall clock the machine may be slow.
     """
     assert all(line != next_one for line, next_one in pairwise(lines))
+    lines = [UNLOGGED.sub("", line) for line in lines]
     return text in lines and "ok again" in lines[lines.index(text) :]
 
 
@@ -98,7 +102,11 @@ class Climb:
         )
 
     def is_told(self, name, text, subject="safe output", begin=0):
-        self.world.wait(lambda: text in said(self.world, name, subject)[begin:], text)
+        def is_told():
+            lines = said(self.world, name, subject)[begin:]
+            return text in [UNLOGGED.sub("", line) for line in lines]
+
+        self.world.wait(is_told, text)
 
 
 def test_odometry_that_stops_gets_the_safe_output_until_it_comes_back(world):
@@ -145,7 +153,7 @@ def test_odometry_of_the_future_is_refused(world):
     loop.follows()
     # by as much as it was when the node heard of it
     refused = re.compile(r"bad odometry \(stamp is -[1-5]\.\d\d s from the clock, too far\)")
-    (line,) = filter(refused.fullmatch, said(world, CONTROLLER))
+    line, *_ = filter(refused.fullmatch, said(world, CONTROLLER))
     world.wait(lambda: is_told_and_over(said(world, CONTROLLER), line), "its end")
 
 
@@ -153,7 +161,6 @@ def test_odometry_that_was_overtaken_is_ignored(world):
     loop = Loop(world, "odometry_timeout:=1.0")
     loop.plan()
     loop.follows()
-    before = said(world, CONTROLLER)
     begin = len(loop.torques)
     newer = loop.tell()
     overtaken = loop.tell(age=SECOND // 20)
@@ -165,8 +172,8 @@ def test_odometry_that_was_overtaken_is_ignored(world):
     world.wait(lambda: last in answered(), "answer to the last one")
     assert newer in answered()
     assert overtaken not in answered()
-    # of a slow machine's
-    assert set(said(world, CONTROLLER)[len(before) :]) <= {"no odometry", "ok again"}
+    # else it would have been refused; a slow machine may have other troubles
+    assert "bad odometry" not in world.log(CONTROLLER)
 
 
 def test_a_reference_that_stops_gets_the_safe_output_until_a_new_one_comes(world):
@@ -196,12 +203,16 @@ def test_in_lock_step_the_plant_waits_for_a_new_controller(world):
     climb.is_under_way()
     begin = len(said(world, PLANT, "lock-step"))
     climb.kill(CONTROLLER)
-    (waits,) = world.wait(lambda: said(world, PLANT, "lock-step")[begin:], "word of it")
-    stamp = reading.nanoseconds(climb.odometry[-1].header.stamp)
-    assert waits == f"no torque for the odometry of {stamp / SECOND:.3f} s"
+
+    def waits():
+        stamp = reading.nanoseconds(climb.odometry[-1].header.stamp)
+        return f"no torque for the odometry of {stamp / SECOND:.3f} s"
+
+    world.wait(lambda: waits() in said(world, PLANT, "lock-step")[begin:], "word of it")
+    told = waits()
     climb.start(CONTROLLER)
     climb.is_on_path()
-    assert said(world, PLANT, "lock-step")[begin:] == [waits, "ok again"]
+    assert is_told_and_over(said(world, PLANT, "lock-step")[begin:], told)
 
 
 def test_a_plant_that_starts_again_is_brought_to_the_path(world):

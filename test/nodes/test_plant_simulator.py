@@ -13,6 +13,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
+from world import TIMEOUT
 
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading, writing
@@ -176,8 +177,13 @@ def test_reset_brings_the_climber_back_while_time_goes_on(world):
     world.start_node("plant_simulator", "inclination:=0.0", "initial_x:=2.0")
     odometry = world.listen(Odometry, "odom")
     commands = world.speak(JointState, "wheel_torques")
-    commands.publish(torques(5.0, 5.0))
-    world.wait(lambda: odometry and odometry[-1].pose.pose.position.x > 2.001, "motion")
+
+    def has_moved():
+        commands.publish(torques(5.0, 5.0))  # one may be stale when a slow machine heeds it
+        return odometry and odometry[-1].pose.pose.position.x > 2.001
+
+    world.wait(has_moved, "motion")
+    world.wait(lambda: not any(m.twist.twist.linear.x for m in odometry[-9:]), "rest")
     before = stamp(odometry[-1])
     assert world.call(Trigger, "plant_simulator/reset", Trigger.Request()).success
     world.wait(lambda: odometry[-1].pose.pose.position.x == 2.0, "start")
@@ -197,7 +203,7 @@ class Answering:
     """Answers every odometry once, with torques that are a function of its stamp."""
 
     def __init__(self, world, namespace="", torque=lambda time: 0.0):
-        self.states, self.torque = {}, torque
+        self.world, self.states, self.torque = world, {}, torque
         self.commands = world.speak(JointState, f"{namespace}wheel_torques")
         self.heard = world.listen(Odometry, f"{namespace}odom")
         self.truth = world.listen(Odometry, f"{namespace}ground_truth")
@@ -210,6 +216,13 @@ class Answering:
                 torque = self.torque(stamp(message) * 1e-9 - 1.0)
                 self.commands.publish(torques(torque, 0.9 * torque, stamp(message)))
         self.heard.clear()
+        return len(self.states)
+
+    def answer_all(self):
+        """The same, with what is on its way; looks are counted, as a slow machine has few."""
+        for _ in range(15):
+            self.world.executor.spin_once(timeout_sec=0.02)
+            self.answer()
         return len(self.states)
 
     def places(self):
@@ -252,14 +265,12 @@ def test_paused_it_goes_on_step_by_step_and_only_when_asked(world):
     answering = Answering(world)
     world.wait(lambda: answering.answer() > 3, "motion")
     assert world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=True)).success
-    world.wait(lambda: answering.answer() and not answering.heard, "what was on its way")
+    answering.answer_all()
     for _ in range(2):
         before = answering.answer()
         assert world.call(Trigger, "plant_simulator/step", Trigger.Request()).success
         world.wait(lambda before=before: answering.answer() > before, "one step")
-        until = time.monotonic() + 0.3
-        world.wait(lambda until=until: answering.answer() and time.monotonic() > until, "no more")
-        assert answering.answer() == before + 1
+        assert answering.answer_all() == before + 1
     assert world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False)).success
     world.wait(lambda: answering.answer() > before + 20, "going on")
     refused = world.call(Trigger, "plant_simulator/step", Trigger.Request())
@@ -270,14 +281,18 @@ def test_on_the_wall_clock_a_pause_is_left_out(world):
     world.start_node("plant_simulator", "inclination:=0.0", "initial_x:=2.0")
     odometry = world.listen(Odometry, "odom")
     world.wait(lambda: len(odometry) > 5, "odometry")
-    world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=True))
-    until = time.monotonic() + 1.2
-    world.wait(lambda: time.monotonic() > until, "time to pass")
-    seen = len(odometry)
-    world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False))
-    world.wait(lambda: len(odometry) > seen + 50, "odometry again")
-    behind = re.findall(r"([\d.]+) s behind", world.log("plant_simulator"))
-    assert all(float(seconds) < 1.0 for seconds in behind)  # what a slow machine is, at most
+
+    def is_behind_after_a_pause():
+        world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=True))
+        until, before = time.monotonic() + 1.2, world.log("plant_simulator")
+        world.wait(lambda: time.monotonic() > until, "time to pass")
+        seen = len(odometry)
+        world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False))
+        world.wait(lambda: len(odometry) > seen + 50, "odometry again")
+        return "s behind" in world.log("plant_simulator").removeprefix(before)
+
+    # a slow machine may be behind after one, but not after each of them
+    assert not all(is_behind_after_a_pause() for _ in range(5))
     gaps = np.diff([stamp(m) for m in odometry])
     assert gaps.max() > 1_000_000_000  # the pause, of which nothing was told
     assert (gaps > 0).all()
@@ -392,7 +407,7 @@ def test_late_noisy_odometry_runs_in_lock_step_beside_the_truth(world):
     ],
 )
 def test_what_cannot_be_simulated_is_refused_with_one_line(world, parameters, said):
-    assert world.start_node("plant_simulator", *parameters).wait(60) == 1
+    assert world.start_node("plant_simulator", *parameters).wait(TIMEOUT) == 1
     (line,) = world.log("plant_simulator").splitlines()
     assert said in line
     del world.processes["plant_simulator"]

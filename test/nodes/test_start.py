@@ -3,7 +3,7 @@
 import signal
 
 import pytest
-from world import CONFIG
+from world import CONFIG, TIMEOUT
 
 pytestmark = pytest.mark.nodes
 
@@ -49,7 +49,7 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
     ],
 )
 def test_a_bad_parameter_is_refused_with_one_line(world, name, parameters, line):
-    assert world.start_node(name, *parameters).wait(60) == 1
+    assert world.start_node(name, *parameters).wait(TIMEOUT) == 1
     (said,) = world.log(name).splitlines()
     assert said.startswith(f"{name}: ")
     assert line in said
@@ -63,7 +63,7 @@ def test_a_bad_waypoint_file_is_refused_with_one_line(world, tmp_path, content, 
     file = tmp_path / "points.txt"
     file.write_text(content)
     name = "trajectory_publisher"
-    assert world.start_node(name, "shape:=waypoints", f"waypoints.file:={file}").wait(60) == 1
+    assert world.start_node(name, "shape:=waypoints", f"waypoints.file:={file}").wait(TIMEOUT) == 1
     (said,) = world.log(name).splitlines()
     assert f"waypoints.file='{file}'" in said
     assert wrong in said
@@ -73,7 +73,7 @@ def test_a_bad_waypoint_file_is_refused_with_one_line(world, tmp_path, content, 
 @pytest.mark.installed
 @pytest.mark.parametrize("name", NODES)
 def test_a_missing_parameter_file_is_refused_without_a_traceback(world, name):
-    assert world.start_node(name, config="nothing.yaml").wait(60) == 1
+    assert world.start_node(name, config="nothing.yaml").wait(TIMEOUT) == 1
     assert "nothing.yaml" in world.log(name)
     assert "Traceback" not in world.log(name)
     del world.processes[name]
@@ -81,7 +81,7 @@ def test_a_missing_parameter_file_is_refused_without_a_traceback(world, name):
 
 def run(world, name, *arguments):
     """What a node says that does not start, but ends by itself, and its status."""
-    status = world.start(name, *map(str, arguments)).wait(60)
+    status = world.start(name, *map(str, arguments)).wait(TIMEOUT)
     del world.processes[name]
     return status, world.log(name).splitlines()
 

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -111,7 +112,10 @@ def test_bad_odometry_gets_the_safe_output_and_good_one_is_followed_again(world,
     loop.is_safe(**how)
     loop.follows()
     world.wait(lambda: "safe output: ok again" in world.log(NAME), "word of the recovery")
-    assert world.log(NAME).count(said) == 1
+    told = [line for line in world.log(NAME).splitlines() if "safe output" in line]
+    assert any(said in line for line in told)
+    # a slow machine may hold up odometry in between
+    assert not any(said in line and said in later for line, later in pairwise(told))
 
 
 def test_odometry_that_stops_is_noticed_and_followed_when_it_comes_back(world):
@@ -126,11 +130,12 @@ def test_odometry_that_stops_is_noticed_and_followed_when_it_comes_back(world):
 def test_a_reference_that_is_missing_or_ends_gets_the_safe_output(world):
     loop = Loop(world, "odometry_timeout:=1.0")
     loop.is_safe()
-    world.wait(lambda: "safe output: no reference" in world.log(NAME), "word of it")
-    loop.plan(seconds=(loop.now() - loop.begin) * 1e-9 + 2.0)
+    no_reference = "safe output: no reference"
+    world.wait(lambda: no_reference in world.log(NAME), "word of it")
+    loop.plan(seconds=(loop.now() - loop.begin) * 1e-9 + 4.0)
     loop.follows()
+    loop.until(lambda _: no_reference in world.log(NAME).partition("ok again")[2], "word of it")
     loop.is_safe()
-    world.wait(lambda: world.log(NAME).count("safe output: no reference") == 2, "word of it")
 
 
 def test_hold_carries_the_weight_in_place_of_zero_torque(world):
@@ -286,7 +291,8 @@ def test_the_safe_output_has_no_speeds(world):
         "safe output",
         spoil=lambda m: setattr(m, "child_frame_id", ""),
     )
-    assert list(loop.torques[-1].velocity) == [0.0, 0.0]
+    safe = [m for m in loop.torques if not any(m.effort)]
+    assert all(list(m.velocity) == [0.0, 0.0] for m in safe)
 
 
 def test_a_second_climber_keeps_to_its_namespace(world):

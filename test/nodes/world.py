@@ -131,7 +131,7 @@ class World:
                 raise AssertionError(f"no {what} within {TIMEOUT} s\n{logs}")
         return value
 
-    def hear(self, kind, topic, depth=100):
+    def hear(self, kind, topic, depth=1000):
         """List that fills with the messages of a topic.
 
         All that have come are taken at once: the executor takes ten times as long for each.
@@ -155,7 +155,7 @@ class World:
 
     def speak(self, kind, topic):
         """Publisher of a topic that somebody listens to."""
-        publisher = self.node.create_publisher(kind, topic, 10)
+        publisher = self.node.create_publisher(kind, topic, 1000)  # for those who are held up
         self.wait(publisher.get_subscription_count, f"subscriber of {topic}")
         return publisher
 
