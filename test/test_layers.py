@@ -19,6 +19,7 @@ BELOW = {
     "control": MATHEMATICS,
     "simulation": MATHEMATICS,
     "localization": MATHEMATICS,
+    "planning": MATHEMATICS,
     "messages": MATHEMATICS,
     "closed_loop": MATHEMATICS | {"control", "simulation"},
     "bags": MATHEMATICS | {"control", "messages"},
@@ -29,7 +30,7 @@ BELOW = {
     "campaign": DATA | {"system", "bags", "report"},
     "paper": DATA | {"system", "bags", "report"},
     "driver_check": DATA | {"system", "ros"},
-    "nodes": DATA | {"localization", "system", "ros"},
+    "nodes": DATA | {"localization", "planning", "system", "ros"},
     "recording": {"system", "ros", "bags"},
     "demo": DATA | {"system", "ros"},
 }

@@ -93,6 +93,10 @@ class Waypoints:
         """See `Shape`."""
         return self.at_rate(0.0).gear(s)
 
+    def segment(self, s: Array) -> Any:
+        """See `Shape`."""
+        return self.at_rate(0.0).segment(s)
+
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
         return self.at_rate(0.0).derivatives(s)
@@ -152,6 +156,12 @@ class SlowedPath:
         places = self._progress(s)[0], np.array(self.path.start)
         now, first = (np.searchsorted(self.path.reversals, at, "right") for at in places)
         return 1.0 - 2.0 * ((now - first) % 2)
+
+    def segment(self, s: Array) -> Any:
+        """See `Shape`."""
+        legs, place = self.path.legs, self._progress(s)[0]
+        leg = np.searchsorted(legs, place + 1e-9 * legs[-1], "right") - 1
+        return self.path.numbers[np.clip(leg, 0, len(legs) - 2)]
 
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
