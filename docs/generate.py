@@ -44,6 +44,7 @@ CONTENTS = {
     "stamp; `source`: the controller's mode",
     topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
+    topics.GIVEN_PATH: "2 to 50 000 places to drive through, in `odom`; orientations are not read",
     topics.REFERENCE_PATH: "the whole path, for display",
     topics.TORQUES: "`effort` [N m] and `velocity` [rad/s] by joint name, of which motors "
     "take one; the stamp is that of the odometry it answers",

@@ -23,7 +23,7 @@ BELOW = {
     "messages": MATHEMATICS,
     "closed_loop": MATHEMATICS | {"control", "simulation"},
     "bags": MATHEMATICS | {"control", "messages"},
-    "ros": MATHEMATICS | {"system", "control", "simulation", "messages"},
+    "ros": MATHEMATICS | {"planning", "system", "control", "simulation", "messages"},
     "report": DATA | {"system", "bags"},
     "identification": DATA | {"system", "bags", "report"},
     "replay": DATA | {"system", "bags", "report"},

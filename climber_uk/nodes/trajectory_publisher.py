@@ -17,10 +17,13 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
+from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
+from climber_uk.mechanics.waypoints import Rounding
 from climber_uk.messages import reading, writing
 from climber_uk.messages.references import ReferenceWriter, Row
 from climber_uk.messages.topics import (
+    GIVEN_PATH,
     ODOMETRY,
     PLANNER,
     PROGRESS,
@@ -31,7 +34,9 @@ from climber_uk.messages.topics import (
 )
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.planning.course import Course, CourseOptions
+from climber_uk.planning.given_path import Manner
 from climber_uk.planning.progress import FOLLOWING, WAITING, Odometer, Progress, progress
+from climber_uk.ros.path_intake import PathIntake
 from climber_uk.ros.running import (
     BEST_EFFORT,
     LATCHED,
@@ -74,6 +79,7 @@ class TrajectoryPublisher(ClimberNode):
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(CourseOptions)
         self.planned = build_trajectory(self.parameters.read)
+        self.planned_name = self.parameters.read(TrajectoryParameters).shape
         self.course: Course[Row] | None = None  # the one under way
         self.waits_for_rest = False  # to start: the one under way comes to rest first
         self.is_paused, self.has_told_done = False, False
@@ -89,6 +95,7 @@ class TrajectoryPublisher(ClimberNode):
         self.progress = self.publisher(DiagnosticArray, private(PROGRESS), RELIABLE)
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.subscription(Float64, "~/speed", self.on_speed)
+        self.given = PathIntake(self, GIVEN_PATH, self.manner)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_service(SetBool, "~/pause", self.on_pause)
@@ -104,7 +111,16 @@ class TrajectoryPublisher(ClimberNode):
         """Extremes of the trajectory, for the log."""
         described = summary(self.planned)
         self.parameters.remarks += described.remarks
-        return f"{self.parameters.read(TrajectoryParameters).shape}, {described}"
+        return f"{self.planned_name}, {described}"
+
+    def manner(self) -> Manner:
+        """How a path is driven that comes from outside: as waypoints would be."""
+        law = self.parameters.read(TrajectoryParameters).time_law
+        return Manner(
+            rounding=self.parameters.read(Rounding, "waypoints."),
+            law=self.parameters.read(TIME_LAWS[law], f"{law}."),
+            reverse_gear=self.planned.reverse_gear,
+        )
 
     # What an operator asks for
 
@@ -148,7 +164,7 @@ class TrajectoryPublisher(ClimberNode):
         """Come to rest on the path; whether it does, and where."""
         if self.course is None:
             return False, "not started"
-        self.is_paused, self.waits_for_rest = True, False
+        self.is_paused = True
         self.course.pause(self.position)
         return self.said(f"comes to rest within {self.course.ramp_time:.3g} s")
 
@@ -157,8 +173,9 @@ class TrajectoryPublisher(ClimberNode):
         if self.course is None:
             return False, "not started"
         self.is_paused = False
-        if self.waits_for_rest:
+        if self.waits_for_rest and direction > 0:
             return True, self.begin()
+        self.waits_for_rest = False
         self.course.go_on(self.position, direction)
         return self.said("goes on" if direction > 0 else "goes back along the path")
 
@@ -213,8 +230,7 @@ class TrajectoryPublisher(ClimberNode):
         self.followed, self.mode, self.has_told_done = None, "", False
         self.last_look = now or stamp  # the odometry may have come before the first clock
         self.publish_around(start)
-        shape = self.parameters.read(TrajectoryParameters).shape
-        self.get_logger().info(f"{shape} starts at {start / SECOND:.3f} s")
+        self.get_logger().info(f"{self.planned_name} starts at {start / SECOND:.3f} s")
         self.publish_path(start)
 
     def on_reference_time(self, message: TimeReference) -> None:
@@ -252,6 +268,12 @@ class TrajectoryPublisher(ClimberNode):
             self.course, self.waits_for_rest = None, False
             self.wait_for_odometry()
         self.last_look = now
+        given = self.given.ready()
+        if given is not None:
+            self.planned, described = given
+            self.planned_name = "path"
+            begins = self.begin()
+            self.get_logger().info(f"path taken: {described}; {begins}")
         if self.course is not None:
             position = self.position
             self.publish_around(position)

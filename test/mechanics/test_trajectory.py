@@ -16,7 +16,7 @@ def waypoints(tmp_path):
     def make(points):
         file = tmp_path / "points.txt"
         np.savetxt(file, points)
-        return Waypoints(str(file))
+        return Waypoints(file=str(file))
 
     return make
 

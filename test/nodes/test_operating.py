@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 from test_faults import LIMIT, PLANNER
@@ -47,6 +49,41 @@ class Operated(Waiting):
     def largest_jump(self):
         efforts = np.array([m.effort for m in self.torques])
         return np.abs(np.diff(efforts, axis=0)).max()
+
+
+def path(places, frame="odom"):
+    message = Path()
+    message.header.frame_id = frame
+    for x, y in places:
+        message.poses.append(PoseStamped())
+        message.poses[-1].pose.position.x, message.poses[-1].pose.position.y = x, y
+    return message
+
+
+def test_a_path_from_outside_is_taken_up_in_mid_course_or_refused_in_words(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    climb = Operated(world, {PLANNER: line, "plant_simulator": ["initial_heading:=0.0"]})
+    climb.drives(0.28, 0.31)
+    given = world.speak(Path, "path")
+    given.publish(path([(0.0, 0.0), (1.0, 1.0)], "map"))
+    given.publish(path([(0.0, 0.0), (float("nan"), 1.0)]))
+    given.publish(path([(1.0, 1.0), (1.0, 1.0)]))
+    for why in (
+        "path refused: frame_id='map' must be 'odom'",
+        "path refused: pose 2 at (nan, 1) is not finite",
+        "path refused: path: all points are within 0.00333 m",
+    ):
+        world.wait(lambda why=why: why in world.log(PLANNER), why)
+    climb.drives(0.28, 0.31)
+    corner = path([(2.0, 3.0), (2.0, 3.5), (1.5, 3.5)])
+    given.publish(corner)
+    given.publish(corner)
+    world.wait(lambda: "comes to rest, then starts" in world.log(PLANNER), "a path taken up")
+    climb.is_told_to_be("done")
+    end = climb.odometry[-1].pose.pose.position
+    assert (end.x, end.y) == pytest.approx((1.5, 3.5), abs=0.01)
+    assert world.log(PLANNER).count("path taken") == 1
+    assert "path starts at" in world.log(PLANNER)
 
 
 def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(world):

@@ -38,7 +38,9 @@ def climber_trajectory():
 
 def lanes():
     law = RestToRest(rate=0.2, ramp_time=2.0)
-    return Trajectory(Waypoints(str(Path(CONFIG).parent / "lanes.csv")), law, origin=(0.0, 3.0))
+    return Trajectory(
+        Waypoints(file=str(Path(CONFIG).parent / "lanes.csv")), law, origin=(0.0, 3.0)
+    )
 
 
 def asked_at_random(under_way, random, number):

@@ -83,7 +83,7 @@ def test_segments_are_the_points_of_the_file(tmp_path):
     """One is left out, as it is where another one is; then it drives back."""
     points = [[0, 0], [1, 0], [1, 0], [1, 1], [0, 1], [0.5, 1]]
     np.savetxt(tmp_path / "points.txt", points)
-    trajectory = Trajectory(Waypoints(str(tmp_path / "points.txt")), LAW)
+    trajectory = Trajectory(Waypoints(file=str(tmp_path / "points.txt")), LAW)
     course = begun(trajectory)
     seen = []
     for time in np.arange(0.0, trajectory.duration + 1.0, 0.2):
