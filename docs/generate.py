@@ -45,6 +45,7 @@ CONTENTS = {
     "stamp; `source`: the controller's mode",
     topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
+    topics.GIVEN_PATH: "2 to 50 000 places to drive through, in `odom`; orientations are not read",
     topics.REFERENCE_PATH: "the whole path, for display",
     topics.TORQUES: "`effort` [N m] and `velocity` [rad/s] by joint name, of which motors "
     "take one; the stamp is that of the odometry it answers",
@@ -79,7 +80,13 @@ CONTENTS = {
     ): "all parameters as they are, at the start and whenever one changes",
     "~/transition_event": "changes of the managed node's state",
     "~/start": "start, or start again, at the next odometry",
-    "~/stop": "come to rest on the path",
+    "~/stop": "come to rest on the path, as `~/pause`",
+    "~/retreat": "go back along the path, heading kept",
+    "~/speed": "share of the planned speed, 0.01 to 1: as the parameter `speed`",
+    topics.private(
+        topics.PROGRESS
+    ): "one status; `message`: waiting, approaching, following, paused "
+    "or done; values: done, left [m], time_left [s], lap, segment; 10 Hz, if anybody listens",
     "~/enable": "become active or inactive",
     "~/change_state": "managed node: configure, activate, deactivate, clean up, shut down",
     "~/get_state": "managed node",
@@ -87,7 +94,8 @@ CONTENTS = {
     "~/get_available_transitions": "managed node",
     "~/get_transition_graph": "managed node",
     "~/reset": "back to the initial state; time goes on",
-    "~/pause": "stop time, of all climbers that share it, or let it go on",
+    "~/pause": "of the plant: stop time, of all climbers that share it, or let it go on; of the "
+    "planner: come to rest on the path, or go on along it",
     "~/step": "one control period, while paused",
 }
 

@@ -46,6 +46,8 @@ NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
     *(
         "stop_time",
+        "reaction",
+        "speed",
         "effort_commands",
         "effort_order",
         "publish_cmd_vel",

@@ -13,7 +13,17 @@ reference's frame: along its heading, and to its left. Floats, or arrays (N,) of
 import math
 from typing import Any, NamedTuple
 
-from climber_uk.mechanics.elementary import arctan, cos, either, select, sin, sqrt, tanh, wrapped
+from climber_uk.mechanics.elementary import (
+    arctan,
+    clipped,
+    cos,
+    either,
+    select,
+    sin,
+    sqrt,
+    tanh,
+    wrapped,
+)
 from climber_uk.mechanics.quantities import DesiredAcceleration, Motion, ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
 
@@ -34,6 +44,9 @@ class PreparedTarget(NamedTuple):
     catch_up: tuple[Any, Any]  # L, and L̇, of one behind: most by which it is faster [m/s]
     turn_rate: tuple[Any, Any]  # R [rad/s], and Ṙ
     gain: tuple[Any, Any, Any]  # g [1/m], ġ and g̈
+
+
+COMES = 2e-3  # [m/s] of a reference, from which on it comes without a doubt
 
 
 @parameters(slots=True)
@@ -167,6 +180,8 @@ class Guidance:
         s = psi_1 + R * tanh_u  # s: 0 when it turns back as fast as it should
         theta_2 = omega_d1 - psi_2 - omega_n * (sech2_u * psi_1 + s)
         theta_2 = theta_2 - R_1 * (tanh_u - u * sech2_u)
-        # ahead of a reference that comes it waits, and overcomes no friction to go back
-        wanted = select(wanted * v_d < 0.0, 0.0, wanted)
+        # ahead of a reference that comes it waits, and overcomes no friction to go back; gradually,
+        # for the sign of the speed of a reference at rest is but rounding
+        fade = clipped(1.0 - abs(v_d) / COMES, 0.0, 1.0)
+        wanted = select(wanted * v_d < 0.0, fade * clipped(wanted, -COMES, COMES), wanted)
         return DesiredAcceleration(v_1, theta_2, wanted, omega - s)

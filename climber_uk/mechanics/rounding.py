@@ -35,6 +35,8 @@ class Rounded:
     length: float  # [m] of the polyline
     closed: bool
     reversals: Array  # (k,) s where it goes back the way it came, with one tangent
+    legs: Array  # (m,) s where a leg of the polyline begins, and where the last ends
+    numbers: Any  # (m,) of the points there, as they were given, from 1
     start: float = 0.0  # s of the first point: a closed curve with reversals begins at one
 
 
@@ -47,7 +49,8 @@ def rounded(points: Array, tolerance: float, reversal_angle: float) -> Rounded:
     """
     near, spacing = NEAR * tolerance, ROUNDING * tolerance / MOMENT
     closed = len(points) > 2 and math.dist(points[0], points[-1]) < near
-    corners = _thinned(points, near, closed)
+    kept = _thinned(points, near, closed)
+    corners = points[kept]
     if len(corners) < 2 + closed or (corners[0] == corners[1]).all():
         raise ValueError(f"all points are within {near:.3g} m, a sixth of the tolerance")
     back = _reversals(corners, reversal_angle, closed)
@@ -56,24 +59,26 @@ def rounded(points: Array, tolerance: float, reversal_angle: float) -> Rounded:
     start = 0
     if closed and len(back):
         start = back[0]
-        corners = np.concatenate([corners[start:-1], corners[: start + 1]])
+        kept = np.concatenate([kept[start:-1], kept[: start + 1]])
+        corners = points[kept]
         back = back - start
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     length = float(s[-1])
     breaks = _breaks(s, back, closed, spacing)
     make = _periodic if closed and not len(back) else _clamped
     curve = make(s, corners, breaks, s[back])
-    return Rounded(curve, length, closed, s[back], float(s[-1 - start]) % length)
+    first = float(s[-1 - start]) % length
+    return Rounded(curve, length, closed, s[back], s, kept + 1, first)
 
 
-def _thinned(points: Array, near: float, closed: bool) -> Array:
-    """Points (m, 2) of which each is at least `near` [m] from the one before; both ends stay."""
-    first, *others = points.tolist()
-    kept, end = [first], first if closed else others[-1]
-    for point in others:
-        if math.dist(point, kept[-1]) >= near:
-            kept.append(point)
-    while len(kept) > 1 and math.dist(kept[-1], end) < near:
+def _thinned(points: Array, near: float, closed: bool) -> Any:
+    """Indices (m,) of points that are at least `near` [m] from the one before; both ends stay."""
+    places = points.tolist()
+    kept, end = [0], 0 if closed else len(places) - 1
+    for i, point in enumerate(places):
+        if math.dist(point, places[kept[-1]]) >= near:
+            kept.append(i)
+    while len(kept) > 1 and math.dist(places[kept[-1]], places[end]) < near:
         kept.pop()
     return np.array([*kept, end])
 

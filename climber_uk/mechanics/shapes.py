@@ -44,6 +44,10 @@ class Shape(Protocol):
         """1, or -1 between an odd number of reversals and the next, where the tail goes first."""
         return 1.0
 
+    def segment(self, s: Array) -> Any:
+        """Number of the last point that it has passed, from 1, of those that it leads through."""
+        return 1
+
     @property
     def stations(self) -> Array:
         """Places s (n,), in order, so dense that no extreme of the path is missed."""

@@ -5,13 +5,13 @@ entry point `climber_uk.time_laws` of another package.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, Protocol
 
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.elementary import Derivatives, compose
+from climber_uk.mechanics.elementary import Derivatives
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
@@ -127,35 +127,6 @@ class RestToRest(TimeLaw):
         slower = smooth_start(since - distance / rate, self.ramp_time)
         s, s_1, s_2, s_3 = (rate * (up - down) for up, down in zip(faster, slower, strict=True))
         return places[leg] + s, s_1, s_2, s_3
-
-
-@dataclass(frozen=True)
-class Stopping(TimeLaw):
-    """Another law until `start`; from there its clock slows down and stops in `ramp_time`."""
-
-    law: TimeLaw
-    start: float  # [s]
-    ramp_time: float  # [s]
-
-    @property
-    def rate(self) -> float:
-        """See `TimeLaw`."""
-        return self.law.rate
-
-    def duration(self, shape: Shape) -> float:
-        """See `TimeLaw`."""
-        return self.start + self.ramp_time
-
-    def horizon(self, shape: Shape) -> float:
-        """See `TimeLaw`."""
-        return self.duration(shape)
-
-    def progress(self, time: Array, shape: Shape) -> Derivatives:
-        """See `TimeLaw`."""
-        since = np.minimum(time - self.start, self.ramp_time)
-        lost, slower, t_2, t_3 = smooth_start(since, self.ramp_time)
-        law = self.law.progress(self.start + since - lost, shape)
-        return compose(law, (1 - slower, -t_2, -t_3))
 
 
 TIME_LAWS = Variants[type[TimeLaw]](

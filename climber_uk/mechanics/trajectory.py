@@ -53,6 +53,12 @@ class Trajectory:
         """Reference at `time` (...) [s] since the start."""
         return self._travelled(self.law.progress(np.asarray(time, dtype=float), self.course))
 
+    def at_own_time(self, own_time: Derivatives) -> Reference:
+        """Reference (...) at the law's time (...) [s], which goes on with these derivatives."""
+        u, *rates = own_time
+        progress = self.law.progress(np.asarray(u, dtype=float), self.course)
+        return self._travelled(compose(progress, tuple(rates)))  # type: ignore[arg-type]
+
     def path(self, points: int) -> Array:
         """Poses (points, 3) [m, rad], even in the path parameter, once along the shape."""
         s = np.linspace(0, self.course.length, points)

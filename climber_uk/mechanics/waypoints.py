@@ -1,6 +1,6 @@
 """A path through waypoints: the polyline of a file with its corners rounded, slow in its bends."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -17,16 +17,9 @@ STATIONS = 2001
 
 
 @parameters
-class Waypoints:
-    """A path straight from each point of a text file to the next, its corners rounded.
+class Rounding:
+    """How corners of a path through points are rounded, and how slow they are."""
 
-    The path parameter s is the distance [m] on straights. In bends it is stretched, so that at
-    the law's rate the limits of yaw rate and acceleration hold. Where the points turn back, the
-    climber stops and goes back in the other gear. The path is closed if its last point is
-    nearer than a sixth of the tolerance to its first. Raises `ValueError` naming the file.
-    """
-
-    file: str = parameter("", "", "text file with x and y [m], one point a line", is_path=True)
     tolerance: float = parameter(
         0.02, "m", "most distance of the path from the straight lines between points", above=0
     )
@@ -40,16 +33,32 @@ class Waypoints:
         at_most=1.0,
     )
 
-    def __post_init__(self) -> None:
-        _ = self._rounded  # a bad file is found now, not when the climber starts
+
+class ThroughPoints(Rounding):
+    """A path straight from each of its points to the next, its corners rounded: a `Shape`.
+
+    The path parameter s is the distance [m] on straights. In bends it is stretched, so that at
+    the law's rate the limits of yaw rate and acceleration hold. Where the points turn back, the
+    climber stops and goes back in the other gear. The path is closed if its last point is
+    nearer than a sixth of the tolerance to its first.
+    """
+
+    def given(self) -> Array:
+        """Points (n, 2) [m]; raises `ValueError`."""
+        raise NotImplementedError
+
+    @property
+    def source(self) -> str:
+        """What an error calls the points."""
+        return "path"
 
     @cached_property
     def _rounded(self) -> Rounded:
-        points = read_waypoints(self.file)
+        points = self.given()
         try:
             return rounded(points, self.tolerance, self.reversal_angle)
         except ValueError as error:
-            raise ValueError(f"file={self.file!r}: {error}") from None
+            raise ValueError(f"{self.source}: {error}") from None
 
     @cached_property
     def _by_rate(self) -> dict[float, "SlowedPath"]:
@@ -63,7 +72,7 @@ class Waypoints:
             try:
                 pace = slowed(path.curve, path.length, path.closed, self.tolerance, limits)
             except ValueError as error:
-                raise ValueError(f"waypoints.file={self.file!r}: {error}") from None
+                raise ValueError(f"{self.source}: {error}") from None
             self._by_rate[rate] = SlowedPath(path, pace)
         return self._by_rate[rate]
 
@@ -93,9 +102,52 @@ class Waypoints:
         """See `Shape`."""
         return self.at_rate(0.0).gear(s)
 
+    def segment(self, s: Array) -> Any:
+        """See `Shape`."""
+        return self.at_rate(0.0).segment(s)
+
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""
         return self.at_rate(0.0).derivatives(s)
+
+
+@parameters
+class Waypoints(ThroughPoints):
+    """A path straight from each point of a text file to the next, its corners rounded.
+
+    Raises `ValueError` naming the file.
+    """
+
+    file: str = parameter("", "", "text file with x and y [m], one point a line", is_path=True)
+
+    def __post_init__(self) -> None:
+        _ = self._rounded  # a bad file is found now, not when the climber starts
+
+    def given(self) -> Array:
+        """See `ThroughPoints`."""
+        return read_waypoints(self.file)
+
+    @property
+    def source(self) -> str:
+        """See `ThroughPoints`."""
+        return f"file={self.file!r}"
+
+
+@dataclass(frozen=True)
+class Polyline(ThroughPoints):
+    """The same through points that are given; raises `ValueError` as soon as it is used."""
+
+    places: Array = field(default_factory=lambda: np.empty((0, 2)))  # (n, 2) [m]
+
+    @classmethod
+    def through(cls, places: Array, rounding: Rounding) -> "Polyline":
+        """Path through `places` (n, 2) [m] with this rounding."""
+        limits = {rule.name: getattr(rounding, rule.name) for rule in fields(Rounding)}
+        return cls(**limits, places=places)
+
+    def given(self) -> Array:
+        """See `ThroughPoints`."""
+        return self.places
 
 
 @dataclass(frozen=True)
@@ -152,6 +204,12 @@ class SlowedPath:
         places = self._progress(s)[0], np.array(self.path.start)
         now, first = (np.searchsorted(self.path.reversals, at, "right") for at in places)
         return 1.0 - 2.0 * ((now - first) % 2)
+
+    def segment(self, s: Array) -> Any:
+        """See `Shape`."""
+        legs, place = self.path.legs, self._progress(s)[0]
+        leg = np.searchsorted(legs, place + 1e-9 * legs[-1], "right") - 1
+        return self.path.numbers[np.clip(leg, 0, len(legs) - 2)]
 
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""

@@ -8,6 +8,8 @@ PLANNER, CONTROLLER, PLANT = NODES = (
 ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
 REFERENCE_TIME = "reference_time"  # where on the reference the climber was
 REFERENCE_PATH = "reference_path"  # all of it, for display
+GIVEN_PATH = "path"  # from a planner, or a person's clicks
+PROGRESS = f"{PLANNER}/progress"  # how far along its path a climber is
 TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PUSH = "joint_states", "suction_pressure", "push"
 IMU, POSE = "imu", "pose"  # of robots without an odometry of their own

@@ -5,7 +5,7 @@ Arrays of two wheels are (right, left), messages have (left, right): `left_right
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -174,6 +174,13 @@ def diagnostics(
     )
     message = DiagnosticArray(status=[status])
     message.header.stamp = time(stamp)
+    return message
+
+
+def progress(name: str, values: Mapping[str, Any], stamp: int) -> DiagnosticArray:
+    """Progress of the node `name`: its `state` as the message, what else there is by name."""
+    numbers = {key: value for key, value in values.items() if key != "state"}
+    message = diagnostics(name, DiagnosticStatus.OK, values["state"], numbers, stamp)
     return message
 
 

@@ -2,49 +2,71 @@
 
 The trajectory's times never change their meaning. A controller publishes on `reference_time` how
 far it has come, and the preview begins there, however long the controller waits. Where no
-controller publishes it, the clock leads.
+controller publishes it, the clock leads. What an operator asks for, to pause, to go on, slower or
+back, changes the points ahead of the climber: see `planning.course`.
 """
 
-from collections import deque
-from dataclasses import replace
-
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry, Path
+from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import TimeReference
-from std_srvs.srv import Trigger
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
-from climber_uk.mechanics.time_laws import Stopping
+from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
+from climber_uk.mechanics.waypoints import Rounding
 from climber_uk.messages import reading, writing
 from climber_uk.messages.references import ReferenceWriter, Row
-from climber_uk.messages.topics import ODOMETRY, PLANNER, REFERENCE, REFERENCE_PATH, REFERENCE_TIME
+from climber_uk.messages.topics import (
+    GIVEN_PATH,
+    ODOMETRY,
+    PLANNER,
+    PROGRESS,
+    REFERENCE,
+    REFERENCE_PATH,
+    REFERENCE_TIME,
+    private,
+)
 from climber_uk.parameters.declaration import parameter, parameters
-from climber_uk.ros.running import BEST_EFFORT, LATCHED, WALL_CLOCK, ClimberNode, run
+from climber_uk.planning.course import Course, CourseOptions
+from climber_uk.planning.given_path import Manner
+from climber_uk.planning.progress import FOLLOWING, WAITING, Odometer, Progress, progress
+from climber_uk.ros.path_intake import PathIntake
+from climber_uk.ros.running import (
+    BEST_EFFORT,
+    LATCHED,
+    RELIABLE,
+    WALL_CLOCK,
+    ClimberNode,
+    Throttle,
+    run,
+)
 
 STANDSTILL = 0.2  # [s] of wall-clock time without a change, after which a clock stands still
 ODOMETRY_AGE = 1.0  # [s] of an odometry, above which it does not start a trajectory
+PROGRESS_PERIOD = SECOND // 10  # [ns]
 CLOCK_STEP = SECOND // 5  # [ns] back, from which on a clock was reset
 
 
 @parameters
 class PublisherOptions:
-    """When a trajectory starts and stops, and how it is published."""
+    """When a trajectory starts, and how fast it is driven."""
 
     autostart: bool = parameter(True, "", "start at the first odometry; false: only at ~/start")
     start_delay: float = parameter(0.0, "s", "from that odometry's stamp to the start", at_least=0)
-    preview: float = parameter(1.0, "s", "how far ahead the reference is published", above=0)
-    point_period: float = parameter(0.05, "s", "time between two points of a preview", above=0)
-    publish_period: float = parameter(0.1, "s", "time between two previews", above=0)
-    stop_time: float = parameter(1.0, "s", "time from the full rate to rest after ~/stop", above=0)
-
-    def __post_init__(self) -> None:
-        if self.preview < 2 * self.publish_period:
-            raise ValueError(
-                f"preview={self.preview} must be >= 2 publish_period={self.publish_period} [s]"
-            )
+    speed: float = parameter(
+        1.0,
+        "",
+        "share of the planned speed, also set by ~/speed; no more, so that what is planned holds",
+        at_least=0.01,
+        at_most=1,
+        runtime=True,
+    )
 
 
 class TrajectoryPublisher(ClimberNode):
@@ -52,54 +74,132 @@ class TrajectoryPublisher(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__(PLANNER)
-        for kind, prefix in [*TYPES, (PublisherOptions, "")]:
+        for kind, prefix in [*TYPES, (PublisherOptions, ""), (CourseOptions, "")]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
-        self.options = self.parameters.read(PublisherOptions)
+        self.options = self.parameters.read(CourseOptions)
         self.planned = build_trajectory(self.parameters.read)
-        self.trajectory = self.planned
-        self.start: int | None = None  # [ns] stamp of the trajectory's time 0
+        self.planned_name = self.parameters.read(TrajectoryParameters).shape
+        self.course: Course[Row] | None = None  # the one under way
+        self.waits_for_rest = False  # to start: the one under way comes to rest first
+        self.is_paused, self.has_told_done = False, False
         self.followed: int | None = None  # [ns] how far a controller has come
+        self.mode = ""  # what it does; empty: none tells
         self.last_look = self.stood_at = 0  # [ns] of the clock
-        self.points: deque[Row] = deque()
-        self.next_point = 0  # every point is computed once: previews agree to the last bit
+        self.odometer: Odometer | None = None  # once progress is asked for
+        self.is_progress_due = Throttle(PROGRESS_PERIOD)
 
         self.reference = self.publisher(MultiDOFJointTrajectory, REFERENCE)
         self.serialized = ReferenceWriter(self.names.odom_frame, self.names.base_frame)
         self.path = self.publisher(Path, REFERENCE_PATH, LATCHED)
+        self.progress = self.publisher(DiagnosticArray, private(PROGRESS), RELIABLE)
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
+        self.subscription(Float64, "~/speed", self.on_speed)
+        self.given = PathIntake(self, GIVEN_PATH, self.manner)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
+        self.create_service(SetBool, "~/pause", self.on_pause)
+        self.create_service(Trigger, "~/retreat", self.on_retreat)
         self.create_timer(self.options.publish_period, self.publish)
         self.create_timer(STANDSTILL, self.publish_at_standstill, clock=WALL_CLOCK)
         self.odometry: Subscription | None = None  # only while a start is waited for
         self.publish_path(self.get_clock().now().nanoseconds)
-        if self.options.autostart:
+        if self.parameters.read(PublisherOptions).autostart:
             self.wait_for_odometry()
 
     def summary(self) -> str:
         """Extremes of the trajectory, for the log."""
         described = summary(self.planned)
         self.parameters.remarks += described.remarks
-        return f"{self.parameters.read(TrajectoryParameters).shape}, {described}"
+        return f"{self.planned_name}, {described}"
+
+    def manner(self) -> Manner:
+        """How a path is driven that comes from outside: as waypoints would be."""
+        law = self.parameters.read(TrajectoryParameters).time_law
+        return Manner(
+            rounding=self.parameters.read(Rounding, "waypoints."),
+            law=self.parameters.read(TIME_LAWS[law], f"{law}."),
+            reverse_gear=self.planned.reverse_gear,
+        )
+
+    # What an operator asks for
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/start: start from the beginning, at the next odometry."""
-        self.wait_for_odometry()
-        response.success, response.message = True, "starts at the next odometry"
+        self.is_paused = False
+        response.success, response.message = True, self.begin()
         return response
 
     def on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Service ~/stop: come to rest on the path, after the points that are published already."""
-        if self.start is None:
-            response.message = "not started"
-            return response
-        start = self.next_point * self.options.point_period
-        law = Stopping(self.trajectory.law, start, self.options.stop_time)
-        self.trajectory = replace(self.planned, law=law)
-        response.success, response.message = True, f"comes to rest from {start:.2f} s on"
-        self.get_logger().info(response.message)
+        """Service ~/stop: come to rest on the path, as ~/pause does."""
+        response.success, response.message = self.pause()
         return response
+
+    def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Service ~/pause: come to rest on the path (true), or go on along it (false)."""
+        response.success, response.message = self.pause() if request.data else self.go_on(1)
+        return response
+
+    def on_retreat(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Service ~/retreat: go back along the path as it was driven, the heading kept."""
+        response.success, response.message = self.go_on(-1)
+        return response
+
+    def on_speed(self, message: Float64) -> None:
+        """Topic ~/speed: as the parameter `speed`."""
+        result = self.set_parameters([Parameter("speed", value=float(message.data))])[0]
+        self.report("speed", "" if result.successful else "refused", result.reason, False)
+
+    def on_parameters(self) -> None:
+        """Take up another speed."""
+        if self.course is not None:
+            self.course.set_speed(self.speed, self.position)
+
+    @property
+    def speed(self) -> float:
+        """Share of the planned speed."""
+        return self.parameters.read(PublisherOptions).speed
+
+    def pause(self) -> tuple[bool, str]:
+        """Come to rest on the path; whether it does, and where."""
+        if self.course is None:
+            return False, "not started"
+        self.is_paused = True
+        self.course.pause(self.position)
+        return self.said(f"comes to rest within {self.course.ramp_time:.3g} s")
+
+    def go_on(self, direction: int) -> tuple[bool, str]:
+        """Go on along the path, or back (-1); whether it does."""
+        if self.course is None:
+            return False, "not started"
+        self.is_paused = False
+        if self.waits_for_rest and direction > 0:
+            return True, self.begin()
+        self.waits_for_rest = False
+        self.course.go_on(self.position, direction)
+        return self.said("goes on" if direction > 0 else "goes back along the path")
+
+    def said(self, what: str) -> tuple[bool, str]:
+        """Log what is done for a service."""
+        self.get_logger().info(what)
+        return True, what
+
+    # Beginning
+
+    def begin(self) -> str:
+        """Start what is planned at the next odometry, once the climber rests; say so."""
+        if self.course is not None and self.is_driven and not self.course.rests(self.position):
+            self.course.pause(self.position)
+            self.waits_for_rest = True
+            return "comes to rest, then starts"
+        self.waits_for_rest = False
+        self.wait_for_odometry()
+        return "starts at the next odometry"
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether the course is followed, as far as is known."""
+        return self.mode in ("", FOLLOWING)
 
     def wait_for_odometry(self) -> None:
         """Subscribe the odometry, to start at the next one."""
@@ -124,33 +224,36 @@ class TrajectoryPublisher(ClimberNode):
         self.report("start", "")
         self.destroy_subscription(self.odometry)
         self.odometry = None
-        self.trajectory, self.next_point = self.planned, 0
-        self.points.clear()
-        self.followed = None
-        self.start = stamp + round(self.options.start_delay * SECOND)
+        start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
+        make, options = writing.reference_numbers, self.options
+        self.course = Course(self.planned, start, options, make, self.is_paused, self.speed)
+        self.followed, self.mode, self.has_told_done = None, "", False
         self.last_look = now or stamp  # the odometry may have come before the first clock
-        self.publish_around(self.start)
-        shape = self.parameters.read(TrajectoryParameters).shape
-        self.get_logger().info(f"{shape} starts at {self.start / SECOND:.3f} s")
-        self.publish_path(self.start)
+        self.publish_around(start)
+        self.get_logger().info(f"{self.planned_name} starts at {start / SECOND:.3f} s")
+        self.publish_path(start)
 
     def on_reference_time(self, message: TimeReference) -> None:
         """Keep how far a controller has come, unless that is of another trajectory."""
         followed = reading.nanoseconds(message.time_ref)
         stamp, now = reading.nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
         is_of_now = stamp < now + ODOMETRY_AGE * SECOND
-        if self.start is not None and is_of_now and self.start <= followed <= stamp + SECOND:
-            self.followed = followed
+        if (
+            self.course is not None
+            and is_of_now
+            and self.course.start <= followed <= stamp + SECOND
+        ):
+            self.followed, self.mode = followed, message.source
 
     @property
     def position(self) -> int:
-        """Stamp [ns] that the trajectory has come to: the controller's, else the clock's."""
-        assert self.start is not None
+        """Stamp [ns] that the course has come to: the controller's, else the clock's."""
+        assert self.course is not None
         if self.followed is not None:
             return self.followed
         if self.count_publishers(REFERENCE_TIME):
-            return self.start
-        return max(self.start, self.get_clock().now().nanoseconds)
+            return self.course.start
+        return max(self.course.start, self.get_clock().now().nanoseconds)
 
     def publish_path(self, stamp: int) -> None:
         """Publish the whole path, for display."""
@@ -160,13 +263,43 @@ class TrajectoryPublisher(ClimberNode):
     def publish(self) -> None:
         """Publish the preview from where the trajectory has come to."""
         now = self.get_clock().now().nanoseconds
-        if 0 < now < self.last_look - CLOCK_STEP and self.start is not None:
+        if 0 < now < self.last_look - CLOCK_STEP and self.course is not None:
             self.get_logger().warning("the clock went back: starts again at the next odometry")
-            self.start = None
+            self.course, self.waits_for_rest = None, False
             self.wait_for_odometry()
         self.last_look = now
-        if self.start is not None:
-            self.publish_around(self.position)
+        given = self.given.ready()
+        if given is not None:
+            self.planned, described = given
+            self.planned_name = "path"
+            begins = self.begin()
+            self.get_logger().info(f"path taken: {described}; {begins}")
+        if self.course is not None:
+            position = self.position
+            self.publish_around(position)
+            self.tell_done(self.course, position)
+            if self.waits_for_rest and (self.course.rests(position) or not self.is_driven):
+                self.begin()
+        if self.is_progress_due(now) and self.progress.get_subscription_count():
+            self.publish_progress(now)
+
+    def tell_done(self, course: Course[Row], position: int) -> None:
+        """Log once that the course has come to its end."""
+        is_done = course.is_done(position)
+        if is_done and not self.has_told_done:
+            where = "end" if course.direction > 0 else "beginning"
+            self.get_logger().info(f"done: at the {where} after {course.time(position):.1f} s")
+        self.has_told_done = is_done
+
+    def publish_progress(self, now: int) -> None:
+        """Publish how far the course is."""
+        how_far = Progress(WAITING)
+        if self.course is not None:
+            if self.odometer is None or self.odometer.trajectory is not self.course.trajectory:
+                self.odometer = Odometer(self.course.trajectory)
+            how_far = progress(self.course, self.odometer, self.position, self.mode)
+        name = self.get_fully_qualified_name()
+        self.progress.publish(writing.progress(name, vars(how_far), now))
 
     def publish_at_standstill(self) -> None:
         """Publish again while time stands still: lock-step may wait for a preview that was lost."""
@@ -177,17 +310,8 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_around(self, position: int) -> None:
         """Publish the preview at `position` [ns], from a little before it to its end."""
-        assert self.start is not None
-        options, time = self.options, (position - self.start) / SECOND
-        oldest = time - options.publish_period - 2 * options.point_period
-        self.next_point = max(self.next_point, int(oldest / options.point_period))
-        while self.next_point * options.point_period < time + options.preview:
-            at = self.next_point * options.point_period
-            self.points.append(writing.reference_numbers(self.trajectory.at(at), at))
-            self.next_point += 1
-        while self.points[0][-2] * SECOND + self.points[0][-1] < oldest * SECOND:
-            self.points.popleft()
-        self.reference.publish(self.serialized(self.points, self.start))
+        assert self.course is not None
+        self.reference.publish(self.serialized(self.course.preview(position), self.course.start))
 
 
 def main() -> None:

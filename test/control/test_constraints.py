@@ -62,6 +62,20 @@ def test_ahead_of_a_reference_that_comes_it_overcomes_no_friction_to_go_back(spe
     assert np.sign(slower) == -np.sign(ahead)
 
 
+@pytest.mark.parametrize("ahead", [-2e-4, 2e-4])
+def test_at_rest_the_sign_of_the_references_speed_changes_nothing(ahead):
+    """It is but rounding there; and where it turns round, friction's share changes gradually."""
+    motion, gains = Motion(ahead, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), Guidance()
+
+    def wanted(speed):
+        target = ReferencePoint(0.0, 0.0, 0.0, speed, *(7 * [0.0]))
+        return gains.desired_acceleration(gains.prepare(target), motion).speed
+
+    assert wanted(1e-9) == pytest.approx(wanted(-1e-9), abs=1e-8)
+    speeds = np.linspace(-0.01, 0.01, 2001)
+    assert np.abs(np.diff([wanted(speed) for speed in speeds])).max() <= 2 * 1e-5
+
+
 @settings(deadline=None)
 @given(cases)
 def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):

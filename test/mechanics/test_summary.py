@@ -5,7 +5,7 @@ import pytest
 
 from climber_uk.mechanics.shapes import SHAPES, Circle, Ellipse, Lemniscate, Line, SineWave
 from climber_uk.mechanics.summary import summary
-from climber_uk.mechanics.time_laws import ConstantRate, RestToRest, Stopping
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
 BEND = 0.2 * (2 * math.pi) ** 2  # [1/m] of the sine wave at its crests
@@ -68,14 +68,6 @@ def test_ramps_that_fill_the_way_keep_it_slow():
     said = summary(Trajectory(Line(1.0), RestToRest(rate=50.0, ramp_time=2.0)))
     assert said.fastest_speed == pytest.approx(0.5)
     assert said.duration == pytest.approx(4.0)
-
-
-def test_a_stopped_trajectory_is_as_fast_as_it_got():
-    # 0.2 s of a ramp of 1 s: u³ (10 - 15 u + 6 u²) at u = 0.2; the clock then slows down
-    law = Stopping(RestToRest(rate=1.0, ramp_time=1.0), start=0.2, ramp_time=1e-3)
-    said = summary(Trajectory(Line(1.0), law))
-    assert said.fastest_speed == pytest.approx(0.05792, rel=2e-3)
-    assert said.duration == pytest.approx(0.201)
 
 
 @pytest.mark.parametrize("reverse_gear", [False, True])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from climber_uk.mechanics.shapes import SHAPES, Circle, Ellipse, Line
-from climber_uk.mechanics.time_laws import ConstantRate, RestToRest, Stopping
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.waypoints import Waypoints
 
@@ -16,7 +16,7 @@ def waypoints(tmp_path):
     def make(points):
         file = tmp_path / "points.txt"
         np.savetxt(file, points)
-        return Waypoints(str(file))
+        return Waypoints(file=str(file))
 
     return make
 
@@ -36,7 +36,6 @@ LAWS = {
     "once": RestToRest(rate=0.8, ramp_time=1.5),
     "repeated": RestToRest(rate=0.8, ramp_time=1.5, runs=3, laps=2, pause=0.4),
     "too short for its ramps": RestToRest(rate=50.0, ramp_time=1.5),
-    "stopped": Stopping(RestToRest(rate=0.8, ramp_time=1.5), start=1.3, ramp_time=0.7),
 }
 
 
@@ -91,16 +90,6 @@ def test_reverse_gear_turns_the_climber_but_not_the_path():
     np.testing.assert_allclose(forwards.velocity, backwards.velocity)
     assert backwards.pose[2] - forwards.pose[2] == pytest.approx(math.pi)
     assert backwards.speed == pytest.approx(-forwards.speed)
-
-
-def test_stopping_leaves_the_past_alone_and_rests_after_its_ramp():
-    law = RestToRest(rate=0.8, ramp_time=1.0)
-    going = Trajectory(Circle(), law)
-    stopped = Trajectory(Circle(), Stopping(law, start=2.0, ramp_time=1.0))
-    np.testing.assert_array_equal(stopped.at(1.9).pose, going.at(1.9).pose)
-    assert stopped.duration == 3.0
-    np.testing.assert_allclose(stopped.at(3.0).pose, stopped.at(50.0).pose)
-    np.testing.assert_allclose(stopped.at(3.0).velocity, 0, atol=1e-12)
 
 
 def test_an_open_shape_refuses_a_law_that_would_run_off_it():

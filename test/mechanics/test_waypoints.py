@@ -47,7 +47,9 @@ def folder(tmp_path_factory):
 def made(folder, points, **parameters):
     file = folder / "points.txt"
     np.savetxt(file, points)
-    return Waypoints(str(file), max_yaw_rate=YAW_RATE, max_acceleration=ACCELERATION, **parameters)
+    return Waypoints(
+        file=str(file), max_yaw_rate=YAW_RATE, max_acceleration=ACCELERATION, **parameters
+    )
 
 
 def distance(places, line):

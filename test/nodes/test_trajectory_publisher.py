@@ -65,12 +65,16 @@ def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(w
         )
 
     world.wait(at_rest, "rest")
-    # nothing that was published before was taken back
-    points = {}
+    # what is near is never taken back: 0.3 s from where each preview begins
+    points, taken_back = {}, []
     for message in references:
+        begin = reading.nanoseconds(message.points[0].time_from_start)
         for point in message.points:
             time = reading.nanoseconds(point.time_from_start)
-            assert points.setdefault(time, point) == point
+            if points.setdefault(time, point) != point:
+                taken_back.append(time - begin)
+                points[time] = point
+    assert min(taken_back) > 0.3 * SECOND
 
 
 @pytest.mark.parametrize("seconds", [0, 5])

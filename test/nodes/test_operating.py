@@ -1,0 +1,127 @@
+"""An operator pauses a climber on its path, goes on, slower, and back: the three nodes."""
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
+from test_faults import LIMIT, PLANNER
+from test_waiting import Waiting
+
+pytestmark = pytest.mark.nodes
+
+
+class Operated(Waiting):
+    """A climb with an operator."""
+
+    def __init__(self, world, changed=None):
+        super().__init__(world, changed)
+        self.progress = world.listen(DiagnosticArray, f"{PLANNER}/progress")
+
+    def pause(self, paused):
+        asked = SetBool.Request(data=paused)
+        return self.world.call(SetBool, f"{PLANNER}/pause", asked)
+
+    def ask(self, service):
+        return self.world.call(Trigger, f"{PLANNER}/{service}", Trigger.Request())
+
+    def told(self):
+        """What was told last of the progress: its state, and numbers by name."""
+        (status,) = self.progress[-1].status
+        return status.message, {pair.key: float(pair.value) for pair in status.values}
+
+    def is_told_to_be(self, state):
+        self.progress.clear()
+        self.world.wait(lambda: self.progress and self.told()[0] == state, state)
+        return self.told()[1]
+
+    def drives(self, low, high):
+        """Wait until its speed [m/s] is between these for 0.5 s."""
+
+        def is_so():
+            last = [m.twist.twist.linear.x for m in self.odometry[-100:]]
+            return len(last) == 100 and low <= min(last) <= max(last) <= high
+
+        self.world.wait(is_so, f"a speed of {low} to {high} m/s")
+
+    def largest_jump(self):
+        efforts = np.array([m.effort for m in self.torques])
+        return np.abs(np.diff(efforts, axis=0)).max()
+
+
+def path(places, frame="odom"):
+    message = Path()
+    message.header.frame_id = frame
+    for x, y in places:
+        message.poses.append(PoseStamped())
+        message.poses[-1].pose.position.x, message.poses[-1].pose.position.y = x, y
+    return message
+
+
+def test_a_path_from_outside_is_taken_up_in_mid_course_or_refused_in_words(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    climb = Operated(world, {PLANNER: line, "plant_simulator": ["initial_heading:=0.0"]})
+    climb.drives(0.28, 0.31)
+    given = world.speak(Path, "path")
+    given.publish(path([(0.0, 0.0), (1.0, 1.0)], "map"))
+    given.publish(path([(0.0, 0.0), (float("nan"), 1.0)]))
+    given.publish(path([(1.0, 1.0), (1.0, 1.0)]))
+    for why in (
+        "path refused: frame_id='map' must be 'odom'",
+        "path refused: pose 2 at (nan, 1) is not finite",
+        "path refused: path: all points are within 0.00333 m",
+    ):
+        world.wait(lambda why=why: why in world.log(PLANNER), why)
+    climb.drives(0.28, 0.31)
+    corner = path([(2.0, 3.0), (2.0, 3.5), (1.5, 3.5)])
+    given.publish(corner)
+    given.publish(corner)
+    world.wait(lambda: "comes to rest, then starts" in world.log(PLANNER), "a path taken up")
+    climb.is_told_to_be("done")
+    end = climb.odometry[-1].pose.pose.position
+    assert (end.x, end.y) == pytest.approx((1.5, 3.5), abs=0.01)
+    assert world.log(PLANNER).count("path taken") == 1
+    assert "path starts at" in world.log(PLANNER)
+
+
+def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    start = ["initial_heading:=0.0"]
+    climb = Operated(world, {PLANNER: line, "plant_simulator": start})
+    climb.drives(0.28, 0.31)
+    assert climb.pause(True).success
+    paused = climb.is_told_to_be("paused")
+    climb.drives(-1e-3, 1e-3)
+    assert paused["done"] + paused["left"] == pytest.approx(4.0, abs=1e-6)
+    x = climb.odometry[-1].pose.pose.position.x
+    assert paused["done"] == pytest.approx(x, abs=0.01)
+    assert climb.is_told_to_be("paused")["done"] == pytest.approx(paused["done"], abs=1e-6)
+
+    world.speak(Float64, f"{PLANNER}/speed").publish(Float64(data=0.5))
+    climb.pause(False)
+    climb.drives(0.14, 0.16)
+    world.speak(Float64, f"{PLANNER}/speed").publish(Float64(data=1.5))
+    world.wait(
+        lambda: "out of range Min: 0.01, Max: 1.0, value: 1.5" in world.log(PLANNER),
+        "a refusal in words",
+    )
+    climb.drives(0.14, 0.16)
+    climb.ask("retreat")
+    climb.drives(-0.16, -0.14)
+    back = climb.is_told_to_be("done")
+    assert back["done"] == pytest.approx(0.0, abs=1e-6)
+    climb.drives(-1e-3, 1e-3)
+    assert climb.odometry[-1].pose.pose.position.x == pytest.approx(0.0, abs=0.01)
+    assert "done: at the beginning" in world.log(PLANNER)
+
+    world.speak(Float64, f"{PLANNER}/speed").publish(Float64(data=1.0))
+    assert climb.ask("start").message == "starts at the next odometry"
+    climb.drives(0.28, 0.31)
+    assert climb.ask("start").message == "comes to rest, then starts"
+    climb.is_told_to_be("approaching")
+    climb.is_told_to_be("done")
+    assert climb.odometry[-1].pose.pose.position.x == pytest.approx(4.0, abs=0.01)
+    assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
+    assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01

@@ -1,0 +1,109 @@
+"""Paths from outside are driven within their tolerance, or refused in words."""
+
+import numpy as np
+import pytest
+from random_paths import random_path
+from under_way import UnderWay
+
+from climber_uk.control.safety import Mode
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
+from climber_uk.mechanics.waypoints import Rounding
+from climber_uk.planning.given_path import Manner, planned
+
+RATE, TOLERANCE, LIMIT = 0.2, 0.02, 4.0
+MANNER = Manner(Rounding(tolerance=TOLERANCE), RestToRest(rate=RATE, ramp_time=2.0))
+
+
+def distance(places, line):
+    """Distances (n,) of places (n, 2) from a polyline, of whose points 2000 are looked at."""
+    line = line[:: max(1, len(line) // 2000)]
+    starts, ways = line[:-1], np.diff(line, axis=0)
+    square = np.maximum((ways**2).sum(axis=1), 1e-300)
+    gaps = places[:, None] - starts
+    share = np.clip((gaps * ways).sum(axis=2) / square, 0, 1)
+    return np.hypot(*np.moveaxis(gaps - share[..., None] * ways, -1, 0)).min(axis=1)
+
+
+class Sent(UnderWay):
+    """A climber that is sent along one path after the other, each in the midst of the other.
+
+    No torque changes by more than 0.2 N m from one odometry to the next (5 ms).
+    """
+
+    def __init__(self, trajectory):
+        super().__init__(trajectory, max_torque_rate=40.0)
+
+    def send(self, trajectory):
+        self.course.pause(self.position)
+        self.run(20, until=lambda: self.course.rests(self.position))
+        self.begin(trajectory)
+
+    def drive(self, seconds):
+        """Approach the path, and follow it for some time, or to its end."""
+        self.run(seconds + 30, until=lambda: self.has_followed(seconds))
+
+    def has_followed(self, seconds):
+        if self.modes[-1] is not Mode.FOLLOWING:
+            return False
+        time, _ = self.course.own_time(self.position)
+        return time >= seconds or self.course.is_done(self.position)
+
+    def check(self, first, places):
+        """Assert what holds while it follows, since `first`: not on its way there."""
+        modes = self.modes[first:]
+        assert set(modes) <= {Mode.FOLLOWING, Mode.APPROACHING}
+        follows = np.array([mode is Mode.FOLLOWING for mode in modes])
+        assert follows.any()
+        driven = self.places[first:][follows][::20]
+        # where it begins near the path it is not on it yet
+        assert distance(driven[len(driven) // 2 :], places).max() <= TOLERANCE + 5e-3
+        assert np.abs(self.sent[first:]).max() <= LIMIT
+        assert np.abs(np.diff(self.sent[max(first - 1, 0) :], axis=0)).max() <= 0.2 + 1e-9
+        speeds = np.array([abs(state.forward_speed) for state in self.states[first:]])
+        assert speeds[follows].max() <= 1.05 * RATE
+
+
+def drive_at_random(random, number):
+    """Send a climber along `number` paths; return how many were refused."""
+    climber, refused = None, []
+    for _ in range(number):
+        name, places = random_path(random)
+        if climber is not None:
+            places = places - places[0] + climber.places[-1] + random.normal(0, 0.3, 2)
+        try:
+            trajectory, _ = planned(places, MANNER)
+        except ValueError as error:
+            refused.append((name, str(error)))
+            continue
+        if climber is None:
+            climber = Sent(trajectory)
+        else:
+            climber.send(trajectory)
+        first = len(climber.times)
+        whole = random.random() < 0.5
+        climber.drive(min(trajectory.duration if whole else random.uniform(2, 12), 60))
+        climber.check(first, places)
+    assert {name for name, _ in refused} <= {"unfit", "noisy"}
+    assert all(" m" in said for _, said in refused)
+    return len(refused)
+
+
+def test_random_paths_are_driven_or_refused_in_words():
+    drive_at_random(np.random.default_rng(3), 2)
+
+
+@pytest.mark.soak
+def test_a_hundred_random_paths():
+    assert drive_at_random(np.random.default_rng(4), 100) > 0
+
+
+@pytest.mark.parametrize(
+    ("places", "law", "why"),
+    [
+        (np.zeros((4, 2)), MANNER.law, "path: all points are within 0.00333 m"),
+        ([[0, 0], [1, 0]], ConstantRate(0.2), "use 'rest_to_rest'"),
+    ],
+)
+def test_what_cannot_be_driven_is_refused_in_words(places, law, why):
+    with pytest.raises(ValueError, match=why):
+        planned(np.array(places, float), Manner(MANNER.rounding, law))

@@ -1,0 +1,85 @@
+"""A course, its controller and the climber of config/climber.yaml, in lock-step."""
+
+from pathlib import Path
+
+import numpy as np
+
+from climber_uk.control.build import build_controller
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.preview import Preview
+from climber_uk.mechanics.quantities import State
+from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.planning.course import Course, CourseOptions
+from climber_uk.simulation.plant import Plant
+
+CONFIG = Path(__file__).parents[2] / "config" / "climber.yaml"
+STEP, PERIOD = 0.0025, 0.005  # [s] of the plant, and from one odometry to the next
+TOLD_EVERY, PUBLISHED_EVERY = 10, 20  # [periods], as the nodes do
+
+
+def preview(rows):
+    """Preview of points (time [ns], reference)."""
+    times, references = zip(*rows, strict=True)
+    parts = (
+        np.array([getattr(r, part) for r in references])
+        for part in ("pose", "velocity", "acceleration")
+    )
+    return Preview(np.array(times, np.int64), *parts)
+
+
+class UnderWay:
+    """Odometry every 5 ms, torques that act at once, previews every 0.1 s."""
+
+    def __init__(self, trajectory, *, state=None, options=None, **parameters):
+        self.options = options or CourseOptions()
+        given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
+        self.controller = build_controller(Values(given), None)
+        self.plant = Plant(self.controller.law.climber, STEP)
+        self.now, self.torques = SECOND, np.zeros(2)
+        self.times, self.states, self.sent, self.positions, self.modes = [], [], [], [], []
+        self.begin(trajectory)
+        reference = trajectory.at(0.0)
+        self.state = state or State(reference.pose, reference.velocity)
+
+    def begin(self, trajectory, **how):
+        start = self.now
+        make = lambda reference, time: (start + round(time * SECOND), reference)  # noqa: E731
+        self.course = Course(trajectory, start, self.options, make, **how)
+        self.position, self.period = start, 0
+
+    @property
+    def time(self):
+        """Seconds since the course was begun."""
+        return self.course.time(self.now)
+
+    def run(self, seconds, until=lambda: False):
+        """Go on for some time, or until something holds."""
+        for _ in range(round(seconds / PERIOD)):
+            if self.period % PUBLISHED_EVERY == 0:
+                self.controller.on_reference(self.now, preview(self.course.preview(self.position)))
+            answer = self.controller.on_odometry(self.now, self.now, self.state.motion)
+            if answer is not None:
+                self.torques = answer.torques
+            if self.period % TOLD_EVERY == 0:
+                position = self.controller.active.position(self.controller.stamp)
+                self.position = self.position if position is None else position
+            self.times.append(self.now)
+            self.states.append(self.state)
+            self.sent.append(self.torques)
+            self.positions.append(self.course.own_time(self.position)[0])
+            self.modes.append(self.controller.mode)
+            self.state = self.plant.advance(self.state, self.torques, round(PERIOD / STEP))
+            self.now += round(PERIOD * SECOND)
+            self.period += 1
+            if until():
+                break
+        return self
+
+    @property
+    def places(self):
+        return np.array([state.pose[:2] for state in self.states])
+
+    @property
+    def largest_jump(self):
+        """Largest change [N m] of a wheel's torque from one odometry to the next."""
+        return np.abs(np.diff(self.sent, axis=0)).max()
