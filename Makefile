@@ -13,7 +13,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 
-.PHONY: demo paper campaign docs bench test lint unit coverage soak colcon clean
+.PHONY: demo paper campaign docs bench physics test lint unit coverage soak colcon clean
 
 demo: $(SET_UP)
 	@exec $(BIN)/run_demo --with-parent --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
@@ -34,6 +34,14 @@ docs: $(SET_UP)
 # Beside MuJoCo and Pinocchio, which are installed for it
 bench: $(VENV)/bench
 	@$(BIN)/python bench/all.py
+
+# Our plant beside MuJoCo, which is installed for it
+physics: $(VENV)/physics
+	@$(BIN)/python bench/physics.py
+
+$(VENV)/physics: $(SET_UP) bench/requirements.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint bench/requirements.txt mujoco
+	touch $@
 
 $(VENV)/bench: $(SET_UP) bench/requirements.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint requirements.txt \
