@@ -1,7 +1,7 @@
 """`python bench/physics.py`: our plant beside MuJoCo, driven by the same controller over paths.
 
-The robot of config/climber.yaml on two wheels and on four, by torques, and on four by speeds
-(config/velocity.yaml), with `slip: true`. Both are made from the same parameters. The distance from
+The robots of config/climber.yaml and four_wheels.yaml, by torques, and the one of velocity.yaml on
+four wheels, by speeds, with `slip: true`. Both are made from the same parameters. The distance from
 the reference, RMS and largest [mm], the largest side slip [mm/s], and the half track that wheels
 show while it turns [m]. MuJoCo is not installed with the package: `make physics` does it.
 """
@@ -61,11 +61,10 @@ PATHS: dict[str, tuple[dict[str, Any], float]] = {  # parameters of the planner,
 }
 # rotors behind a gear: wheels that are much lighter chatter on the engine's contacts
 TWO = {"slip": True, "wheel_inertia": 2e-4}
-FOUR = {**TWO, "locomotion": "four_wheeled"}
 ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
     "two wheels": ("climber.yaml", TWO),
-    "four wheels": ("climber.yaml", FOUR),
-    "four wheels, by speeds": ("velocity.yaml", FOUR),
+    "four wheels": ("four_wheels.yaml", {}),
+    "four wheels, by speeds": ("velocity.yaml", {**TWO, "locomotion": "four_wheeled"}),
 }
 
 

@@ -165,11 +165,11 @@ class MujocoDriver(ClimberNode):
         if self.is_simulated:
             self.clock.publish(Clock(clock=writing.time(self.stamp)))
         self.truth.publish(writing.odometry(climber.state, self.stamp, *frames))
-        joints = JointState(name=[names.left_wheel_joint, names.right_wheel_joint])
+        joints = JointState(name=names.wheels.all)
         joints.header.stamp = writing.time(self.stamp)
-        joints.position = climber.angles[::-1].tolist()
-        joints.velocity = climber.rates[::-1].tolist()
-        joints.effort = climber.torques[::-1].tolist()
+        joints.position = names.wheels.rates(*writing.left_right(climber.angles))
+        joints.velocity = names.wheels.rates(*writing.left_right(climber.rates))
+        joints.effort = names.wheels.torques(*writing.left_right(climber.torques))
         self.joints.publish(joints)
         if self.is_due(self.stamp):
             pressure = FluidPressure(fluid_pressure=float(climber.pressure))
