@@ -17,7 +17,7 @@ SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: demo help paper campaign docs bench test lint unit coverage soak colcon clean
+.PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean
 
 ## run the nodes, and tell how well; CONFIG=config/climber.yaml, CLOCK=wall, CLIMBERS=4
 demo: $(SET_UP)
@@ -44,6 +44,14 @@ docs: $(SET_UP)
 ## speed and accuracy beside others', which are installed for it
 bench: $(VENV)/bench
 	@$(BIN)/python bench/all.py
+
+## our plant beside MuJoCo, which is installed for it
+physics: $(VENV)/physics
+	@$(BIN)/python bench/physics.py
+
+$(VENV)/physics: $(SET_UP) bench/requirements.txt
+	$(PIP) --constraint bench/requirements.txt mujoco
+	touch $@
 
 $(VENV)/bench: $(TOOLS) bench/requirements.txt
 	$(PIP) --constraint requirements.txt --requirement bench/requirements.txt

@@ -31,6 +31,8 @@ setup(
         "fast": ["numba"],
         # the same on all of an accelerator, or faster on a CPU
         "accelerator": ["jax"],
+        # examples/mujoco_driver.py: a climber of other physics
+        "physics": ["mujoco"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo", "coverage"],
     },
     zip_safe=False,

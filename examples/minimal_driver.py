@@ -30,12 +30,14 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
 SECOND = 1_000_000_000  # [ns]
-LEFT, RIGHT = "left_wheel_joint", "right_wheel_joint"
 PARAMETERS: dict[str, tuple[Any, tuple[float, float] | None, str]] = {  # default, bounds, meaning
     "device": ("/dev/ttyACM0", None, "serial port of the board"),
     "prefix_frames": (True, None, "put the node's namespace before both frames"),
     "wheel_radius": (0.027, (1e-3, 1.0), "radius of the wheels [m]"),
     "half_track": (0.3, (1e-3, 10.0), "distance of a wheel from the centre [m]"),
+    "effective_half_track": (0.0, (0.0, 10.0), "by which wheels reckon turns; 0: half_track [m]"),
+    "left_wheel_joint": ("left_wheel_joint", None, "of several of the side, front to rear: a, b"),
+    "right_wheel_joint": ("right_wheel_joint", None, "the same of the right side"),
     "encoder_counts": (4096, (4, 1e8), "counts in a turn of a wheel"),
     "motor_constant": (0.025, (1e-4, 10.0), "torque of a motor for a current [N m/A]"),
     "gear_ratio": (50.0, (1e-2, 1e4), "turns of a motor in a turn of its wheel"),
@@ -239,7 +241,10 @@ class Driver(Node):
         self.torque = value["motor_constant"] * value["gear_ratio"]  # [N m] at a wheel for 1 A
         self.max_current = value["max_current"]
         start = value["initial_x"], value["initial_y"], value["initial_heading"]
-        self.reckoning = DeadReckoning(self.radius * angle, value["half_track"], start)
+        turning = value["effective_half_track"] or value["half_track"]
+        self.reckoning = DeadReckoning(self.radius * angle, turning, start)
+        names = value["left_wheel_joint"], value["right_wheel_joint"]
+        self.left, self.right = ([joint.strip() for joint in side.split(",")] for side in names)
         self.board_clock = BoardClock(self.get_parameter("use_sim_time").value)
         prefix = f"{self.get_namespace()}/".lstrip("/") if value["prefix_frames"] else ""
         self.odom_frame, self.base_frame = prefix + "odom", prefix + "base_link"
@@ -297,15 +302,19 @@ class Driver(Node):
         if self.acting and stamp - self.answered > self.timeout * SECOND:
             self.say("wheel_torques", f"none for {self.timeout:g} s; {self.instead}")
             self.let_go()  # when this driver has stopped, too, the board does it
-        odometry, joints = Odometry(), JointState(name=[LEFT, RIGHT])
+        odometry, joints = Odometry(), JointState(name=self.left + self.right)
         time = Time(sec=stamp // SECOND, nanosec=stamp % SECOND)
         odometry.header.stamp = joints.header.stamp = time
         odometry.header.frame_id, odometry.child_frame_id = self.odom_frame, self.base_frame
         self.reckoning.fill(odometry)
         self.odometry.publish(odometry)  # first: the controller waits for it
-        joints.position = [way / self.radius for way in self.reckoning.rolled]
-        joints.velocity = [speed / self.radius for speed in self.reckoning.speeds]
-        joints.effort = [self.torque * current for current in frame.currents]
+        angles, rates = (
+            [way / self.radius for way in pair]
+            for pair in (self.reckoning.rolled, self.reckoning.speeds)
+        )
+        left, right = (self.torque * current for current in frame.currents)
+        joints.position, joints.velocity = self.of_each(*angles), self.of_each(*rates)
+        joints.effort = self.of_each(left / len(self.left), right / len(self.right))
         self.joint_states.publish(joints)
 
     # To the board
@@ -320,7 +329,14 @@ class Driver(Node):
         elif stamp != self.answered:  # else it was sent twice
             self.answered, self.acting = stamp, True
             told = dict(zip(message.name, self.obeyed(message), strict=True))
-            self.send(told[LEFT], told[RIGHT])
+            left, right = (sum(told[joint] for joint in side) for side in (self.left, self.right))
+            if self.takes_speeds:  # the mean of a side's wheels; of their torques the sum
+                left, right = left / len(self.left), right / len(self.right)
+            self.send(left, right)
+
+    def of_each(self, left: float, right: float) -> list[float]:
+        """Number of each joint, where all of a side have the same."""
+        return [left] * len(self.left) + [right] * len(self.right)
 
     def obeyed(self, message: JointState) -> Any:
         """Torques [N m], or rates [rad/s] for a board that takes speeds."""
@@ -335,7 +351,8 @@ class Driver(Node):
 
     def fault(self, message: JointState, stamp: int) -> str:
         """What is wrong with a command; '' if nothing is."""
-        if sorted(message.name) != [LEFT, RIGHT] or len(self.obeyed(message)) != 2:
+        joints = sorted(self.left + self.right)
+        if sorted(message.name) != joints or len(self.obeyed(message)) != len(joints):
             return "not one for each wheel"
         if not all(map(math.isfinite, self.obeyed(message))):
             return "not finite"

@@ -1,4 +1,4 @@
-"""The two wheels among the joints that messages name.
+"""The wheels of both sides among the joints that messages name.
 
 Their names are parameters of the controller, of the bag or of a file. Where neither has them, they
 are the one with "left" and the one with "right" in it, if there is one of each.
@@ -14,9 +14,10 @@ from climber_uk.bags.batches import Batch
 from climber_uk.bags.extraction import are_sound
 from climber_uk.bags.time_series import Samples, TimeSeries
 from climber_uk.mechanics import Array, Stamps
-from climber_uk.messages.names import Names
+from climber_uk.messages.names import Names, WheelJoints, wheel_joints
 
 WHEELS = "right", "left"
+Side = tuple[str, ...]  # joints of its wheels
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,19 @@ class Joints:
         arrays = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "names"}
         return replace(self, **arrays)
 
-    def samples(self, quantity: str, joints: Sequence[str]) -> Samples:
-        """The `rates`, `torques` or `angles` (n, j) of j of the joints, in their order."""
-        columns = [self.names.index(joint) for joint in joints]
-        values = getattr(self, quantity)[:, columns]
+    def samples(self, quantity: str, sides: Sequence[Side]) -> Samples:
+        """The `rates`, `torques` or `angles` (n, j) of j sides: sums of torques, else means."""
+        values = np.stack([self._of_side(quantity, side) for side in sides], axis=1)
         faults = np.where(are_sound(values).all(axis=1), 0, 1)
         return Samples(self.stamps, self.arrivals, values, faults)
+
+    def _of_side(self, quantity: str, side: Side) -> Array:
+        values = getattr(self, quantity)[:, [self.names.index(joint) for joint in side]]
+        return values.sum(axis=1) if quantity == "torques" else values.mean(axis=1)
+
+    def have(self, sides: Sequence[Side]) -> bool:
+        """Whether all joints of some sides are among these."""
+        return {joint for side in sides for joint in side} <= set(self.names)
 
 
 def _each(batch: Batch, field: str, count: int) -> Array:
@@ -68,21 +76,23 @@ def _missing(batch: Batch, count: int) -> Array:
     return np.broadcast_to(np.nan, (len(batch), count))
 
 
-def wheel_names(parts: Sequence[Joints], parameters: Mapping[str, Any]) -> tuple[str, str]:
-    """Names of the right and the left wheel; `ValueError` if they are not among the joints."""
+def wheel_names(parts: Sequence[Joints], parameters: Mapping[str, Any]) -> tuple[Side, Side]:
+    """Joints of the right and the left wheels; `ValueError` if they are not among the joints."""
     present, usual = sorted({name for part in parts for name in part.names}), vars(Names())
     keys = [f"{side}_wheel_joint" for side in WHEELS]
-    wanted = [str(parameters.get(key, usual[key])) for key in keys]
-    if not set(keys) & parameters.keys() and not set(wanted) <= set(present):
+    right, left = (str(parameters.get(key, usual[key])) for key in keys)
+    joints = wheel_joints(left, right)
+    if not set(keys) & parameters.keys() and not set(joints.all) <= set(present):
         by_side = [[name for name in present if side in name.lower()] for side in WHEELS]
         if [len(names) for names in by_side] == [1, 1] and by_side[0] != by_side[1]:
-            wanted = [names[0] for names in by_side]
+            joints = WheelJoints(right=(by_side[0][0],), left=(by_side[1][0],))
+    wanted = joints.right + joints.left
     if missing := [name for name in wanted if name not in present]:
         raise ValueError(
             f"no {' and no '.join(missing)} among the joints {', '.join(present) or '(no names)'}: "
             f"{' and '.join(keys)} in a --params file say what they are called"
         )
-    return wanted[0], wanted[1]
+    return joints.right, joints.left
 
 
 def torques_and_angles(parts: Sequence[Joints], parameters: Mapping[str, Any]) -> TimeSeries:
@@ -92,7 +102,7 @@ def torques_and_angles(parts: Sequence[Joints], parameters: Mapping[str, Any]) -
     """
     wheels = wheel_names(parts, parameters)
     both = []
-    for part in (part for part in parts if set(wheels) <= set(part.names)):
+    for part in (part for part in parts if part.have(wheels)):
         torques, angles = (part.samples(quantity, wheels) for quantity in ("torques", "angles"))
         values = np.hstack([torques.values, angles.values])
         both.append(torques._replace(values=values, faults=0 * torques.faults))
@@ -105,10 +115,11 @@ def commanded_torques(parts: Sequence[Joints], parameters: Mapping[str, Any]) ->
     Raises `ValueError` if there are none, and as `wheel_names` does.
     """
     wheels = wheel_names(parts, parameters)
-    both = [part.samples("torques", wheels) for part in parts if set(wheels) <= set(part.names)]
+    both = [part.samples("torques", wheels) for part in parts if part.have(wheels)]
     with_torques = [samples for samples in both if np.isfinite(samples.values).any()]
     if not with_torques:
-        raise ValueError(f"no message has {'effort' if both else ' and '.join(wheels)}")
+        joints = " and ".join(joint for side in wheels for joint in side)
+        raise ValueError(f"no message has {'effort' if both else joints}")
     return TimeSeries.of(with_torques)
 
 
@@ -124,16 +135,16 @@ def rates_and_torques(
     return right, left
 
 
-def _of_one(parts: Sequence[Joints], wheel: str) -> TimeSeries:
+def _of_one(parts: Sequence[Joints], wheel: Side) -> TimeSeries:
     own = [
         [part.samples(quantity, [wheel]) for quantity in ("rates", "torques")]
         for part in parts
-        if wheel in part.names
+        if part.have([wheel])
     ]
     for i, field in enumerate(("velocity", "effort")):
         own = [pair for pair in own if np.isfinite(pair[i].values).any()]
         if not own:
-            raise ValueError(f"no {field} of {wheel}")
+            raise ValueError(f"no {field} of {' and '.join(wheel)}")
     return TimeSeries.of(
         [
             rates._replace(

@@ -100,12 +100,14 @@ def simulate(
     motors: Callable[[State, Array], Array] = as_commanded,
     seed: int = 0,
     plant_of: Callable[[Climber, float], Plant] = Plant,
+    robot_of: Callable[[Parts, State, float], SimulatedRobot] = SimulatedRobot,
 ) -> Run:
     """Run of `duration` [s] from `start`; `climber` may change with time.
 
-    `plant_of` makes a plant from a climber and a step [s]. `motors` makes torques (2,) [N m] from
-    the state and the command in force, at every step. No torque acts before the first command,
-    unless the climber starts in motion: then that one does.
+    `plant_of` makes a plant from a climber and a step [s], `robot_of` the robot from parts, start
+    and period [s]. `motors` makes torques (2,) [N m] from the state and the command in force, at
+    every step. No torque acts before the first command, unless the climber starts in motion: then
+    that one does.
     """
     random = np.random.default_rng(seed)
     climber_at = climber if callable(climber) else lambda _: climber
@@ -114,7 +116,7 @@ def simulate(
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
     rows, current = [], climber_at(0.0)
-    robot = SimulatedRobot(link.parts(plant_of(current, link.step)), start, link.period)
+    robot = robot_of(link.parts(plant_of(current, link.step)), start, link.period)
     every, late = round(link.period / link.step), round(link.delay / link.step)
     for step in range(round(duration / link.step) + 1):
         now = SECOND + round(step * link.step * SECOND)

@@ -12,6 +12,7 @@ from scipy.stats import t as student
 from climber_uk.identification.identified import (
     DRIVE,
     HEADING,
+    KNOWN,
     NAMES,
     NOTHING,
     OF_TURNING,
@@ -28,7 +29,6 @@ from climber_uk.mechanics.climber import Climber
 FIRST = {DRIVE: 0, YAW: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
 VISCOUS, LATE = 2, 3  # columns of (11) and (15)
 QUANTILE = 0.975  # of intervals of 95 %
-KNOWN = 0.1  # uncertainty, relative to the value or the drive, above which a value is of no use
 SURE = 2.0  # half widths of its interval from zero, above which a friction is significant
 Columns = Mapping[str, tuple[int, ...]]
 

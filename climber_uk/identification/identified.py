@@ -27,6 +27,7 @@ NAMES = tuple(UNITS)
 OF_TURNING = ("yaw_inertia", "turning_friction", "turning_resistance")
 DRIVE, YAW, WAY, HEADING = "drive", "yaw", "way", "heading"  # kinds of equations
 IN_TIME = (0.0, 0.0)
+KNOWN = 0.1  # uncertainty, relative to the value or the drive, above which a value is of no use
 NOTHING = 1e-100
 WORTH_A_WORD = 0.01  # share of all drive: a model error below it is not reported
 SLIGHT = 5e-4  # likewise, of a weight that is not as assumed: it shows less than it is wrong
@@ -150,6 +151,12 @@ class Identified:
     def is_clear(self, name: str) -> bool:
         """Whether zero is not in the interval of a parameter that was sought."""
         return abs(self[name]) > self.half_width(name) > 0
+
+    @property
+    def tells_effective_track(self) -> bool:
+        """Whether wheel angles tell a half track well, but that of wheels that scrub."""
+        is_well_told = bool(self.uncertainty[-1] <= KNOWN) and "wheel_radius" not in self.reasons
+        return self.has_effective_track and is_well_told
 
     @property
     def uncertainty(self) -> Array:

@@ -10,6 +10,7 @@ from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.report.tables import markdown
 
 COLUMNS = ("parameter", "estimate", "± 95 %", "unit", "nodes now", "")
+EFFECTIVE = "effective_half_track"  # that the wheels show while they scrub
 COULOMB = "seal_friction_coefficient"
 WITHOUT_SEAL = {COULOMB: ("rolling_friction", "N")}  # what that coefficient is then
 ADVICE = {
@@ -30,7 +31,7 @@ def rows(found: Identified, assumed: Climber) -> Iterator[dict[str, Any]]:
     for name, value, half_width in zip(NAMES, found.values, found.half_widths, strict=True):
         label, unit = label_of(name, found.site)
         reason = found.reasons.get(name)
-        yield {
+        row = {
             "parameter": label,
             "estimate": None if reason else float(value),
             "half_width": None if reason else float(half_width),
@@ -41,6 +42,10 @@ def rows(found: Identified, assumed: Climber) -> Iterator[dict[str, Any]]:
             "reason": reason and reason.words,
             "model_fits": all(lack.fits for lack in found.lacks),
         }
+        yield row
+        if name == "half_track" and found.tells_effective_track:
+            told = {"estimate": float(value), "half_width": float(half_width), "known": True}
+            yield {**row, **told, "parameter": EFFECTIVE, "cause": None, "reason": None}
 
 
 def table(found: Identified, assumed: Climber) -> str:
@@ -112,6 +117,8 @@ def changes(found: Identified, assumed: Climber) -> dict[str, dict[str, Any]]:
     if found.site.has_seal and _friction_is_known(found):
         controller[COULOMB] = max(0.0, found.friction / found.extent.load)
         plant |= _law(found, controller[COULOMB])
+    if EFFECTIVE in known:
+        plant[EFFECTIVE] = known[EFFECTIVE]  # of odometry that is made of the wheels
     return {CONTROLLER: _rounded(controller), PLANT: _rounded(plant)}
 
 

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from climber_uk.identification.coefficients import FIRST, KNOWN
+from climber_uk.identification.coefficients import FIRST
 from climber_uk.identification.identified import (
     DRIVE,
     HEADING,
+    KNOWN,
     NAMES,
     OF_TURNING,
     UNITS,

@@ -37,7 +37,7 @@ class Encoders:
         Raises `ValueError` where that cannot be, and counts from there.
         """
         before, self._last = self._last or (right, left), (right, left)
-        radius, half_track = self.options.wheel_radius, self.options.half_track
+        radius, half_track = self.options.wheel_radius, self.options.turning_lever
         ways = [radius * (now - then) for now, then in zip(self._last, before, strict=True)]
         fastest = max(map(abs, ways)) / duration
         if fastest > LARGEST_SPEED:

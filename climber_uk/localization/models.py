@@ -84,7 +84,7 @@ def process_noise(travel: Travel, options: LocalizationOptions) -> Array:
         angle = options.gyro_noise**2 * travel.duration
     else:
         angle = options.turn_noise**2 * (
-            abs(travel.yaw_rate) * travel.duration + travel.path / options.half_track
+            abs(travel.yaw_rate) * travel.duration + travel.path / options.turning_lever
         )
     bias = options.gyro_bias_walk**2 * travel.duration
     scale = 2 * options.scale_deviation**2 * travel.duration / options.scale_time

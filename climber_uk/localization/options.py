@@ -15,6 +15,13 @@ class LocalizationOptions:
     half_track: float = parameter(
         0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
     )
+    effective_half_track: float = parameter(
+        0.0,
+        "m",
+        "by which wheels reckon turns, wider where they scrub; 0: half_track",
+        at_least=0,
+        plausible=(0.02, 3),
+    )
     inclination: float = parameter(
         90.0, "deg", "of the wall: 0 floor, 90 vertical, 180 ceiling", at_least=0, at_most=180
     )
@@ -66,6 +73,11 @@ class LocalizationOptions:
     pull_time: float = parameter(0.3, "s", "in which the output follows a correction", above=0)
     pull_speed: float = parameter(0.05, "m/s", "fastest that it follows", above=0)
     pull_yaw_rate: float = parameter(0.1, "rad/s", "fastest that it follows", above=0)
+
+    @cached_property
+    def turning_lever(self) -> float:
+        """Half track of the wheels' turns [m]."""
+        return self.effective_half_track or self.half_track
 
     @cached_property
     def gravity_along_wall(self) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import arctan2, sqrt
 from climber_uk.mechanics.quantities import Motion, State, Torques
+from climber_uk.messages.names import listed, wheel_joints
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
@@ -127,16 +128,23 @@ def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motio
 def wheel_torques(
     fields: JointFields, left_joint: str, right_joint: str, what: str = "efforts"
 ) -> Torques:
-    """Torques [N m], or rates [rad/s]: `what` the fields' values are."""
+    """Torques [N m] of the sides, or their rates [rad/s]: `what` the fields' values are.
+
+    The torque of a side is the sum of its wheels', its rate their mean.
+    """
     names, values = list(fields.names), list(fields.values)
-    if names not in ([left_joint, right_joint], [right_joint, left_joint]):
-        raise ValueError(f"names {names} must be {left_joint!r} and {right_joint!r}")
-    if len(values) != 2:
-        raise ValueError(f"{len(values)} {what} must be 2")
-    left, right = values if names[0] == left_joint else reversed(values)
-    if not (math.isfinite(left) and math.isfinite(right)):
+    joints = wheel_joints(left_joint, right_joint)
+    if names != joints.all and sorted(names) != sorted(joints.all):
+        raise ValueError(f"names {names} must be {listed(joints.all)}")
+    if len(values) != len(names):
+        raise ValueError(f"{len(values)} {what} must be {len(names)}")
+    if not all(map(math.isfinite, values)):
         raise ValueError(f"{what} {values} must be finite")
-    return Torques(right, left)
+    told = dict(zip(names, values, strict=True))
+    left, right = (sum(told[name] for name in side) for side in joints)
+    if what == "efforts":
+        return Torques(right, left)
+    return Torques(right / len(joints.right), left / len(joints.left))
 
 
 def pressure(message: "FluidPressure") -> float:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from climber_uk.mechanics import Array
+from climber_uk.messages.names import wheel_joints
 from climber_uk.messages.reading import check_size, heading_of, nanoseconds
 
 if TYPE_CHECKING:
@@ -51,14 +52,17 @@ def check_frame(frame: str, wanted: str) -> None:
 
 
 def wheel_angles(message: "JointState", left_joint: str, right_joint: str) -> tuple[float, float]:
-    """Angles of the right and the left wheel [rad]; other joints may be there, too."""
+    """Angles of the right and the left side's wheels [rad]; other joints may be there, too."""
     names, angles = list(message.name), list(message.position)
     if len(angles) != len(names):
         raise ValueError(f"{len(angles)} positions of {len(names)} names")
-    for joint in (left_joint, right_joint):
+    joints = wheel_joints(left_joint, right_joint)
+    for joint in joints.all:
         if names.count(joint) != 1:
             raise ValueError(f"names {names} must have {joint!r} once")
-    right, left = (float(angles[names.index(joint)]) for joint in (right_joint, left_joint))
+    left, right = (
+        float(sum(angles[names.index(joint)] for joint in side) / len(side)) for side in joints
+    )
     check_size(position=[left, right])
     return right, left
 

@@ -26,6 +26,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import State
+from climber_uk.messages.names import wheel_joints
 
 if TYPE_CHECKING:
     from climber_uk.mechanics.reference import Reference
@@ -100,8 +101,9 @@ def transform(odometry: Odometry) -> TransformStamped:
 
 def wheel_torques(torques: Array, stamp: int, left_joint: str, right_joint: str) -> JointState:
     """Message of torques (2,) (right, left) [N m]; `stamp` is that of the odometry they answer."""
-    message = JointState(name=[left_joint, right_joint])
-    message.effort = left_right(torques)
+    joints = wheel_joints(left_joint, right_joint)
+    message = JointState(name=joints.all)
+    message.effort = joints.torques(*left_right(torques))
     message.header.stamp = time(stamp)
     return message
 

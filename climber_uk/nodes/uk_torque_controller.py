@@ -91,8 +91,9 @@ class UkTorqueController(ManagedNode):
 
         self.read_odometry = NumberReader(Odometry, *reading.ODOMETRY)
         self.read_reference = PreviewReader()
-        joints = [self.names.left_wheel_joint, self.names.right_wheel_joint]
-        torques = JointState(name=joints, velocity=[0.0, 0.0], effort=[0.0, 0.0])
+        self.joints = self.names.wheels
+        zeros = self.joints.rates(0.0, 0.0)
+        torques = JointState(name=self.joints.all, velocity=zeros, effort=zeros)
         self.torques = Output(self.publisher(JointState, TORQUES), torques, writing.WHEEL_COMMAND)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         zero, base_frame = (0.0, 0.0, 0.0), self.names.base_frame
@@ -265,11 +266,14 @@ class UkTorqueController(ManagedNode):
         """Publish torques and speeds with the stamp of the odometry that they answer."""
         right, left = answer.wheels
         right_rate, left_rate = self.controller.law.climber.rim_rates(answer.speeds)
-        self.torques.publish(answer.stamp, (left_rate, right_rate), (left, right))
+        rates, torques = self.joints.rates(left_rate, right_rate), self.joints.torques(left, right)
+        self.torques.publish(answer.stamp, rates, torques)
         if self.options.publish_cmd_vel:
             self.twist.publish(answer.stamp, *answer.speeds)
         if self.options.effort_commands:
-            ordered = [left, right] if self.options.effort_order == "left_right" else [right, left]
+            count = len(self.joints.left)
+            is_left_first = self.options.effort_order == "left_right"
+            ordered = torques if is_left_first else torques[count:] + torques[:count]
             self.efforts.publish(Float64MultiArray(data=ordered))
 
     def publish_causes(self, stamp: int, command: Command, motion: Motion) -> None:

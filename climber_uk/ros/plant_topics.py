@@ -20,7 +20,7 @@ try:
 except ImportError:  # it comes with a ROS installation, not with the wheels
     TFMessage = None
 
-NO_STATE, NO_PAIR = State(np.zeros(3), np.zeros(3)), [0.0, 0.0]
+NO_STATE = State(np.zeros(3), np.zeros(3))
 
 
 class PlantTopics:
@@ -29,8 +29,9 @@ class PlantTopics:
     def __init__(self, node: ClimberNode, sensors: FieldSensors, has_odometry: bool) -> None:
         self.names, self.is_due = node.names, Throttle(PUBLISH_PERIOD)
         names = self.names
-        joints = [names.left_wheel_joint, names.right_wheel_joint]
-        state = JointState(name=joints, position=NO_PAIR, velocity=NO_PAIR, effort=NO_PAIR)
+        self.wheels = names.wheels
+        zeros = self.wheels.rates(0.0, 0.0)
+        state = JointState(name=self.wheels.all, position=zeros, velocity=zeros, effort=zeros)
         odometry = writing.odometry(NO_STATE, 0, names.odom_frame, names.base_frame)
         self.odometry: Output | None = None
         if has_odometry:
@@ -67,8 +68,11 @@ class PlantTopics:
                 x, y, heading = fix.pose.tolist()
                 self.pose.publish(fix.stamp, x, y, math.sin(heading / 2), math.cos(heading / 2))
         if self.joints.is_heard:
-            pairs = measured.angles, robot.rates, robot.torques
-            self.joints.publish(measured.stamp, *(writing.left_right(pair) for pair in pairs))
+            angles, rates, torques = map(
+                writing.left_right, (measured.angles, robot.rates, robot.torques)
+            )
+            told = self.wheels.rates(*angles), self.wheels.rates(*rates)
+            self.joints.publish(measured.stamp, *told, self.wheels.torques(*torques))
 
     def publish_others(self, robot: SimulatedRobot, now: int) -> None:
         """Publish true state and transform at `now` [ns]; now and then the pressure."""

@@ -49,12 +49,15 @@ class Wheels(OdometrySource):
 
     def start(self, sensors: "Sensors", climber: Climber, period: float, state: State) -> Measure:
         """See `OdometrySource`."""
-        return DeadReckoning(sensors.encoder_resolution, climber, period, state.pose).measure
+        return DeadReckoning(sensors, climber, period, state.pose).measure
 
 
 SOURCES = Variants[type[OdometrySource]]({"truth": Truth, "wheels": Wheels}, "odometry_sources")
 # Parameters of what is measured, and when; all others are errors that are added to that
-MEASURING = "odometry_source", "odometry_delay", "encoder_resolution", "seed"
+MEASURING = (
+    *("odometry_source", "odometry_delay", "encoder_resolution", "effective_half_track"),
+    "seed",
+)
 
 
 @parameters
@@ -88,6 +91,13 @@ class Sensors:
         "of the wheels' encoders, for odometry_source wheels; 0: exact",
         at_least=0,
         plausible=(0.0, 1),
+    )
+    effective_half_track: float = parameter(
+        0.0,
+        "m",
+        "by which wheels reckon turns, wider where they scrub; 0: half_track",
+        at_least=0,
+        plausible=(0.02, 3),
     )
     seed: int = parameter(0, "", "of the noise: the same seed gives the same noise", at_least=0)
 
@@ -179,8 +189,9 @@ class Odometer:
 class DeadReckoning:
     """Where wheels have rolled to since the start, counted in steps of their encoders."""
 
-    def __init__(self, resolution: float, climber: Climber, period: float, pose: Array) -> None:
-        self.resolution, self.climber, self.period = resolution, climber, period
+    def __init__(self, sensors: Sensors, climber: Climber, period: float, pose: Array) -> None:
+        self.resolution, self.climber, self.period = sensors.encoder_resolution, climber, period
+        self.half_track = sensors.effective_half_track or climber.half_track
         self.counted: Array = np.zeros(2)  # [rad] right, left
         self.pose = pose
 
@@ -191,7 +202,7 @@ class DeadReckoning:
             angles = resolution * np.floor(angles / resolution)
         right, left = (climber.wheel_radius * (angles - self.counted)).tolist()
         self.counted = angles
-        distance, angle = (right + left) / 2, (right - left) / (2 * climber.half_track)
+        distance, angle = (right + left) / 2, (right - left) / (2 * self.half_track)
         x, y, heading = self.pose.tolist()
         middle = heading + angle / 2
         self.pose = np.array(
@@ -199,4 +210,5 @@ class DeadReckoning:
         )
         if resolution > 0:
             return State.rolling(self.pose, distance / self.period, angle / self.period)
-        return State.rolling(self.pose, float(wheels.forward_speed), float(wheels.yaw_rate))
+        yaw_rate = float(wheels.yaw_rate) * climber.half_track / self.half_track
+        return State.rolling(self.pose, float(wheels.forward_speed), yaw_rate)

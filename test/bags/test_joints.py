@@ -85,6 +85,24 @@ def test_the_names_are_those_of_the_parameters_whatever_they_are(tmp_path):
     assert (got["mean_power_right"], got["mean_power_left"]) == (RIGHT_POWER, LEFT_POWER)
 
 
+def test_of_several_wheels_of_a_side_torques_are_added_and_rates_averaged(tmp_path):
+    made = Made()
+    made.add_odometry()
+    joints = ["front_left", "front_right", "rear_left", "rear_right"]
+    made.add_joint_states(joints, [-3, 2, -5, 4], [0.5, 1, 1.5, 0.5])
+    made.add_joint_states(joints, [], [1, 2, 3, 4], topic="wheel_torques")
+    bag = made.write(tmp_path / "bag")
+    names = {
+        "left_wheel_joint": "front_left, rear_left",
+        "right_wheel_joint": "front_right, rear_right",
+    }
+    (run,), said = read_runs(bag, Topics(), parameters=lambda _: names)
+    assert said == []
+    assert run.torques[0].tolist() == [6, 4]
+    got = evaluate(Case(run))
+    assert (got["mean_power_right"], got["mean_power_left"]) == (RIGHT_POWER, LEFT_POWER)
+
+
 def test_names_that_nobody_told_are_those_with_a_side_if_it_is_clear(tmp_path):
     made = Made()
     made.add_odometry()

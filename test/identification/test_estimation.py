@@ -383,6 +383,11 @@ def test_wheels_that_scrub_tell_an_effective_half_track_and_not_where_they_are(e
     motion = moved(scrub=30.0, effective=effective, noise=1.0, wheels=True)
     found = identify(motion, BELIEVED)
     assert "half_track" in found.reasons
+    (told,) = [row for row in rows(found, BELIEVED) if row["parameter"] == "effective_half_track"]
+    assert abs(told["estimate"] - 0.3 * effective) < told["half_width"] < 0.01
+    changed = changes(found, BELIEVED)
+    assert changed["plant_simulator"]["effective_half_track"] == pytest.approx(told["estimate"])
+    assert "half_track" not in changed["plant_simulator"]
     assert f"an effective one of {0.3 * effective:.3g}"[:-1] in said_of(found) + str(found.reasons)
     assert not wrong(found, turning_friction=30.0)
     assert ("yaw_inertia" in found.reasons) == (effective > 1.1)
@@ -394,6 +399,7 @@ def test_odometry_that_is_made_of_the_wheels_does_not_measure_them():
     found = identify(exact, believed)
     assert {"wheel_radius", "half_track"} <= set(found.reasons)
     assert "made of them?" in said_of(found)
+    assert "effective_half_track" not in table(found, believed)
     assert not {"wheel_radius", "half_track"} & set(changes(found, believed)["plant_simulator"])
 
 

@@ -242,6 +242,27 @@ def test_speeds_become_counts_a_second_and_those_that_are_unfit_become_zero(worl
     assert board.commands()[-1] == (0, 0)
 
 
+def test_of_several_wheels_of_a_side_the_board_gets_the_sum_and_tells_each_its_share(world):
+    sides = "left_wheel_joint:=fl, rl", "right_wheel_joint:=fr, rr"
+    board = Board(world, *sides, "half_track:=0.3", "effective_half_track:=0.36")
+    commands = world.speak(JointState, "wheel_torques")
+    board.tell(0, 0, 0, 0, 0, 0, again=True)
+    message = JointState(name=["fl", "fr", "rl", "rr"], effort=[0.5, 1.0, 0.75, 0.25])
+
+    def arrives():
+        message.header.stamp = board.tell(0, 0, 0, 0, 0, 0).header.stamp
+        commands.publish(message)
+        return (1000, -1000) in board.commands()
+
+    world.wait(arrives, "both sums: 1.25 N m, of 1.25 N m/A")
+    told = board.tell(-41, -41, 1000, -1000, 0, 0)  # it turns to the right... as wheels tell
+    joints = next(m for m in board.joints if stamp(m) == stamp(told))
+    assert list(joints.name) == ["fl", "rl", "fr", "rr"]
+    assert list(joints.effort) == pytest.approx([0.625] * 4)
+    rim = 41 / 4096 * 2 * math.pi * 0.027 / 0.005
+    assert told.twist.twist.angular.z == pytest.approx(2 * rim / (2 * 0.36))
+
+
 def test_torques_that_do_not_come_any_more_are_dropped(world):
     board = Controlled(world)
     board.answer(1.25, 1.25)

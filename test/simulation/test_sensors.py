@@ -121,6 +121,19 @@ def test_sensors_are_ideal_only_if_no_error_of_any_kind_is_added():
             assert sensors.ideal == Sensors()
 
 
+@pytest.mark.parametrize("resolution", [0.0, 1e-6])
+def test_wheels_that_scrub_reckon_turns_by_their_effective_half_track(resolution):
+    sensors = Sensors(
+        odometry_source="wheels", encoder_resolution=resolution, effective_half_track=0.36
+    )
+    wheels = State.rolling(np.zeros(3), 0.0, 0.6)  # as half_track, 0.3 m, has it
+    odometer = Odometer(sensors, Climber(), 0.1, State(np.zeros(3), np.zeros(3)))
+    odometer.measure(wheels, wheels, np.array([1.0, -1.0]) * 0.3 * 0.06 / Climber().wheel_radius)
+    _, told = odometer.latest()
+    assert told.heading == pytest.approx(0.05, abs=1e-6)
+    assert told.yaw_rate == pytest.approx(0.5, abs=1e-3)
+
+
 def test_an_encoder_counts_whole_steps():
     step = 0.01  # [rad]
     sensors = Sensors(odometry_source="wheels", encoder_resolution=step)
