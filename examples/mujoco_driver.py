@@ -72,10 +72,8 @@ class MujocoDriver(ClimberNode):
         self.film = Film(self.climber, film) if film else None
         self.is_simulated, self.has_fallen = self.options.simulated_time, False
         self.obeyed = "velocity" if parts.motors.take_speeds else "effort"
-        self.command, self.commanded_at = (
-            np.zeros(2),
-            0,
-        )  # as (right, left), and its odometry's [ns]
+        self.command = np.zeros(2)  # right, left
+        self.commanded_at = 0  # [ns] of its odometry
         # a stamp of 0 would mean that there is no time yet
         self.origin = SECOND if self.is_simulated else self.get_clock().now().nanoseconds
         self.stamp = self.origin  # [ns]
@@ -84,10 +82,8 @@ class MujocoDriver(ClimberNode):
         self.odometry = self.publisher(Odometry, ODOMETRY)
         self.truth = self.publisher(Odometry, TRUTH)
         self.joints = self.publisher(JointState, JOINTS)
-        self.pressure, self.is_due = (
-            self.publisher(FluidPressure, PRESSURE),
-            Throttle(PUBLISH_PERIOD),
-        )
+        self.pressure = self.publisher(FluidPressure, PRESSURE)
+        self.is_due = Throttle(PUBLISH_PERIOD)
         self.subscription(JointState, TORQUES, self.on_torques)
         self.start_diagnostics(dict, alone_on=(ODOMETRY, TORQUES))
         if self.is_simulated:
