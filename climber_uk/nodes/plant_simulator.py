@@ -45,7 +45,7 @@ class PlantSimulator(ClimberNode):
         self.time.join(self)
         self.place_at_start()
 
-        self.topics = PlantTopics(self, self.sensors, self.options.publish_odometry)
+        self.topics = PlantTopics(self, self.sensors, self.options)
         self.take_speeds = self.robot.parts.motors.take_speeds
         obeyed = reading.JOINT_RATES if self.take_speeds else reading.JOINT_STATE
         self.read_torques = NumberReader(JointState, *obeyed)

@@ -13,6 +13,7 @@ from climber_uk.messages.topics import IMU, JOINTS, ODOMETRY, POSE, PRESSURE, TR
 from climber_uk.ros.output import Output
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 from climber_uk.simulation.field_sensors import FieldSensors, Measured
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.simulated_robot import SimulatedRobot
 
 try:
@@ -26,7 +27,9 @@ NO_STATE = State(np.zeros(3), np.zeros(3))
 class PlantTopics:
     """Publishers of a simulated climber, in its node's namespace."""
 
-    def __init__(self, node: ClimberNode, sensors: FieldSensors, has_odometry: bool) -> None:
+    def __init__(
+        self, node: ClimberNode, sensors: FieldSensors, options: SimulationOptions
+    ) -> None:
         self.names, self.is_due = node.names, Throttle(PUBLISH_PERIOD)
         names = self.names
         self.wheels = names.wheels
@@ -34,7 +37,7 @@ class PlantTopics:
         state = JointState(name=self.wheels.all, position=zeros, velocity=zeros, effort=zeros)
         odometry = writing.odometry(NO_STATE, 0, names.odom_frame, names.base_frame)
         self.odometry: Output | None = None
-        if has_odometry:
+        if options.publish_odometry:
             self.odometry = Output(node.publisher(Odometry, ODOMETRY), odometry, writing.ODOMETRY)
         self.truth = Output(node.publisher(Odometry, TRUTH), odometry, writing.ODOMETRY)
         self.joints = Output(node.publisher(JointState, JOINTS), state, writing.JOINT_STATE)
@@ -50,7 +53,8 @@ class PlantTopics:
             self.pose = Output(publisher, pose, writing_sensors.POSE)
         pressure = node.publisher(FluidPressure, PRESSURE)
         self.pressure = Output(pressure, FluidPressure(), ["fluid_pressure"])
-        self.transform = node.publisher(TFMessage, "/tf") if TFMessage else None
+        has_tf = TFMessage and options.publish_tf
+        self.transform = node.publisher(TFMessage, "/tf") if has_tf else None
 
     def publish_odometry(self, robot: SimulatedRobot, measured_at: int) -> None:
         """Publish the odometry that is due, with the stamp `measured_at` [ns]."""

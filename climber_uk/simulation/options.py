@@ -16,6 +16,9 @@ class SimulationOptions:
     publish_odometry: bool = parameter(
         True, "", "publish odom; false: wall_odometry makes it, of joint_states, imu and pose"
     )
+    publish_tf: bool = parameter(
+        True, "", "publish base_frame in odom_frame on /tf, where tf2_msgs is installed"
+    )
     real_time_factor: float = parameter(
         0.0, "", "fastest simulated time by wall-clock time; 0: no limit", at_least=0
     )
