@@ -111,9 +111,9 @@ def parameters(nodes: list[ClimberNode]) -> str:
         "others only at its start. Every topic's QoS is a parameter besides: "
         "`qos_overrides.<topic>.publisher.reliability`, ….",
         "\nIn a parameter file, what `/**` is given (or `/a/*`: any name) is for all nodes that "
-        "have it, and remarked on by the others; what is given to `/**/x`, or to x in any other way "
-        "by its name, x has to have: a misspelt parameter ends the node at its start, and so does a "
-        "file that has nothing for it.",
+        "have it, and remarked on by the others; what is given to `/**/x`, or to x in any other "
+        "way by its name, x has to have: a misspelt parameter ends the node at its start, and so "
+        "does a file that has nothing for it.",
     ]
     for node in nodes:
         lines.append(f"\n## {node.get_name()}\n")
