@@ -9,7 +9,8 @@ import signal
 from contextlib import suppress
 
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+if "PYTEST_XDIST_WORKER" not in os.environ:  # they have what `use_udp` has made of it
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 # more would only wait for each other, in each of many processes
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 

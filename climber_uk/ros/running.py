@@ -41,7 +41,7 @@ RELIABLE = QoSProfile(depth=10)
 SENT = QoSProfile(depth=1000)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
-LONGEST_END = 4  # [s] from a signal to the end of the process, whatever hangs
+LONGEST_END = 4  # [s] from a signal to the end of the process, whatever hangs, step by step
 PUBLISH_PERIOD = SECOND // 20  # [ns] of topics that need not be published every time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LINES, LINES_PERIOD = 6, 10.0  # most lines of the log on one subject, in so many [s]
@@ -260,6 +260,11 @@ def run(
         signal.alarm(LONGEST_END)  # by the kernel: the middleware may not come back
         end.set_result(None)
 
+    def give_time() -> None:
+        """A slow machine is no reason to be killed: each step of the end has that time."""
+        if end.done():
+            signal.alarm(LONGEST_END)
+
     on_end(stop)
     try:
         ParameterFiles(sys.argv, "")  # raises with the line that is wrong, unlike rcl
@@ -282,8 +287,11 @@ def run(
     finally:
         ignore_end()  # the terminal and launch may both send a signal
         for node in nodes:
+            give_time()
             node.destroy_node()
+        give_time()
         rclpy.try_shutdown()
+        give_time()
 
 
 def parse(

@@ -18,8 +18,10 @@ def workers(number: int | None) -> Iterator[ProcessPoolExecutor]:
         try:
             yield executor
         except BaseException:
+            before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # or a second one leaves some
             for process in multiprocessing.active_children():
                 process.terminate()
+            signal.signal(signal.SIGINT, before)
             raise
 
 

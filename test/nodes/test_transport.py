@@ -1,5 +1,6 @@
 """Nodes talk by UDP unless told otherwise, and all others of the domain hear them all the same."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -34,6 +35,10 @@ def test_udp_is_chosen_where_nothing_else_was_and_the_range_stays(before, after)
     again = dict(environment)
     use_udp(again)
     assert again == environment
+
+
+def test_the_tests_themselves_have_the_transport_that_is_the_default():
+    assert os.environ.items() >= (UDP | LOCAL).items()
 
 
 ONCE = """

@@ -181,14 +181,14 @@ def test_a_start_3_m_off_that_is_allowed_is_approached_at_its_speed(world):
     climb.is_in("following")
     assert climb.fastest() < 0.84
     begin = climb.now
-    climb.passes(3.0)
+    climb.passes(1.5)
     assert climb.off_the_path(begin) < 0.02
 
 
 def test_a_push_is_ridden_out(world):
     climb = Waiting(world, {PLANT: ["push_timeout:=0.3"]})
     climb.is_in("following")
-    climb.passes(3.0)
+    climb.passes(2.0)
     push = world.speak(WrenchStamped, "push")
     wrench = WrenchStamped()
     wrench.header.frame_id = "base_link"
@@ -218,7 +218,7 @@ def test_a_motor_that_dies_is_noticed_and_the_climber_comes_to_rest(world):
     climb.is_in("following")
     known = {"following", "approaching", "waiting"}
     for side in (0, 1):
-        climb.passes(3.0)
+        climb.passes(1.5)
         dead, dies_at = side, climb.now
         fault = climb.comes_to(lambda mode: mode not in known, "fault")
         assert reading.nanoseconds(fault.header.stamp) / SECOND < dies_at + 0.35
