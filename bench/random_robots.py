@@ -103,8 +103,8 @@ class Trying:
         self.heard.append(Arrival(writing.odometry(state, stamp, "odom", "base_link"), now, now, 0))
         if len(self.heard) == AT_FIRST:
             self.trial = Trial(BUILT, Bounds(), self.heard, self.period, False)
-        torques = self.trial.torques(stamp, now, state) if self.trial else np.zeros(2)
-        return Answer(stamp, NO_TORQUES if torques is None else Torques(*torques.tolist()), None)
+        told = self.trial.command(stamp, now, state) if self.trial else None
+        return Answer(stamp, NO_TORQUES if told is None else Torques(*told.torques.tolist()), None)
 
 
 def told(of: Robot) -> float:

@@ -150,7 +150,8 @@ def plan(climber: Climber, bounds: Bounds) -> str:
     return (
         "the climber is going to turn left, drive forward, back and turn right, some 0.1 rad and "
         f"1 cm, by torques that rise until it moves, to {bounds.torque_share:g} of "
-        f"{climber.max_wheel_torque:g} N m at most. It is stopped at {bounds.max_travel:g} m or "
+        f"{climber.max_wheel_torque:g} N m at most, or if it takes speeds by 0.05 m/s, 2 cm. "
+        f"It is stopped at {bounds.max_travel:g} m or "
         f"{bounds.max_turn:g} rad. Ctrl-C stops it at once."
     )
 

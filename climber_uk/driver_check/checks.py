@@ -38,7 +38,10 @@ CHECKS: Mapping[str, Check] = {
     "slip": Check(moving.slip, (*GOOD, "heading", "twist")),
     "trial": Check(reacting.trial, (*SAFE, "heading", "twist")),
     "wheels": Check(reacting.wheels, MOVED),
+    "motors": Check(reacting.motors, (*MOVED, "wheels")),
     "gain": Check(reacting.gain, (*MOVED, "wheels")),
+    "servo": Check(reacting.servo, (*MOVED, "wheels", "motors")),
+    "turning": Check(reacting.turning, (*MOVED, "wheels")),
     "latency": Check(reacting.latency, (*MOVED, "wheels")),
     "watchdog": Check(reacting.watchdog, (*MOVED, "wheels")),
 }

@@ -36,6 +36,15 @@ class ExpectedDriver:
     odometry_timeout: float = parameter(
         0.1, "s", "age above which odometry is refused; too short: `age` fails", above=0
     )
+    motors: str = parameter(
+        "torque",
+        "",
+        "which of the command the driver obeys; wrong: `motors` fails",
+        choices=("torque", "velocity"),
+    )
+    servo_time_constant: float = parameter(
+        0.02, "s", "of a board that takes speeds; wrong by two: `servo` warns", at_least=0
+    )
     transport_delay: float = parameter(
         0.0, "s", "from a torque's publication to its action; wrong: `latency` warns", at_least=0
     )
@@ -104,15 +113,27 @@ class MotionSeen:
         return self.twist[:, [0, 2]]
 
 
-class TorqueCommand(NamedTuple):
-    """Torques in force from a time [ns] on."""
+NOTHING: Array = np.zeros(2)
+
+
+class WheelCommand(NamedTuple):
+    """What is told of a time [ns] on; a board obeys torques or rates."""
 
     time: int
     torques: Array  # (2,) right, left [N m]
+    rates: Array = NOTHING  # (2,) right, left [rad/s]
+
+
+class WheelRates(NamedTuple):
+    """Rates of the wheels that a joint_states tells."""
+
+    stamp: int  # [ns]
+    right: float  # [rad/s]
+    left: float
 
 
 class PulseTimes(NamedTuple):
-    """Begin and end [ns] of a pulse of torques."""
+    """Begin and end [ns] of a pulse of torques, or of speeds."""
 
     turns: bool  # τR = -τL, else τR = τL
     begin: int
@@ -121,13 +142,14 @@ class PulseTimes(NamedTuple):
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """The torques of a trial, and why it was stopped if it was."""
+    """The commands of a trial, and why it was stopped if it was."""
 
     pulses: Sequence[PulseTimes]
-    commands: Sequence[TorqueCommand]
+    commands: Sequence[WheelCommand]
     highest: float  # [N m] limit of a wheel's torque in the trial
     silence: tuple[int, int] | None = None  # begin and end [ns] without commands
     trouble: str = ""  # why it was stopped before the end
+    takes_speeds: bool | None = False  # whether the board obeys rates; None: not found out
 
 
 @dataclass(frozen=True)
@@ -140,6 +162,7 @@ class Evidence:
     use_sim_time: bool
     graph: Graph
     arrivals: Sequence[Arrival]
+    turning: Sequence[WheelRates] = ()  # as joint_states tell
     trial: TrialRecord | None = None
 
     @cached_property

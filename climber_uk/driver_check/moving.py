@@ -26,6 +26,15 @@ class Displacements:
     in_body: Array  # (n, 2) [m] of the pose, forward and to the left
     by_twist: Array  # (n, 2) [m] of the twist, forward and to the left
 
+    def straight(self, clear: Any, half_track: float) -> Any:
+        """Those of the blocks `clear` (n,) in which it drives straight; all, if too few are.
+
+        On a wall a climber whose wheels scrub sags while it turns: no fault of the driver.
+        """
+        ahead = np.abs(self.in_body[:, 0])
+        straight = clear & (half_track * np.abs(self.yaw) < thresholds.STRAIGHT * ahead)
+        return straight if straight.sum() >= thresholds.FEWEST else clear
+
     @property
     def drives(self) -> bool:
         """Whether the climber drives, by its pose or by its twist."""
@@ -110,6 +119,7 @@ def twist(seen: Evidence) -> Finding:
     if not gone.drives:
         return skipped("it did not drive: drive it, or use --move")
     clear = above_noise(gone.on_wall, gone.by_twist)
+    clear = gone.straight(clear, seen.climber.half_track)
     if np.abs(gone.by_twist[clear]).sum() < thresholds.NO_TWIST * np.abs(gone.on_wall[clear]).sum():
         return failed(
             "the pose moves while twist.linear is zero",
@@ -142,6 +152,7 @@ def slip(seen: Evidence) -> Finding:
     if not gone.drives:
         return skipped("it did not drive: drive it, or use --move")
     clear, (ahead, aside) = above_noise(gone.on_wall), gone.in_body.T
+    clear = gone.straight(clear, seen.climber.half_track)
     share = size(aside, clear) / max(float(np.linalg.norm(ahead[clear])), TINY)
     said = f"sideways {share:.2%} of the way forward"
     hint = "pose must be that of the middle between the wheels, and they must not slide"

@@ -3,6 +3,7 @@
 import time
 from bisect import bisect_right
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from nav_msgs.msg import Odometry
@@ -12,13 +13,20 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from climber_uk.driver_check.evidence import Arrival, Evidence, ExpectedDriver
+from climber_uk.driver_check.evidence import (
+    NOTHING,
+    Arrival,
+    Evidence,
+    ExpectedDriver,
+    WheelCommand,
+    WheelRates,
+)
 from climber_uk.driver_check.graph import graph, others_commanding
 from climber_uk.driver_check.trial import Bounds, Trial
-from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages import reading, writing
-from climber_uk.messages.topics import CLOCK, ODOMETRY, TORQUES
+from climber_uk.messages.topics import CLOCK, JOINTS, ODOMETRY, TORQUES
 from climber_uk.ros.running import ClimberNode
 
 MANY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -40,12 +48,23 @@ class DriverNode(ClimberNode):
         self.trial: Trial | None = None
         self.torques: Publisher | None = None  # only once no other node commands
         self.answer: JointState | None = None
+        self.turning: list[WheelRates] = []
+        self.subscription(JointState, JOINTS, self.on_joints, MANY)
         self.odometry = self.subscription(Odometry, ODOMETRY, self.on_odometry, MANY)
         self.subscription(Clock, CLOCK, self.on_clock, MANY)
 
     def on_clock(self, message: Clock, info: dict[str, int]) -> None:
         """Keep a simulated time, and when it was received."""
         self.simulated.append((info["received_timestamp"], reading.nanoseconds(message.clock)))
+
+    def on_joints(self, message: JointState) -> None:
+        """Keep the wheels' rates, if they are told; nobody has to."""
+        wheels = self.names.left_wheel_joint, self.names.right_wheel_joint
+        stamp = reading.nanoseconds(message.header.stamp)
+        fields = reading.JointFields(*divmod(stamp, SECOND), message.velocity, message.name)
+        with suppress(ValueError):
+            right, left = reading.wheel_torques(fields, *wheels, "velocities")
+            self.turning.append(WheelRates(stamp, right, left))
 
     def on_odometry(self, message: Odometry, info: dict[str, int]) -> None:
         """Keep an odometry, and answer it if this node commands.
@@ -64,26 +83,29 @@ class DriverNode(ClimberNode):
         """Answer an odometry with torques; a repeated one with the same torques."""
         stamp = reading.nanoseconds(message.header.stamp)
         if self.answer is None or stamp != reading.nanoseconds(self.answer.header.stamp):
-            torques = self.decide(message, stamp)
-            self.answer = None if torques is None else self.message(torques, stamp)
+            command = self.decide(message, stamp)
+            self.answer = None if command is None else self.message(command, stamp)
         if self.torques is not None and self.answer is not None:
             self.torques.publish(self.answer)
 
-    def message(self, torques: Array, stamp: int) -> JointState:
-        """Message of torques (2,) (right, left) [N m] that answers the odometry of `stamp` [ns]."""
+    def message(self, command: WheelCommand, stamp: int) -> JointState:
+        """Message of a command that answers the odometry of `stamp` [ns]."""
         left, right = self.names.left_wheel_joint, self.names.right_wheel_joint
-        return writing.wheel_torques(torques, stamp, left, right)
+        message = writing.wheel_torques(command.torques, stamp, left, right)
+        message.velocity = self.names.wheels.rates(*writing.left_right(command.rates))
+        return message
 
-    def decide(self, message: Odometry, stamp: int) -> Array | None:
-        """Torques (2,) (right, left) [N m], or None; before a trial 0 in simulated time only."""
+    def decide(self, message: Odometry, stamp: int) -> WheelCommand | None:
+        """What is commanded, or None; before a trial 0 in simulated time only."""
+        nothing = WheelCommand(stamp, NOTHING)
         if self.trial is None:
-            return np.zeros(2) if self.has_clock() else None
+            return nothing if self.has_clock() else None
         try:
             state = reading.state(message, message.header.frame_id, message.child_frame_id)
         except ValueError as error:
             self.trial.stop(str(error))
-            return np.zeros(2)
-        return self.trial.torques(stamp, self.get_clock().now().nanoseconds, state)
+            return nothing
+        return self.trial.command(stamp, self.get_clock().now().nanoseconds, state)
 
     def has_clock(self) -> bool:
         """Whether /clock is published."""
@@ -150,7 +172,7 @@ class DriverNode(ClimberNode):
         """Command zero torque."""
         if self.torques is not None and self.trial is not None:
             stamp = reading.nanoseconds(self.arrivals[-1].message.header.stamp)
-            self.torques.publish(self.message(np.zeros(2), stamp))
+            self.torques.publish(self.message(WheelCommand(stamp, NOTHING), stamp))
 
     def end_with_zero(self) -> None:
         """Command zero torque, and wait until it is received."""
@@ -173,6 +195,7 @@ class DriverNode(ClimberNode):
             use_sim_time=self.use_sim_time,
             graph=graph(self, self.odometry.topic_name),
             arrivals=self.clocked_arrivals(),
+            turning=self.turning,
             trial=self.trial.record() if self.trial else None,
         )
 

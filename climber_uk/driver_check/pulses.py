@@ -1,14 +1,15 @@
-"""Pulses of wheel torques that move a climber a little, whatever its mass and friction.
+"""Pulses of wheel torques, or speeds, that move a climber a little.
 
     τ = k t until it moves, then τ falls at the same rate until it stops
 
-so that friction and weight need not be known, and no torque is higher than it has to be.
-Times are in seconds.
+so that friction and weight need not be known, and no torque is higher than it has to be. Where a
+board takes speeds, there is a step of speed and one back. Times are in seconds.
 """
 
 import numpy as np
 
-from climber_uk.driver_check.response import PAIR, expected_gain
+from climber_uk.driver_check.evidence import NOTHING
+from climber_uk.driver_check.response import PAIR, expected_gain, expected_rim_gain
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, wrapped
@@ -25,7 +26,38 @@ RUNAWAY = 4.0  # of the goals, of which 2 are reached: damp at once
 DAMPING_TIME, REST_TIME = 0.1, 1.0  # [s] of the motion that is left, and the longest
 REST_SHARE = 0.05  # of the goals, below which it is at rest
 PUSH_TIME, PUSHED_BY = 0.15, 0.5  # [s], [rad/s²] of yawing, before commands stop
+HOLD_TIME, HOLD_PERIODS = 0.4, 12.0  # [s] of a speed, and at least so many odometry messages
+OBEYED, TOO_FAR = 0.3, 4.0  # of the way at that speed, from which on a board has obeyed; too far
 LOOK_TIME = 0.25  # [s] after the watchdog's time, in which the motion is judged
+
+
+class SpeedPulse:
+    """A step of the wheels' rates ωR = ±ωL, held, and one back; a board of torques does nothing."""
+
+    by_speeds = True
+
+    def __init__(self, turns: bool, sign: float, climber: Climber, period: float) -> None:
+        self.turns, goal = turns, GOALS[int(turns)]
+        self.rates = sign * goal / expected_rim_gain(climber)[int(turns)] * PAIR[int(turns)]
+        self.held = max(HOLD_TIME, HOLD_PERIODS * period)  # and as long at rest
+        self.ends, self.ways = self.held, GOALS * self.held  # [m], [rad] it would move at both
+        self.start: State | None = None
+        self.is_obeyed = self.done = False
+
+    def command(self, time: float, state: State) -> Array:
+        """Rates (2,) (right, left) [rad/s] at `time` [s] since the pulse's begin."""
+        self.start = self.start or state
+        way = state.pose - self.start.pose
+        places = np.array([np.hypot(*way[:2]), abs(wrapped(float(way[2])))])
+        self.is_obeyed = self.is_obeyed or bool((places > OBEYED * self.ways).any())
+        if (places > TOO_FAR * self.ways).any():
+            self.finish()
+        self.done = time >= self.ends + self.held
+        return self.rates if time < self.ends else NOTHING
+
+    def finish(self) -> None:
+        """From now on only stand still."""
+        self.ends = 0.0
 
 
 class Pulse:
@@ -33,6 +65,8 @@ class Pulse:
 
     It is `done` when the climber rests, or should.
     """
+
+    by_speeds = False
 
     def __init__(
         self, turns: bool, sign: float, climber: Climber, period: float, limit: float
@@ -52,7 +86,7 @@ class Pulse:
         self.reacts, self.sign = int(turns), sign  # which speed reacts, and its sign
         self.falls = self.done = False
 
-    def torques(self, time: float, state: State) -> Array:
+    def command(self, time: float, state: State) -> Array:
         """Torques (2,) (right, left) [N m] at `time` [s] since the pulse's begin."""
         self.start = self.start or state
         # missed periods are not made up for: their reaction was not seen
@@ -104,21 +138,21 @@ class Pulse:
 
 
 class Silence:
-    """A small yawing torque, then no command, to see the watchdog act; then damping."""
+    """A small yawing command (2,), then none, to see the watchdog act; then damping."""
 
-    def __init__(self, torque: float, watchdog_time: float, after: Pulse) -> None:
-        self.torque, self.after = torque, after
-        self.after.top = self.after.damping
-        self.resumes_at = PUSH_TIME + watchdog_time + LOOK_TIME
+    def __init__(self, yawing: Array, watchdog_time: float, after: Pulse | SpeedPulse) -> None:
+        self.yawing, self.after, self.by_speeds = yawing, after, after.by_speeds
+        self.pushed = HOLD_TIME if self.by_speeds else PUSH_TIME
+        self.resumes_at = self.pushed + watchdog_time + LOOK_TIME
 
-    def torques(self, time: float, state: State) -> Array | None:
-        """Torques as a `Pulse` has them; None: send nothing."""
-        if time < min(PUSH_TIME, self.resumes_at):
-            return self.torque * PAIR[1]
+    def command(self, time: float, state: State) -> Array | None:
+        """Command as the pulse `after` has it; None: send nothing."""
+        if time < min(self.pushed, self.resumes_at):
+            return self.yawing
         if time < self.resumes_at:
             return None
         self.after.finish()
-        return self.after.torques(time - self.resumes_at, state)
+        return self.after.command(time - self.resumes_at, state)
 
     def finish(self) -> None:
         """From now on only damp the motion."""
@@ -130,5 +164,5 @@ class Silence:
         return self.after.done
 
 
-Stage = Pulse | Silence
+Stage = Pulse | SpeedPulse | Silence
 """What a trial consists of."""

@@ -1,12 +1,20 @@
-"""Response of a climber to torques, fitted to pulses of the pairs τR = ±τL.
+"""Response of a climber to torques or speeds, fitted to pulses of the pairs τR = ±τL or ωR = ±ωL.
 
     speed(t) = speed₀ + G ∫ τ(t - L) dt + c t - κ ∫ speed dt
 
 while it slides in one direction: c and κ stand for friction and weight. By (11) and (15)
 G = 2/(r m) for the drive and 2 d/(r J) for the turn. A speed that is the mean of the period before
-its stamp, as of encoders, is that of the period's middle.
+its stamp, as of encoders, is that of the period's middle. What resists a turn is c and κ of its
+pulses, by J. Of a board that takes speeds,
+
+    speed(t) = G y(t - L),   ẏ = (ω* - y) / T
+
+with the time constant T of its servo, and G = r for the drive and r/d for the turn; wheels that
+scrub turn the climber by less, as if it were wider.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -19,6 +27,10 @@ from climber_uk.mechanics.climber import Climber
 
 PAIR = np.array([[1.0, 1.0], [1.0, -1.0]])  # (right, left), to drive and to yaw
 COARSE = 20  # delays that are tried, and again so many around the best
+# of delay and time constant: points either way, and how often the best one's surroundings
+GRID, REFINEMENTS = 3, 9
+SETTLED = 0.7  # of a step's time, from which on the speed counts
+LATTICE = range(-GRID, GRID + 1)
 WIRINGS = {  # torque at the wheels (right, left) of the torques commanded
     "": [[1, 0], [0, 1]],
     "left and right are swapped": [[0, 1], [1, 0]],
@@ -40,22 +52,31 @@ def expected_gain(climber: Climber) -> Array:
     return np.array([force / climber.mass, moment / climber.yaw_inertia])
 
 
+def expected_rim_gain(climber: Climber) -> Array:
+    """Speeds (2,) per rate of the wheels of each pair: [m/s / rad/s], [rad/s / rad/s]."""
+    return np.array([climber.wheel_radius, climber.wheel_radius / climber.half_track])
+
+
 @dataclass(frozen=True)
 class Fit:
     """Fit of one speed in one pulse."""
 
-    gain: float  # per torque of each wheel of the pair
+    gain: float  # per command of each wheel of the pair
     offset: float  # c
+    drag: float  # κ [1/s]
     misfit: float  # sum of squares, by that of the speed
 
 
 @dataclass(frozen=True)
 class Response:
-    """Gains of the pairs of torques, by those of the model; nan where it did not move."""
+    """Gains of the pairs of commands, by those of the model; nan where it did not move."""
 
     gains: Array  # (2, 2): driving, yawing pair (rows) on forward speed, yaw rate (columns)
     offsets: Array  # (2, 2) c
     delay: float  # L [s]
+    time_constant: float = 0.0  # T [s] of a board that takes speeds
+    turning_friction: float = np.nan  # what resists a turn: Coulomb's [N m]
+    turning_resistance: float = np.nan  # and in proportion to the yaw rate [N m s]
 
     @property
     def wiring(self) -> tuple[str, float]:
@@ -74,6 +95,8 @@ class Response:
 
 def respond(motion: MotionSeen, trial: TrialRecord, climber: Climber) -> Response:
     """Response with the delay and gains of the least misfit over all pulses."""
+    if trial.takes_speeds:
+        return respond_to_speeds(motion, trial, climber)
     at_rest = motion.stamp < trial.commands[0].time
     noise = np.std(motion.reaction[at_rest], axis=0) if at_rest.sum() > 1 else np.zeros(2)
     still = np.array([thresholds.STANDING_SPEED, thresholds.STANDING_RATE]) / 2
@@ -92,7 +115,77 @@ def respond(motion: MotionSeen, trial: TrialRecord, climber: Climber) -> Respons
         if found:
             gains[turns, speed] = np.mean([fit.gain for fit in found])
             offsets[turns, speed] = found[0].offset
-    return Response(gains / expected_gain(climber), offsets, float(best))
+    # J by the same fit: 2 d/r of each wheel's torque are a moment
+    moments = [(abs(fit.offset), fit.drag) / np.abs(fit.gain) for fit in fits[1, 1] if fit.gain]
+    resisted = np.mean(moments, axis=0) if moments else np.full(2, np.nan)
+    resisted = resisted * 2 * climber.half_track / climber.wheel_radius
+    return Response(gains / expected_gain(climber), offsets, float(best), 0.0, *resisted.tolist())
+
+
+def respond_to_speeds(motion: MotionSeen, trial: TrialRecord, climber: Climber) -> Response:
+    """Response to rates; friction that is overcome first makes a pair later: the earlier counts."""
+    pairs = sorted({int(pulse.turns) for pulse in trial.pulses})
+    found = [_lateness(partial(_followed, motion, trial, pair)) for pair in pairs]
+    delay, time_constant = min(found, key=sum)
+    gains = np.full((2, 2), np.nan)
+    for pair in pairs:
+        gains[pair] = _gains(*_followed(motion, trial, pair, delay, time_constant))
+    gains /= expected_rim_gain(climber)
+    return Response(gains, np.zeros((2, 2)), delay, time_constant)
+
+
+def _lateness(
+    followed: Callable[[float, float], tuple[Array, Array, Array]],
+) -> tuple[float, float]:
+    """Delay L and time constant T [s] of the least misfit, by ever finer grids of L and ln T."""
+    best, reach = np.array([thresholds.LONGEST_DELAY / 2, np.log(0.03)]), np.array([0.1, 3.0])
+
+    def misfit(point: Array) -> float:
+        reached, speeds, steady = followed(float(point[0]), math.exp(point[1]))
+        left = speeds - np.outer(reached, _gains(reached, speeds, steady))
+        return float(np.sum(left**2))
+
+    for _ in range(REFINEMENTS):
+        grid = [best + reach * [i, j] / GRID for i in LATTICE for j in LATTICE]
+        best = min((np.maximum(point, [0.0, -9.0]) for point in grid), key=misfit)
+        reach = reach / 2
+    return float(best[0]), math.exp(best[1])
+
+
+def _gains(reached: Array, speeds: Array, steady: Array) -> Array:
+    """Both speeds (2,) by the rate that a servo has reached, where that has settled."""
+    reached, speeds = reached[steady], speeds[steady]
+    gains: Array = reached @ speeds / (reached @ reached)
+    return gains
+
+
+def _followed(
+    motion: MotionSeen, trial: TrialRecord, pair: int, delay: float, time_constant: float
+) -> tuple[Array, Array, Array]:
+    """In the n messages of a pair's pulses: the rate (n,) that a servo has reached, both speeds.
+
+    And in which of them (n,) it has had time to.
+    """
+    times = np.array([command.time - motion.stamp[0] for command in trial.commands]) / SECOND
+    rates = np.array([command.rates for command in trial.commands]) @ PAIR[pair] / 2
+    steps = np.append(True, np.diff(rates) != 0)
+    times, rates = times[steps], rates[steps]
+    shares = np.exp(-np.diff(times) / time_constant)
+    before = np.zeros(len(times))  # reached at the begin of each step
+    for number, share in enumerate(shares.tolist()):
+        before[number + 1] = rates[number] + (before[number] - rates[number]) * share
+    during = np.zeros(len(motion.stamp), bool)
+    for pulse in trial.pulses:
+        if int(pulse.turns) == pair:
+            during |= (motion.stamp >= pulse.begin) & (motion.stamp <= pulse.end)
+    measured = motion.time[during] - (motion.period / 2 if motion.has_mean_twist else 0.0)
+    last = np.clip(np.searchsorted(times, measured - delay, "right") - 1, 0, None)
+    left = np.exp(-np.maximum(0.0, measured - delay - times[last]) / time_constant)
+    reached = rates[last] + (before[last] - rates[last]) * left
+    now = np.clip(np.searchsorted(times, measured, "right") - 1, 0, None)
+    until = np.append(times[1:], np.inf)[now]
+    steady = (rates[now] != 0) & (measured - times[now] > SETTLED * (until - times[now]))
+    return reached, motion.reaction[during], steady
 
 
 def _fit_all(
@@ -130,7 +223,8 @@ def _fit(time: Array, impulse: Array, speed: Array, floor: float) -> Fit | None:
         columns = columns[:, :3]
         found, *_ = np.linalg.lstsq(columns, speed, rcond=None)
     misfit = float(np.sum((columns @ found - speed) ** 2) / np.sum(speed**2))
-    return Fit(float(found[0]), float(found[1]), misfit)
+    drag = float(found[3]) if len(found) > 3 else 0.0
+    return Fit(float(found[0]), float(found[1]), drag, misfit)
 
 
 def _sliding(speed: Array, floor: float) -> slice:
@@ -157,9 +251,10 @@ def _cosine(a: Array, b: Array) -> float:
     return float(a @ b) / size if size else 0.0
 
 
-def pushed_on(motion: MotionSeen, silence: tuple[int, int]) -> tuple[float, float]:
-    """Yaw rate [rad/s] at the begin of a silence [ns], and yaw acceleration [rad/s²] at its end."""
+def pushed_on(motion: MotionSeen, silence: tuple[int, int]) -> tuple[float, float, float]:
+    """Yaw rate [rad/s] at the begin of a silence [ns]; yaw rate and acceleration at its end."""
     begin, end = silence
     last = (motion.stamp > end - (end - begin) // 3) & (motion.stamp <= end)
     slope, _ = np.polyfit(motion.time[last], motion.twist[last, 2], 1)
-    return float(np.interp(begin, motion.stamp, motion.twist[:, 2])), float(slope)
+    before = float(np.interp(begin, motion.stamp, motion.twist[:, 2]))
+    return before, float(np.mean(motion.twist[last, 2])), float(slope)

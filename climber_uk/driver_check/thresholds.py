@@ -13,6 +13,7 @@ NEAREST_CLOCK = 10.0  # [s] from a clock that may be meant by a stamp; clocks ar
 FEWEST = 5  # messages of which a statistic is made
 # [s] of an unconfigured delay: half of what the controller bears, docs/control.md; its timeout
 REACTION, LATE_REACTION = 0.01, 0.1
+SERVO_REACTION = 0.03  # [s] of a speed servo, which has to overcome friction first
 
 # Motion
 MOVED, TURNED = 0.005, 0.01  # [m], [rad] of a motion that is long enough to judge
@@ -20,6 +21,7 @@ BLOCK = 0.05  # [s] over which speed and displacement are compared: steps are no
 RATIO_OFF, RATIO_WRONG = 0.1, 0.25  # of pose and twist: rounding and noise; a wrong unit or radius
 GAP = 4.0  # periods from which on messages, and their twist, are lost
 TELLING = 0.2  # of a block's largest displacement: smaller ones are mostly noise
+STRAIGHT = 0.3  # of the way: less of the rims' turn is still straight on
 NO_TWIST = 5e-4  # of the pose's displacement: less than a speed in km/s would be
 UNIT_OFF = 0.2  # by which a wrong unit may be missed, of 57.3
 SAME_FRAME = 0.05  # of the way: too small a difference between the frames of body and wall
@@ -32,5 +34,8 @@ MOVING = 0.2  # of the highest speed: where friction surely slides
 LIKENESS = 0.9  # cosine of a reaction and the one it is taken for
 # times the model's: the controller learns the first, docs/control.md
 GAIN_OFF, GAIN_WRONG = 1.2, 1.5
+# times what is told: what the controller learns, docs/control.md; [s] that are near in any case
+SERVO_OFF, SERVO_NEAR = 2.0, 0.01
+TRACK_OFF = 1.5  # times the half track: four wheels as long as wide scrub about as much
 STILL_PUSHED = 0.5  # of the acceleration that a torque gave while it was commanded
 LONGEST_DELAY = 0.2  # [s] that is looked for

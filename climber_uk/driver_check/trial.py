@@ -1,14 +1,14 @@
-"""A trial: pulses of torque one after the other, from odometry to odometry, within bounds."""
+"""A trial: pulses of torque, or of speed, from odometry to odometry, within bounds."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from climber_uk.driver_check import evidence, thresholds
-from climber_uk.driver_check.evidence import Arrival, TorqueCommand, motion_of
-from climber_uk.driver_check.pulses import PUSHED_BY, Pulse, Silence, Stage
-from climber_uk.driver_check.response import expected_gain, respond
-from climber_uk.mechanics import SECOND, Array
+from climber_uk.driver_check.evidence import NOTHING, Arrival, WheelCommand, motion_of
+from climber_uk.driver_check.pulses import PUSHED_BY, Pulse, Silence, SpeedPulse, Stage
+from climber_uk.driver_check.response import PAIR, expected_gain, respond
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import State, along
@@ -48,6 +48,7 @@ class Bounds:
 class Trial:
     """Yaws left, drives forward and back, yaws right, and stops commanding during a small yaw.
 
+    First by speeds, without torque: a board that obeys them is tried by them alone.
     A stage in which odometry came late, on the wall clock, is ended and repeated, as it is not
     known from when on its torques acted.
     """
@@ -66,7 +67,8 @@ class Trial:
         self.late = round(max(LATE, LATE_PERIODS * period) * SECOND)
         ages = [a.wall - reading.nanoseconds(a.message.header.stamp) for a in heard]
         self.usual_age = float(np.median(ages))  # [ns]
-        self.commands: list[TorqueCommand] = []
+        self.commands: list[WheelCommand] = []
+        self.takes_speeds: bool | None = None  # not known yet
         self.pulses: list[evidence.PulseTimes] = []
         self.silence: tuple[int, int] | None = None
         self.trouble = ""
@@ -87,51 +89,63 @@ class Trial:
             return self.pulse(ORDER[len(self.pulses)])
         return self.silence_in_a_yaw() if self.on_wall_clock and self.silence is None else None
 
-    def pulse(self, turns: bool) -> Pulse:
+    def pulse(self, turns: bool) -> Pulse | SpeedPulse:
         """Pulse to the left or forward at first, then to the right or back, to stay near."""
         way, back = self.way[int(turns)], BACK[int(turns)]
         is_second = len(self.pulses) >= len(ORDER) / 2
         sign = -1.0 if way > back or (is_second and way > -back) else 1.0
+        if self.takes_speeds is not False:
+            return SpeedPulse(turns, sign, self.climber, self.period)
         return Pulse(turns, sign, self.climber, self.period, self.limit)
 
     def silence_in_a_yaw(self) -> Silence | None:
-        """Stage that tries the watchdog; None if no torque is known that yaws the climber."""
+        """Stage that tries the watchdog; None if no command is known that yaws the climber."""
         response = respond(motion_of(self.heard), self.record(), self.climber)
         name, likeness = response.wiring
         gain, offset = response.gains[1, 1], response.offsets[1, 1]
         if name or likeness < thresholds.LIKENESS or not gain > 0:
             return None
+        if self.takes_speeds:
+            speeds = SpeedPulse(True, 1.0, self.climber, self.period)
+            return Silence(speeds.rates, self.bounds.watchdog_time, speeds)
         torque = float((PUSHED_BY - offset) / (gain * expected_gain(self.climber)[1]))
         after = Pulse(True, 1.0, self.climber, self.period, self.limit)
-        return Silence(torque, self.bounds.watchdog_time, after) if torque <= self.limit else None
+        after.top = after.damping
+        yawing = torque * PAIR[1]
+        return Silence(yawing, self.bounds.watchdog_time, after) if torque <= self.limit else None
 
     def record(self) -> evidence.TrialRecord:
         """Pulses, commands and trouble so far."""
         return evidence.TrialRecord(
-            self.pulses, self.commands, self.limit, self.silence, self.trouble
+            self.pulses,
+            self.commands,
+            self.limit,
+            self.silence,
+            self.trouble,
+            self.takes_speeds,
         )
 
     def stop(self, why: str) -> None:
-        """Command zero torque from now on; `why` is the trouble, unless there is one."""
+        """Command zero from now on; `why` is the trouble, unless there is one."""
         self.stage, self.trouble = None, self.trouble or why
 
-    def torques(self, stamp: int, now: int, state: State) -> Array | None:
-        """Torques (2,) (right, left) [N m] that answer an odometry; None: send nothing."""
+    def command(self, stamp: int, now: int, state: State) -> WheelCommand | None:
+        """What answers an odometry; None: send nothing."""
         self.keep_within_bounds(state)
         is_late = self.on_wall_clock and (
             now - stamp > self.usual_age + self.late or 0 < self.last < stamp - self.late
         )
         self.last = stamp
-        torques: Array | None = np.zeros(2)
+        told: WheelCommand | None = WheelCommand(max(stamp, now), NOTHING)
         if self.stage is not None and (self.begun_at or not is_late):
             self.begun_at = self.begun_at or stamp
             if is_late:
                 self.spoilt = True
                 self.stage.finish()
-            torques = self.stage_torques(self.stage, stamp, state)
-        if torques is not None:
-            self.commands.append(TorqueCommand(max(stamp, now), torques))
-        return torques
+            told = self.stage_command(self.stage, stamp, max(stamp, now), state)
+        if told is not None:
+            self.commands.append(told)
+        return told
 
     def keep_within_bounds(self, state: State) -> None:
         """Do not begin if the climber moves; only damp its motion if it has gone too far."""
@@ -150,15 +164,22 @@ class Trial:
         if self.trouble and self.stage is not None:
             self.stage.finish()
 
-    def stage_torques(self, stage: Stage, stamp: int, state: State) -> Array | None:
-        """Torques (2,) [N m] of a stage; begins the next one if it is done."""
-        torques = stage.torques((stamp - self.begun_at) / SECOND, state)
-        if torques is None:
+    def stage_command(
+        self, stage: Stage, stamp: int, time: int, state: State
+    ) -> WheelCommand | None:
+        """Command of a stage from a `time` [ns] on; begins the next one if it is done."""
+        numbers = stage.command((stamp - self.begun_at) / SECOND, state)
+        if numbers is None:
             self.silence = self.silence[0] if self.silence else stamp, stamp
         if stage.done:
             if self.spoilt and isinstance(stage, Silence):
                 self.silence = None
-            elif not self.spoilt and isinstance(stage, Pulse):
-                self.pulses.append(evidence.PulseTimes(stage.turns, self.begun_at, stamp))
+            elif not self.spoilt and not isinstance(stage, Silence):
+                if isinstance(stage, SpeedPulse) and self.takes_speeds is None:
+                    self.takes_speeds = stage.is_obeyed
+                if stage.by_speeds == self.takes_speeds:
+                    self.pulses.append(evidence.PulseTimes(stage.turns, self.begun_at, stamp))
             self.stage = self.next_stage()
-        return torques
+        if numbers is None:
+            return None
+        return WheelCommand(time, *((NOTHING, numbers) if stage.by_speeds else (numbers,)))

@@ -68,12 +68,14 @@ class Motors:
         last: tuple[Array, Array],
         commanded: Array,
         time: float,
+        eagerness: float = 1.0,
     ) -> Array:
         """Torques (2,) as of `torques`, of a servo for `commanded` rates (2,) [rad/s].
 
         `last` are the torques (2,) of the step before, as long as this one, and the rates (2,)
         that the wheels had at its begin. A PI controller in its incremental form: what the last
-        torques did not do, these do as well, be it friction, weight or load that is to blame.
+        torques did not do, these do as well, be it friction, weight or load that is to blame. That
+        is stable where wheels carry at least `eagerness` times the climber's inertia.
         """
         before, rates_before = last
         rates, radius = climber.wheel_rates(wheels), climber.wheel_radius
@@ -84,8 +86,8 @@ class Motors:
         share = 1 - math.exp(-time / self.servo_time_constant) if self.servo_time_constant else 1.0
         missing = radius * (share * (commanded - rates) - (rates - rates_before)) / time
         right, left = missing.tolist()  # [m/s²] of the rims
-        force = climber.mass * (right + left) / 2
-        moment = climber.yaw_inertia * (right - left) / (2 * climber.half_track)
+        force = eagerness * climber.mass * (right + left) / 2
+        moment = eagerness * climber.yaw_inertia * (right - left) / (2 * climber.half_track)
         return _within_bounds(climber, wheels, before + climber.wheel_torques(force, moment))
 
 

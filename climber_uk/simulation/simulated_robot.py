@@ -60,6 +60,7 @@ class Push(NamedTuple):
         return np.array([x * cosine - y * sine, x * sine + y * cosine, moment])
 
 
+OF_SLIPPING = 0.25  # eagerness of a servo, as wheels that slip carry little
 UNPUSHED = Push(NO_PUSH)
 
 
@@ -116,7 +117,8 @@ class SimulatedRobot:
         wheels = plant.as_wheels_tell(self.state)
         if motors.take_speeds:
             last = self.torques, self.rates_before
-            torques = motors.servo(plant.climber, wheels, last, commanded, step)
+            eagerness = OF_SLIPPING if plant.slip else 1.0
+            torques = motors.servo(plant.climber, wheels, last, commanded, step, eagerness)
         else:
             torques = motors.torques(plant.climber, wheels, self.torques, commanded, step)
         state = plant.advance(self.state, torques, 1, push.on(self.state))

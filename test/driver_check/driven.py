@@ -1,11 +1,19 @@
 """A driver without ROS: the plant's machine, what it tells, and what it is told by a trial."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 
 from climber_uk.driver_check import listening
-from climber_uk.driver_check.evidence import Arrival, Endpoint, Evidence, ExpectedDriver, Graph
+from climber_uk.driver_check.evidence import (
+    Arrival,
+    Endpoint,
+    Evidence,
+    ExpectedDriver,
+    Graph,
+    WheelRates,
+)
 from climber_uk.driver_check.trial import Bounds, Trial
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
@@ -69,17 +77,31 @@ def evidence(arrivals, trial=None, graph=ALONE, **others):
 
 
 def tried(
-    wheels, climber=CLIMBER, law=None, sensors=None, late=0, start=START, bounds=None, stall=None
+    wheels,
+    climber=CLIMBER,
+    law=None,
+    sensors=None,
+    late=0,
+    start=START,
+    bounds=None,
+    stall=None,
+    motors=None,
+    contact=None,
+    slip=False,
+    robot=SimulatedRobot,
+    expected=None,
 ):
     """Trial of a driver whose wheels get `wheels` (2, 2) times the torques, `late` periods late.
 
     In the range of messages `stall` nothing is heard until its end, and the last torque acts on.
     """
-    contact = Contact() if law is None else Contact(friction=law)
-    parts = Parts(Plant(climber, PERIOD / 2, contact), Motors(), sensors or Sensors(), Physics())
-    machine = SimulatedRobot(parts, start, PERIOD)
+    motors, contact = motors or Motors(), contact or Contact()
+    contact = contact if law is None else replace(contact, friction=law)
+    plant = Plant(climber, PERIOD / 2, contact, slip=slip)
+    parts = Parts(plant, motors, sensors or Sensors(), Physics())
+    machine = robot(parts, start, PERIOD)
     heard, coming, trial = [], [np.zeros(2)] * late, None
-    missed = []
+    missed, turning, numbers = [], [], np.zeros(2)
     for number in range(4000):
         _, state = machine.odometer.latest()
         stamp = SECOND + number * 5_000_000
@@ -87,17 +109,20 @@ def tried(
         heard.append(arrived(odometry(state.pose, twist, stamp)))
         if number == 50:
             trial = Trial(CLIMBER, bounds or Bounds(), heard, PERIOD, stall is not None)
+        turning.append(WheelRates(stamp, *machine.rates.tolist()))
         missed.append((stamp, state))
         if stall is None or number not in stall:
-            torques = np.zeros(2)
+            told = None
             for past, at in missed if trial else ():
-                torques = trial.torques(past, stamp, at)
+                told = trial.command(past, stamp, at)
             missed.clear()
+            numbers = (told.rates if motors.take_speeds else told.torques) if told else np.zeros(2)
         if trial is not None and trial.stage is None:
             break
-        coming.append(np.array(wheels) @ (np.zeros(2) if torques is None else torques))
+        coming.append(np.array(wheels) @ numbers)
         acting = coming.pop(0)
         for _ in range(2):
             machine.advance(acting)
         machine.measure()
-    return evidence(heard, trial.record())
+    given = {"turning": turning} | ({"expected": expected} if expected else {})
+    return evidence(heard, trial.record(), **given)

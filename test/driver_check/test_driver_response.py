@@ -7,12 +7,20 @@ import pytest
 from driven import CLIMBER, START, arrived, evidence, odometry, tried
 
 from climber_uk.driver_check import checks, reacting, report
-from climber_uk.driver_check.evidence import PulseTimes, TorqueCommand, TrialRecord
+from climber_uk.driver_check.evidence import (
+    ExpectedDriver,
+    PulseTimes,
+    TrialRecord,
+    WheelCommand,
+)
 from climber_uk.driver_check.report import Verdict
 from climber_uk.driver_check.response import WIRINGS, expected_gain, response_of
 from climber_uk.driver_check.trial import Bounds
+from climber_uk.mechanics.adhesion import Grip
+from climber_uk.mechanics.contact import Contact, FourWheeled
 from climber_uk.mechanics.friction import FRICTION
 from climber_uk.mechanics.quantities import State
+from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.sensors import Sensors
 
 RIGHT = np.eye(2)
@@ -111,6 +119,99 @@ def test_without_enough_torque_it_says_so():
     assert "torque_share" in found.hint
 
 
+SPEEDS = Motors(motors="velocity", servo_time_constant=0.05)
+TOLD = ExpectedDriver(motors="velocity", servo_time_constant=0.05)
+
+
+def by_speeds(wheels=RIGHT, expected=TOLD, **how):
+    """Trial of a board that takes speeds."""
+    return tried(wheels, **{"motors": SPEEDS, "expected": expected, **how})
+
+
+@pytest.mark.parametrize("wiring", list(WIRINGS))
+def test_every_wiring_of_a_board_that_takes_speeds_is_found_by_name(wiring):
+    seen = by_speeds(WIRINGS[wiring])
+    found, likeness = response_of(seen).wiring
+    assert seen.trial.takes_speeds
+    assert found == wiring
+    assert likeness > 0.95
+
+
+@pytest.mark.parametrize("board", ["torque", "velocity"])
+@pytest.mark.parametrize("told", ["torque", "velocity"])
+def test_the_board_is_told_and_whether_the_controller_knows(board, told):
+    seen = tried(
+        RIGHT,
+        motors=replace(SPEEDS, motors=board),
+        expected=ExpectedDriver(motors=told, servo_time_constant=0.05),
+    )
+    found = checks.report(seen)
+    failed = [name for name, finding in found.items() if finding.verdict is Verdict.FAIL]
+    assert failed == ([] if board == told else ["motors"])
+    assert {"torque": "effort", "velocity": "velocity"}[board] in found["motors"].said
+
+
+@pytest.mark.parametrize("time_constant", [0.01, 0.02, 0.05, 0.1])
+@pytest.mark.parametrize("late", [0, 4])
+def test_time_constant_and_delay_of_a_servo_are_told_apart(time_constant, late):
+    motors = Motors(motors="velocity", servo_time_constant=time_constant, velocity_resolution=1e-3)
+    seen = by_speeds(motors=motors, late=late)
+    response = response_of(seen)
+    assert response.time_constant == pytest.approx(time_constant, rel=0.1, abs=2e-3)
+    assert response.delay == pytest.approx(0.005 * late, abs=4e-3)
+    servo = reacting.servo(seen)
+    is_off = not 0.5 <= time_constant / 0.05 <= 2.0
+    assert servo.verdict is (Verdict.WARN if is_off else Verdict.PASS)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_board_whose_speeds_are_others_is_told(factor):
+    found = checks.report(by_speeds(factor * RIGHT))
+    assert found["gain"].verdict is Verdict.FAIL
+    assert found["gain"].values["drive"] == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "sensors",
+    [
+        Sensors(odometry_source="wheels", encoder_resolution=0.006),
+        Sensors(
+            position_noise=5e-4, heading_noise=1e-3, speed_noise=5e-3, yaw_rate_noise=1e-2, seed=1
+        ),
+    ],
+    ids=["encoders", "noise"],
+)
+def test_a_board_that_takes_speeds_passes_with_imperfect_sensors(sensors):
+    found = checks.report(by_speeds(sensors=sensors))
+    assert not report.has_failed(found)
+    assert found["servo"].values["time_constant"] == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_board_that_obeys_neither_is_told():
+    found = checks.report(by_speeds(0 * RIGHT))
+    assert found["wheels"].verdict is Verdict.FAIL
+    assert "no reaction to speeds, nor to torques" in found["wheels"].said
+
+
+FOUR = Contact(locomotion=FourWheeled(), grip=Grip(wheel_inertia=2e-4))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("board", ["torque", "velocity"])
+def test_four_wheels_on_a_wall_pass_and_what_they_scrub_is_told(board):
+    motors = replace(SPEEDS, motors=board)
+    expected = replace(TOLD, motors=board)
+    start = State(np.array([0.0, 3.0, 0.785]), np.zeros(3))
+    found = checks.report(
+        tried(RIGHT, motors=motors, expected=expected, contact=FOUR, slip=True, start=start)
+    )
+    assert not report.has_failed(found), report.as_text(found)
+    told = found["turning"].values
+    assert told["effective_half_track"] == pytest.approx(0.35, abs=0.015)
+    if board == "torque":  # μ N l / 2 with N = 384 N, less what the wheels' drive takes of it
+        assert 0.85 * 38.4 < told["turning_friction"] < 38.4
+
+
 def silence(acceleration, until):
     """Evidence of a turn that goes on accelerating for some time [s] after the last command."""
     time = np.arange(0.0, 1.0, 0.005)
@@ -121,7 +222,7 @@ def silence(acceleration, until):
         arrived(odometry((0.0, 0.0, h), (0.0, 0.0, r), s))
         for h, r, s in zip(heading, rate, stamps, strict=True)
     ]
-    commands = [TorqueCommand(stamps[0], np.array([0.01, -0.01]))]
+    commands = [WheelCommand(stamps[0], np.array([0.01, -0.01]))]
     pulses = [PulseTimes(True, stamps[0], stamps[30])]
     return evidence(heard, TrialRecord(pulses, commands, 2.0, (stamps[31], stamps[-1])))
 

@@ -36,8 +36,9 @@ class Driver(PlantSimulator):
     def on_torques(self, serialized):
         if self.into is not None:
             message = deserialize_message(serialized, JointState)
-            left, right = message.effort
-            message.effort = [float(torque) for torque in self.into(self, left, right)]
+            obeyed = "velocity" if self.take_speeds else "effort"
+            left, right = getattr(message, obeyed)
+            setattr(message, obeyed, [float(number) for number in self.into(self, left, right)])
             serialized = serialize_message(message)
         super().on_torques(serialized)
 

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.nodes
 
 FAULTY = Path(__file__).parent / "faulty_driver.py"
 PARAMETERS = "--ros-args", "--params-file", str(CONFIG / "climber.yaml")
+BY_SPEEDS = "--ros-args", "--params-file", str(CONFIG / "velocity.yaml")
 # odometry may be late on a busy machine
 PATIENT = (*PARAMETERS, "-p", "odometry_timeout:=2.0")
 PACED = "simulated_time:=true", "real_time_factor:=2.0"  # it has to be found meanwhile
@@ -52,7 +53,7 @@ FAULTS = {
     "wrong child frame": ("frames", "'base_footprint'"),
 }
 WALL_CLOCK_FAULTS = {
-    "no watchdog": ("watchdog", "still pushes"),
+    "no watchdog": ("watchdog", "still "),
     "stale stamps": ("age", "ms old"),
     "stamps of the future": ("age", "ahead of the clock"),
     "zero stamps": ("clock", "zero"),
@@ -104,16 +105,16 @@ def told(rows):
     return "\n".join(f"{r['verdict']} {r['check']}: {r['said']}" for r in rows.values())
 
 
-def drive(world, fault, *parameters):
-    world.run("driver", sys.executable, FAULTY, fault, *PARAMETERS, *parameters)
+def drive(world, fault, *parameters, board=PARAMETERS):
+    world.run("driver", sys.executable, FAULTY, fault, *board, *parameters)
 
 
 @pytest.mark.parametrize(
     ("clock", "parameters", "skipped"),
     [
-        ("true", (*PARAMETERS, "-p", "use_sim_time:=true"), {"watchdog"}),
+        ("true", (*PARAMETERS, "-p", "use_sim_time:=true"), {"watchdog", "servo"}),
         # a machine that is busy moves it too far
-        pytest.param("false", PATIENT, set(), marks=pytest.mark.soak),
+        pytest.param("false", PATIENT, {"servo"}, marks=pytest.mark.soak),
     ],
 )
 def test_the_plant_passes_all_checks(world, clock, parameters, skipped):
@@ -189,11 +190,21 @@ def test_what_it_cannot_do_is_one_line_and_status_2(world, arguments, said):
     assert "Traceback" not in error
 
 
-@pytest.mark.parametrize(("fault", "check_name", "said"), some(FAULTS, IN_BRIEF))
-def test_a_planted_fault_is_found_by_name_and_nothing_else(world, fault, check_name, said):
+BOARDS = {"torques": PARAMETERS, "speeds": BY_SPEEDS}
+
+
+@pytest.mark.parametrize(
+    ("board", "fault", "check_name", "said"),
+    [
+        pytest.param(board, *row.values, marks=row.marks, id=f"{board}, {row.id}")
+        for board, brief in (("torques", IN_BRIEF), ("speeds", IN_BRIEF[:1]))
+        for row in some(FAULTS, brief)
+    ],
+)
+def test_a_planted_fault_is_found_by_name_and_nothing_else(world, board, fault, check_name, said):
     """In lock-step, which the check itself answers."""
-    drive(world, fault, "-p", "simulated_time:=true")
-    sim_time = (*PARAMETERS, "-p", "use_sim_time:=true")
+    drive(world, fault, "-p", "simulated_time:=true", board=BOARDS[board])
+    sim_time = (*BOARDS[board], "-p", "use_sim_time:=true")
     status, rows, _ = check(world, "--move", "--duration", "0.5", parameters=sim_time)
     assert those(rows, "fail") == [check_name], told(rows)
     assert said in rows[check_name]["said"]
@@ -212,6 +223,23 @@ def test_a_fault_in_time_is_found_by_name_and_nothing_else(world, fault, check_n
     assert those(rows, "fail") == [check_name], told(rows)
     assert said in rows[check_name]["said"]
     assert status == 1
+
+
+@pytest.mark.soak
+def test_a_board_that_takes_speeds_passes_and_has_its_watchdog_tried(world):
+    world.start_node("plant_simulator", config="velocity.yaml")
+    status, rows, _ = check(world, "--move", "--duration", "1", parameters=BY_SPEEDS)
+    assert status == 0, told(rows)
+    assert not those(rows, "fail") + those(rows, "skip"), told(rows)
+    assert rows["servo"]["values"]["time_constant"] == pytest.approx(0.02, abs=0.01)
+
+
+@pytest.mark.soak
+def test_a_board_that_takes_speeds_and_has_no_watchdog_is_told(world):
+    drive(world, "no watchdog", board=BY_SPEEDS)
+    _, rows, _ = check(world, "--move", "--duration", "1", parameters=BY_SPEEDS)
+    assert those(rows, "fail") == ["watchdog"], told(rows)
+    assert "still turns" in rows["watchdog"]["said"]
 
 
 @pytest.mark.soak
