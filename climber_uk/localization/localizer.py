@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from climber_uk.localization.doubts import Doubts
 from climber_uk.localization.encoders import Encoders, Rolled
 from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
 from climber_uk.localization.history import History, Sample
@@ -55,7 +56,7 @@ class Localizer:
         self.history = History(options, Estimate.start(options))
         self.encoders, self.imu = Encoders(options), Imu()
         self.gate, self.smoothing = Gate(options), Smoothing(options)
-        self.counts = Counts()
+        self.counts, self.doubts = Counts(), Doubts(options)
         self.stamp: int | None = None  # [ns] of the last sample of the encoders
         self.last_was_taken = True  # of the fixes
         self.fixed: int | None = None  # [ns] stamp of the last fix that was taken
@@ -111,6 +112,7 @@ class Localizer:
             self.on_fix(fix)
         if self.located or (self.knows_heading and self.knows_position):
             self.located = self._locate(rolled, sample.travel)
+            self.doubts.look(self.estimate)
         return self.located
 
     def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
@@ -186,6 +188,7 @@ class Localizer:
         self.history.correct(number, lambda estimate: after(estimate, fix, innovation(estimate)))
         self._smooth(before)
         self.fixed, self.last_was_taken = fix.stamp, True
+        self.doubts.on_fix(fix.stamp)
         taken, _, believed = self.counts
         self.counts = self.counts._replace(taken=taken + 1, believed=believed + verdict.believed)
         if verdict.believed:

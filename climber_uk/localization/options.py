@@ -49,10 +49,16 @@ class LocalizationOptions:
         math.pi, "rad", "of that; above initial_heading_limit: gravity or a fix tells", above=0
     )
     initial_position_limit: float = parameter(
-        0.2, "m", "deviation above which nothing is published at the start", above=0
+        0.2,
+        "m",
+        "deviation above which nothing is published at the start, and which is told",
+        above=0,
     )
     initial_heading_limit: float = parameter(
-        0.1, "rad", "deviation above which nothing is published at the start", above=0
+        0.1,
+        "rad",
+        "deviation above which nothing is published at the start, and which is told",
+        above=0,
     )
     gate_probability: float = parameter(
         0.999, "", "share of good fixes that pass the gate", above=0, at_most=0.999999

@@ -162,10 +162,13 @@ class WallOdometry(ClimberNode):
             self.report("localization", "")
 
     def tell_what_is_missing(self, stamp: int) -> None:
-        """Report an IMU that is not there, and what a start waits for."""
+        """Report an IMU and fixes that are not there, and what is not known: at first, or later."""
         localizer, options = self.localizer, self.options
         absent = not localizer.imu.is_there(stamp)
         self.report("samples of imu", "none: yaw rate by the wheels" * absent, "", is_fault=False)
+        doubts = localizer.doubts
+        self.report("fixes", "they have stopped" * doubts.have_stopped(stamp), "", is_fault=False)
+        self.report("location", "not known any more" * bool(doubts.unknown), doubts.said)
         missing = []
         if localizer.located is None and not localizer.knows_heading:
             missing.append(f"heading to {options.initial_heading_limit:g} rad")

@@ -204,3 +204,35 @@ def test_deviations_are_those_of_the_errors(seed):
     last = told.position - 0.15 * PERIOD * np.array([math.cos(0.7), math.sin(0.7)])
     for part, true in enumerate((*last, 0.7)):
         assert abs(wrapped(float(estimate.mean[part] - true))) < 5 * estimate.deviation(part)
+
+
+def test_a_position_that_is_not_known_any_more_is_in_doubt_until_fixes_are_back():
+    told = Told(speed=1.0, creep_deviation=0.2).go_on(0.5)
+    assert not told.localizer.doubts.unknown
+    told.go_on(2.0)
+    doubts = told.localizer.doubts
+    assert list(doubts.unknown) == ["position"]
+    assert doubts.said.startswith("position by 0.")
+    assert doubts.said.endswith("above 0.2 m")
+    told.fix(deviation=0.18)
+    told.go_on(PERIOD)
+    assert doubts.unknown  # it is less than the limit now, but by a little
+    for _ in range(10):
+        told.fix()
+        told.go_on(PERIOD)
+    assert not doubts.unknown
+
+
+def test_fixes_have_stopped_after_some_times_their_longest_interval_and_some_seconds():
+    told, stopped = Told(), []
+    doubts = told.localizer.doubts
+    assert not told.go_on(6.0).localizer.doubts.have_stopped(told.stamp)  # there were none
+    for interval in (0.1, 2.0, 0.1):
+        told.fix()
+        told.go_on(interval)
+    for second in range(1, 15):
+        told.go_on(1.0)
+        stopped += [second] * doubts.have_stopped(told.stamp)
+    assert stopped == [10, 11, 12, 13, 14]
+    told.fix()
+    assert not doubts.have_stopped(told.stamp)

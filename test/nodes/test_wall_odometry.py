@@ -123,6 +123,13 @@ def test_what_is_refused_has_one_line_that_says_why_and_is_told_in_diagnostics(w
     assert "times what may be" in values()["last remark"]
     assert "±" in values()["bias of the gyro [rad/s]"]
     assert world.log(NODE).count("must have 'left_wheel_joint' once") == 1
+    told.pose()
+    told.answered()
+    told.stamp += 6 * SECOND
+    said = "fixes: they have stopped"
+    world.wait(lambda: told.go_on() and said in world.log(NODE), said)
+    told.pose()
+    world.wait(lambda: told.go_on() and "fixes: ok again" in world.log(NODE), "fixes")
 
 
 def test_an_imu_that_stops_is_told_and_the_encoders_go_on(world):
