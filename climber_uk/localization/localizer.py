@@ -11,7 +11,17 @@ from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
 from climber_uk.localization.history import History, Sample
 from climber_uk.localization.imu import DELAY, Imu, Weight
 from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
-from climber_uk.localization.models import BIAS, HEADING, SCALE, Travel, X, Y, turn
+from climber_uk.localization.models import (
+    BIAS,
+    FORCE_BIASES,
+    HEADING,
+    SCALE,
+    Travel,
+    X,
+    Y,
+    heading_by_force_biases,
+    turn,
+)
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.output_speed import OutputSpeed
 from climber_uk.localization.smoothing import Smoothing
@@ -129,14 +139,22 @@ class Localizer:
         if pull == 0:
             return
         deviation = options.acceleration_noise / math.sqrt(weight.known) / pull
-        heading = math.atan2(weight.forwards, weight.left) + weight.turned
+        mean, covariance = self.estimate.mean, self.estimate.covariance
+        forwards, left = (np.array([weight.forwards, weight.left]) - mean[FORCE_BIASES]).tolist()
+        heading = math.atan2(forwards, left) + weight.turned
+        by_biases = heading_by_force_biases(heading, pull)
         if not self.knows_heading:
-            if deviation <= options.initial_heading_limit:
+            biases = covariance[np.ix_(FORCE_BIASES, FORCE_BIASES)]
+            if math.sqrt(deviation**2 + by_biases @ biases @ by_biases) <= (
+                options.initial_heading_limit
+            ):
                 self._believe(heading, deviation)
             return
-        off = wrapped(heading - float(self.estimate.mean[HEADING]))
+        off = wrapped(heading - float(mean[HEADING]))
+        rows = [HEADING, *FORCE_BIASES]
+        by_state = np.array([1.0, *-by_biases])
         variance = options.acceleration_noise**2 / weight.time / pull**2
-        variance += self.estimate.deviation(HEADING) ** 2
+        variance += float(by_state @ covariance[np.ix_(rows, rows)] @ by_state)
         disagrees = off**2 > LARGEST_KNOCK * variance
         self._disagrees = self._disagrees + weight.time if disagrees else 0.0
         if self._disagrees > DISAGREES:
@@ -149,7 +167,8 @@ class Localizer:
         self._disagrees, before = 0.0, self.estimate.mean[:3]
         near = float(before[HEADING]) + wrapped(heading - float(before[HEADING]))
         last = len(self.history.entries) - 1
-        self.history.correct(last, lambda estimate: estimate.with_heading(near, deviation))
+        pull = self.options.gravity_along_wall
+        self.history.correct(last, lambda estimate: estimate.with_heading(near, deviation, pull))
         self._smooth(before)
 
     def on_fix(self, fix: Fix) -> None:

@@ -26,6 +26,10 @@ class LocalizationOptions:
     acceleration_noise: float = parameter(
         0.005, "m/s/√s", "of specific force: deviation of its integral after a second", above=0
     )
+    acceleration_bias_deviation: float = parameter(
+        0.1, "m/s²", "of either bias at the start; 0: there is none", at_least=0
+    )
+    acceleration_bias_walk: float = parameter(0.0002, "m/s²/√s", "how much they wander", at_least=0)
     scale_deviation: float = parameter(
         0.01, "", "of the encoders' distance: slip, and a wrong wheel radius", at_least=0
     )

@@ -190,6 +190,8 @@ class WallOdometry(ClimberNode):
             "y [m]": with_deviation(models.Y),
             "heading [rad]": with_deviation(models.HEADING),
             "bias of the gyro [rad/s]": with_deviation(models.BIAS),
+            "bias of the accelerometer, forwards [m/s²]": with_deviation(models.FORWARD_BIAS),
+            "bias of the accelerometer, left [m/s²]": with_deviation(models.LEFT_BIAS),
             "scale error of the encoders": with_deviation(models.SCALE),
             "creep": with_deviation(models.CREEP),
             "gravity along the wall [m/s²]": self.options.gravity_along_wall,

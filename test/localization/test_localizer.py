@@ -26,8 +26,9 @@ class Told:
     """A climber of a heading and a speed, and the localizer that is told of it."""
 
     def __init__(self, seed=0, heading=0.0, speed=0.0, bias=0.0, creep=0.0, **options):
+        known = {"initial_heading": 0.0, "acceleration_bias_deviation": 0.0}
         self.options = LocalizationOptions(
-            gyro_noise=GYRO, acceleration_noise=FORCE, initial_heading=0.0, **options
+            gyro_noise=GYRO, acceleration_noise=FORCE, **{**known, **options}
         )
         self.localizer, self.random = Localizer(self.options), np.random.default_rng(seed)
         self.heading, self.speed, self.bias, self.creep = heading, speed, bias, creep
