@@ -64,7 +64,7 @@ class Localizer:
     def _start(self) -> None:
         options = self.options
         self.history = History(options, Estimate.start(options))
-        self.encoders, self.imu = Encoders(options), Imu()
+        self.encoders, self.imu = Encoders(options), Imu(options.imu_x, options.imu_y)
         self.gate, self.smoothing = Gate(options), Smoothing(options)
         self.counts, self.doubts = Counts(), Doubts(options)
         self.stamp: int | None = None  # [ns] of the last sample of the encoders

@@ -26,6 +26,8 @@ class LocalizationOptions:
     acceleration_noise: float = parameter(
         0.005, "m/s/√s", "of specific force: deviation of its integral after a second", above=0
     )
+    imu_x: float = parameter(0.0, "m", "where it is in base_frame: forwards of the centre")
+    imu_y: float = parameter(0.0, "m", "where it is in base_frame: to the left of the centre")
     acceleration_bias_deviation: float = parameter(
         0.1, "m/s²", "of either bias at the start; 0: there is none", at_least=0
     )

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.localization.encoders import LARGEST_SPEED
+from climber_uk.localization.encoders import LARGEST_SPEED, Rolled
 from climber_uk.localization.gate import Fix
+from climber_uk.localization.imu import Imu
 from climber_uk.localization.localizer import Localizer
 from climber_uk.localization.models import BIAS, CREEP, HEADING
 from climber_uk.localization.options import LocalizationOptions
@@ -237,3 +238,16 @@ def test_fixes_have_stopped_after_some_times_their_longest_interval_and_some_sec
     assert stopped == [10, 11, 12, 13, 14]
     told.fix()
     assert not doubts.have_stopped(told.stamp)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.1, 0.0), (0.0, -0.1)])
+def test_an_imu_away_from_the_centre_tells_the_same_weight(place):
+    """Of a climber that turns on the spot on a floor, by 2 sin(5 t) rad/s."""
+    (x, y), imu, weights = place, Imu(*place), []
+    for number in range(400):
+        time = number * PERIOD
+        rate, faster = 2 * math.sin(5 * time), 10 * math.cos(5 * time)
+        imu.add(round(time * SECOND), rate, -(rate**2) * x - faster * y, faster * x - rate**2 * y)
+        weights.append(imu.weight(Rolled(PERIOD, 0.0, 0.0, rate, False), rate))
+    forces = [(weight.forwards, weight.left) for weight in weights[100:] if weight is not None]
+    np.testing.assert_allclose(forces, 0, atol=0.03)  # of up to 1 m/s²
