@@ -78,6 +78,7 @@ CONTENTS = {
     topics.private(
         topics.PARAMETERS
     ): "all parameters as they are, at the start and whenever one changes",
+    "~/map_to_odom": "pose of `odom` in `map_frame`, in which corrections act at once; 20 Hz",
     "~/transition_event": "changes of the managed node's state",
     "~/start": "start, or start again, at the next odometry",
     "~/stop": "come to rest on the path, as `~/pause`",

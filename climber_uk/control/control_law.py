@@ -78,6 +78,15 @@ class ControlInput(NamedTuple):
     course: Course | None = None  # None: where its heading is
 
 
+class Braking(NamedTuple):
+    """How what moves is braked; rates below 0 are for speeds that have the wrong sign."""
+
+    drive: float  # [1/s]
+    yaw: float  # [1/s]
+    carries: bool = True  # whether the weight is carried
+    shaking: tuple[float, float] = (0.0, 0.0)  # [m/s²] beside that: of the speed, of a rim by yaw
+
+
 class Command(NamedTuple):
     """What the controller answers; a wrench and a reaction in the body's frame."""
 
@@ -241,12 +250,14 @@ class ControlLaw:
         v_1 = (force - rubbing * direction - weight * motion.sine) / mass
         return force + friction * direction, moment, v_1, 0.0
 
-    def braking(self, situation: ControlInput, braking_rate: float) -> Torques:
-        """Torques that carry the weight and brake what moves, at `braking_rate` [1/s]."""
+    def braking(self, situation: ControlInput, braking: Braking) -> Torques:
+        """Torques that carry the weight and brake what moves."""
         climber, motion = self.climber, situation.motion
-        weight = climber.weight_along_wall * motion.sine
-        force = weight - climber.mass * braking_rate * motion.speed
-        moment = -climber.yaw_inertia * braking_rate * motion.yaw_rate
+        weight = climber.weight_along_wall * motion.sine if braking.carries else 0.0
+        shaken, shaken_yaw = braking.shaking
+        force = weight + climber.mass * (shaken - braking.drive * motion.speed)
+        turning = shaken_yaw / climber.half_track - braking.yaw * motion.yaw_rate
+        moment = climber.yaw_inertia * turning
         return Torques(*climber.saturate(force, moment, *self._bounds(situation))[2:4])
 
     @cached_property

@@ -126,7 +126,8 @@ class Controller:
     @property
     def clock_offset(self) -> float:
         """By how much the node's clock is ahead of the odometry's [s]; 0 if that may be latency."""
-        return self.ages.offset(self.estimator.timing.max_latency)
+        is_offset = self.ages.offset(self.estimator.timing.max_latency) != 0
+        return self.ages.least if is_offset else 0.0
 
     def enable(self, enabled: bool) -> None:
         """Follow the reference, or give the safe output; what was wrong before is forgiven."""
@@ -217,6 +218,7 @@ class Controller:
         """Take in an odometry; return what is wrong with it."""
         is_first = self.estimator.motion is None
         observed = self.estimator.see(stamp, motion)
+        self._safe_output.watch(self._law.climber, observed)
         if observed is None and not is_first:
             self._watch_anew()
             self._unsettled = self.safety.settling_messages

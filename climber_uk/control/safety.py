@@ -51,7 +51,6 @@ class Mode(Enum):
     def doubts_odometry(self) -> bool:
         """Whether speeds of odometry may be wrong, so that braking by them may drive."""
         return self in (
-            Mode.BAD_ODOMETRY,
             Mode.JUMPED,
             Mode.NO_TWIST,
             Mode.TWIST_WRONG,

@@ -43,9 +43,9 @@ class Timing:
         runtime=True,
     )
     max_latency: float = parameter(
-        0.02,
+        0.05,
         "s",
-        "age of an odometry that is believed: what is always older is the clocks' offset",
+        "least age of odometry that is latency; what is always beyond is the clocks' offset",
         at_least=0,
         at_most=LONGEST_STEP,
     )
@@ -81,13 +81,19 @@ class Ages:
         return least if before is None else min(least, before)
 
     def offset(self, max_latency: float) -> float:
-        """Offset of the odometry's clock [s]: that part of its age that no latency explains."""
+        """Offset of the odometry's clock [s]: that part of its age that no latency explains.
+
+        If in doubt it is latency: a loop that believes in too much of it is slower, and one that
+        believes in too little oscillates.
+        """
         least = self.least
-        return 0.0 if abs(least) <= max_latency else least
+        if least > max_latency:
+            return least - max_latency
+        return least if least < -max_latency else 0.0
 
     def latency(self, age: float, max_latency: float) -> float:
         """Latency [s] of an odometry of some age [s], without the offset."""
-        return min(max(age - self.offset(max_latency), 0.0), max_latency)
+        return max(age - self.offset(max_latency), 0.0)
 
 
 class TorqueHistory:

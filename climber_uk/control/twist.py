@@ -42,6 +42,8 @@ class TwistCheck:
     """Whether the twist is the rate of the pose: its sign may be wrong.
 
     Compares distances by pose and by twist, summed over the last moments, older ones counting less.
+    A sign is wrong where both go opposite ways all the time: of a climber that swings, sums of a
+    twist that is a little late do so now and then.
     """
 
     def __init__(self) -> None:
@@ -51,6 +53,7 @@ class TwistCheck:
         """Compare from now on."""
         # [m] by pose and by twist: forward, and of a rim by yawing
         self._distances = (0.0, 0.0), (0.0, 0.0)
+        self._alike = 0.0, 0.0  # [m²] sums of products of pose's and twist's, of the same two
         self._opposed = 0
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
@@ -58,18 +61,23 @@ class TwistCheck:
         heading_change = wrapped(motion.heading - last.heading)
         middle = last.heading + heading_change / 2
         forward = (motion.x - last.x) * math.cos(middle) + (motion.y - last.y) * math.sin(middle)
+        way = time * (last.speed + motion.speed) / 2
+        turned = half_track * heading_change
         rim = half_track * time * (last.yaw_rate + motion.yaw_rate) / 2
         left = math.exp(-time / CHECK_MEMORY)
         (pose, twist), (yaw_by_pose, yaw_by_twist) = self._distances
         self._distances = (
-            (left * pose + forward, left * twist + time * (last.speed + motion.speed) / 2),
-            (left * yaw_by_pose + half_track * heading_change, left * yaw_by_twist + rim),
+            (left * pose + forward, left * twist + way),
+            (left * yaw_by_pose + turned, left * yaw_by_twist + rim),
         )
+        alike, yaw_alike = self._alike
+        self._alike = left * alike + forward * way, left * yaw_alike + turned * rim
 
     def opposed(self, least: float) -> str:
         """Field of the twist whose sign is not its pose's, over `least` [m] of both; else ''."""
-        for name, (pose, twist) in zip(("linear.x", "angular.z"), self._distances, strict=True):
-            if pose * twist < 0 and min(abs(pose), abs(twist)) > least:
+        fields = zip(("linear.x", "angular.z"), self._distances, self._alike, strict=True)
+        for name, (pose, twist), alike in fields:
+            if alike < 0 and pose * twist < 0 and min(abs(pose), abs(twist)) > least:
                 return f"twist.{name}"
         return ""
 

@@ -4,6 +4,7 @@ Angles of the wheels -> `encoders` (how far they have rolled, and whether they r
 specific force -> `imu` (between two samples of the encoders) -> `models.Travel` and gravity ->
 `kalman` (predicted and corrected by the `models`, with the variances of `options`) -> `history`, in
 which a fix corrects the state of its own stamp, and all that came after it is done again. `gate`
-refuses fixes, until some agree; `smoothing` lets the output go after the estimate without a jump,
-`output_speed` makes its speed and yaw rate. `localizer.Localizer` calls these in their turn.
+refuses fixes, until some agree; `doubts` tell what is not known any more; `smoothing` lets the
+output go after the estimate without a jump, `output_speed` makes its speed and yaw rate.
+`localizer.Localizer` calls these in their turn.
 """

@@ -24,6 +24,21 @@ class Fix(NamedTuple):
     values: Array  # (n,) [m], [rad]
     noise: Array  # (n, n) covariance
 
+    def moved(self, x: float, y: float, yaw: float) -> "Fix":
+        """The same where the frame of its values has its origin at (x, y) [m], turned by a yaw.
+
+        Raises `ValueError` where only one of x and y is measured, and the yaw turns it.
+        """
+        number = {part: index for index, part in enumerate(self.parts)}
+        turn, offset = np.eye(len(self.parts)), np.array([(x, y, yaw)[part] for part in self.parts])
+        if yaw != 0 and len({0, 1} & set(self.parts)) == 1:
+            raise ValueError("x and y have to be measured both where their frame is turned")
+        if yaw != 0 and 0 in number:
+            cosine, sine, both = math.cos(yaw), math.sin(yaw), [number[0], number[1]]
+            turn[np.ix_(both, both)] = [[cosine, -sine], [sine, cosine]]
+        values, noise = turn @ self.values + offset, turn @ self.noise @ turn.T
+        return self._replace(values=values, noise=noise)
+
 
 class Verdict(NamedTuple):
     """Whether a fix is taken, and how."""

@@ -1,10 +1,11 @@
 """Yaw rate between two samples of the encoders, and the specific force that the weight makes.
 
-    f_x - v̇ = g_t sinθ    f_y - v ω = g_t cosθ
+    f_x - v̇ + ω² r_x + ω̇ r_y = g_t sinθ    f_y - v ω + ω² r_y - ω̇ r_x = g_t cosθ
 
-All go through the same low-pass, twice, so that they are equally late. A bar for each time:
-v̇ is (v̄ - v̿) / τ, and θ̿ = θ - τ (ω̄ + ω̿). What is slower than 1/τ the low-pass leaves as it is: each
-sample counts as much as it does without. Once would leave too much of the encoders' counts in v̇.
+of an IMU that is at r in the climber's frame. All go through the same low-pass, twice, so that they
+are equally late. A bar for each time: v̇ is (v̄ - v̿) / τ, ω̇ alike, and θ̿ = θ - τ (ω̄ + ω̿). What is
+slower than 1/τ the low-pass leaves as it is: each sample counts as much as it does without. Once
+would leave too much of the encoders' counts in v̇.
 """
 
 from typing import NamedTuple
@@ -54,7 +55,9 @@ class LowPass:
 class Imu:
     """Takes samples; `yaw_rate` and `weight` are since the last sample of the encoders."""
 
-    def __init__(self) -> None:
+    def __init__(self, x: float = 0.0, y: float = 0.0) -> None:
+        """An IMU at (x, y) [m] in the climber's frame."""
+        self._place = x, y
         self.stamp: int | None = None  # [ns] of the last sample
         self.period = 0.005  # [s] between two samples
         self._samples: list[
@@ -64,6 +67,7 @@ class Imu:
         self._known = self._unused = 0.0  # [s]
         self._forwards, self._left = LowPass(), LowPass()
         self._speed, self._centripetal, self._yaw_rate = LowPass(), LowPass(), LowPass()
+        self._square = LowPass()  # of the yaw rate
 
     def add(self, stamp: int, yaw_rate: float, forwards: float, left: float) -> None:
         """Take yaw rate [rad/s] and specific force [m/s²] of a `stamp` [ns], all in the body's."""
@@ -106,14 +110,17 @@ class Imu:
         self._speed.add(speed, rolled.duration)
         self._centripetal.add(speed * yaw_rate, rolled.duration)
         self._yaw_rate.add(yaw_rate, rolled.duration)
+        self._square.add(yaw_rate * yaw_rate, rolled.duration)
         if self._unused == 0 or self._unused + 1e-9 < min(SPACING, self._known):
             return None
         time, self._unused = self._unused, 0.0
         acceleration = (self._speed.first.value - self._speed.second.value) / TIME
+        faster = (self._yaw_rate.first.value - self._yaw_rate.second.value) / TIME
         turning = self._yaw_rate.first.value + self._yaw_rate.second.value
+        (x, y), square = self._place, self._square.second.value
         return Weight(
-            self._forwards.second.value - acceleration,
-            self._left.second.value - self._centripetal.second.value,
+            self._forwards.second.value - acceleration + square * x + faster * y,
+            self._left.second.value - self._centripetal.second.value + square * y - faster * x,
             TIME * turning,
             time,
             min(self._known, 4 * TIME),

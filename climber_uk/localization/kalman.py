@@ -24,8 +24,8 @@ LARGEST_KNOCK = 9.2
 class Estimate:
     """What is believed of the state, and how far that may be off."""
 
-    mean: Array  # (6,) as in `models`
-    covariance: Array  # (6, 6)
+    mean: Array  # (8,) as in `models`
+    covariance: Array  # (8, 8)
 
     def deviation(self, part: int) -> float:
         """Standard deviation of a part of the state."""
@@ -40,15 +40,22 @@ class Estimate:
         deviations[:HEADING] = position
         deviations[HEADING], deviations[BIAS] = o.initial_heading_deviation, o.gyro_bias_deviation
         deviations[SCALE], deviations[CREEP] = o.scale_deviation, o.creep_deviation
-        mean = np.array([o.initial_x, o.initial_y, o.initial_heading, 0.0, 0.0, 0.0])
+        deviations[models.FORCE_BIASES] = o.acceleration_bias_deviation
+        mean = np.array([o.initial_x, o.initial_y, o.initial_heading, *[0.0] * 5])
         return cls(mean, np.diag(deviations**2))
 
-    def with_heading(self, heading: float, deviation: float) -> "Estimate":
-        """The same at a heading [rad] that nothing before has told."""
-        mean, covariance = self.mean.copy(), self.covariance.copy()
+    def with_heading(self, heading: float, deviation: float, along_wall: float) -> "Estimate":
+        """The same at a heading [rad] that gravity tells, and nothing before has told.
+
+        Its `deviation` is without that of the accelerometer's biases; `along_wall` is g_t.
+        """
+        by_biases = models.heading_by_force_biases(heading, along_wall)
+        jacobian = np.eye(SIZE)
+        jacobian[HEADING, HEADING] = 0.0
+        jacobian[HEADING, models.FORCE_BIASES] = by_biases
+        mean, covariance = self.mean.copy(), jacobian @ self.covariance @ jacobian.T
         mean[HEADING] = heading
-        covariance[HEADING, :] = covariance[:, HEADING] = 0.0
-        covariance[HEADING, HEADING] = deviation**2
+        covariance[HEADING, HEADING] += deviation**2
         return Estimate(mean, covariance)
 
 
@@ -68,7 +75,7 @@ def predicted(estimate: Estimate, travel: Travel, options: LocalizationOptions) 
 def corrected(
     estimate: Estimate, innovation: Array, jacobian: Array, noise: Array, limit: float = math.inf
 ) -> Estimate:
-    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 6).
+    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 8).
 
     One whose χ² is above `limit` counts for less, by as much as it is above.
     """

@@ -5,12 +5,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from climber_uk.localization.doubts import Doubts
 from climber_uk.localization.encoders import Encoders, Rolled
 from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
 from climber_uk.localization.history import History, Sample
 from climber_uk.localization.imu import DELAY, Imu, Weight
 from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
-from climber_uk.localization.models import BIAS, HEADING, SCALE, Travel, X, Y, turn
+from climber_uk.localization.models import (
+    BIAS,
+    FORCE_BIASES,
+    HEADING,
+    SCALE,
+    Travel,
+    X,
+    Y,
+    heading_by_force_biases,
+    turn,
+)
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.output_speed import OutputSpeed
 from climber_uk.localization.smoothing import Smoothing
@@ -53,9 +64,9 @@ class Localizer:
     def _start(self) -> None:
         options = self.options
         self.history = History(options, Estimate.start(options))
-        self.encoders, self.imu = Encoders(options), Imu()
+        self.encoders, self.imu = Encoders(options), Imu(options.imu_x, options.imu_y)
         self.gate, self.smoothing = Gate(options), Smoothing(options)
-        self.counts = Counts()
+        self.counts, self.doubts = Counts(), Doubts(options)
         self.stamp: int | None = None  # [ns] of the last sample of the encoders
         self.last_was_taken = True  # of the fixes
         self.fixed: int | None = None  # [ns] stamp of the last fix that was taken
@@ -111,6 +122,7 @@ class Localizer:
             self.on_fix(fix)
         if self.located or (self.knows_heading and self.knows_position):
             self.located = self._locate(rolled, sample.travel)
+            self.doubts.look(self.estimate)
         return self.located
 
     def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
@@ -127,14 +139,22 @@ class Localizer:
         if pull == 0:
             return
         deviation = options.acceleration_noise / math.sqrt(weight.known) / pull
-        heading = math.atan2(weight.forwards, weight.left) + weight.turned
+        mean, covariance = self.estimate.mean, self.estimate.covariance
+        forwards, left = (np.array([weight.forwards, weight.left]) - mean[FORCE_BIASES]).tolist()
+        heading = math.atan2(forwards, left) + weight.turned
+        by_biases = heading_by_force_biases(heading, pull)
         if not self.knows_heading:
-            if deviation <= options.initial_heading_limit:
+            biases = covariance[np.ix_(FORCE_BIASES, FORCE_BIASES)]
+            if math.sqrt(deviation**2 + by_biases @ biases @ by_biases) <= (
+                options.initial_heading_limit
+            ):
                 self._believe(heading, deviation)
             return
-        off = wrapped(heading - float(self.estimate.mean[HEADING]))
+        off = wrapped(heading - float(mean[HEADING]))
+        rows = [HEADING, *FORCE_BIASES]
+        by_state = np.array([1.0, *-by_biases])
         variance = options.acceleration_noise**2 / weight.time / pull**2
-        variance += self.estimate.deviation(HEADING) ** 2
+        variance += float(by_state @ covariance[np.ix_(rows, rows)] @ by_state)
         disagrees = off**2 > LARGEST_KNOCK * variance
         self._disagrees = self._disagrees + weight.time if disagrees else 0.0
         if self._disagrees > DISAGREES:
@@ -147,7 +167,8 @@ class Localizer:
         self._disagrees, before = 0.0, self.estimate.mean[:3]
         near = float(before[HEADING]) + wrapped(heading - float(before[HEADING]))
         last = len(self.history.entries) - 1
-        self.history.correct(last, lambda estimate: estimate.with_heading(near, deviation))
+        pull = self.options.gravity_along_wall
+        self.history.correct(last, lambda estimate: estimate.with_heading(near, deviation, pull))
         self._smooth(before)
 
     def on_fix(self, fix: Fix) -> None:
@@ -186,6 +207,7 @@ class Localizer:
         self.history.correct(number, lambda estimate: after(estimate, fix, innovation(estimate)))
         self._smooth(before)
         self.fixed, self.last_was_taken = fix.stamp, True
+        self.doubts.on_fix(fix.stamp)
         taken, _, believed = self.counts
         self.counts = self.counts._replace(taken=taken + 1, believed=believed + verdict.believed)
         if verdict.believed:

@@ -1,6 +1,7 @@
 """How the state goes on, and what sensors show of it, with Jacobians (docs/localization.md).
 
-    x = (x, y, θ, b, σ, κ)   pose; gyro's bias; encoders' scale error; creep
+    x = (x, y, θ, b, σ, κ, β_x, β_y)   pose; gyro's bias; encoders' scale error; creep;
+                                       accelerometer's biases, forwards and to the left
 
     s = S (1 - σ)   α = (ω_gyro - b) Δt   over a way of signed length S and length |S|
     x⁺ = x + s cos(θ + α/2)   y⁺ = y + s sin(θ + α/2) - κ p |S|   θ⁺ = θ + α
@@ -18,8 +19,9 @@ from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY
 
-X, Y, HEADING, BIAS, SCALE, CREEP = range(6)
-SIZE = 6
+X, Y, HEADING, BIAS, SCALE, CREEP, FORWARD_BIAS, LEFT_BIAS = range(8)
+SIZE = 8
+FORCE_BIASES = [FORWARD_BIAS, LEFT_BIAS]
 
 
 class Travel(NamedTuple):
@@ -40,8 +42,8 @@ class Late(NamedTuple):
 
 
 def advanced(state: Array, travel: Travel, pull: float) -> Array:
-    """State (6,) after a `travel`; `pull` is p, the share of gravity along the wall."""
-    x, y, heading, bias, scale, creep = state.tolist()
+    """State (8,) after a `travel`; `pull` is p, the share of gravity along the wall."""
+    x, y, heading, bias, scale, creep, *force_biases = state.tolist()
     angle, way = turn(bias, travel), travel.distance * (1 - scale)
     middle = heading + angle / 2
     return np.array(
@@ -52,6 +54,7 @@ def advanced(state: Array, travel: Travel, pull: float) -> Array:
             bias,
             scale,
             creep,
+            *force_biases,
         ]
     )
 
@@ -62,8 +65,8 @@ def turn(bias: float, travel: Travel) -> float:
 
 
 def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
-    """Derivative (6, 6) of `advanced` by the state."""
-    _, _, heading, bias, scale, _ = state.tolist()
+    """Derivative (8, 8) of `advanced` by the state."""
+    _, _, heading, bias, scale, *_ = state.tolist()
     way, middle = travel.distance * (1 - scale), heading + turn(bias, travel) / 2
     cosine, sine = math.cos(middle), math.sin(middle)
     angle_by_bias = -travel.duration if travel.is_gyro else 0.0
@@ -78,7 +81,7 @@ def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
 
 
 def process_noise(travel: Travel, options: LocalizationOptions) -> Array:
-    """Variances (6,) that a `travel` adds."""
+    """Variances (8,) that a `travel` adds."""
     way = options.way_noise**2 * travel.path
     if travel.is_gyro:
         angle = options.gyro_noise**2 * travel.duration
@@ -88,22 +91,31 @@ def process_noise(travel: Travel, options: LocalizationOptions) -> Array:
         )
     bias = options.gyro_bias_walk**2 * travel.duration
     scale = 2 * options.scale_deviation**2 * travel.duration / options.scale_time
-    return np.array([way, way, angle, bias, scale, 0.0])
+    force = options.acceleration_bias_walk**2 * travel.duration
+    return np.array([way, way, angle, bias, scale, 0.0, force, force])
 
 
 def gravity(state: Array, late: Late, along_wall: float) -> Array:
     """Specific force (2,) of the weight forwards, to the left [m/s²]; `along_wall` is g_t."""
     heading = earlier_heading(state, late)
-    return np.array([along_wall * math.sin(heading), along_wall * math.cos(heading)])
+    exact = np.array([along_wall * math.sin(heading), along_wall * math.cos(heading)])
+    biased: Array = exact + state[FORCE_BIASES]
+    return biased
 
 
 def gravity_jacobian(state: Array, late: Late, along_wall: float) -> Array:
-    """Derivative (2, 6) of `gravity` by the state."""
+    """Derivative (2, 8) of `gravity` by the state."""
     heading = earlier_heading(state, late)
     jacobian = np.zeros((2, SIZE))
     jacobian[:, HEADING] = along_wall * math.cos(heading), -along_wall * math.sin(heading)
     jacobian[:, BIAS] = late.by_bias * jacobian[:, HEADING]
+    jacobian[0, FORWARD_BIAS] = jacobian[1, LEFT_BIAS] = 1.0
     return jacobian
+
+
+def heading_by_force_biases(heading: float, along_wall: float) -> Array:
+    """Derivative (2,) of the heading that gravity tells by the accelerometer's biases, negative."""
+    return np.array([-math.cos(heading), math.sin(heading)]) / along_wall
 
 
 def earlier_heading(state: Array, late: Late) -> float:

@@ -33,6 +33,12 @@ class LocalizationOptions:
     acceleration_noise: float = parameter(
         0.005, "m/s/√s", "of specific force: deviation of its integral after a second", above=0
     )
+    imu_x: float = parameter(0.0, "m", "where it is in base_frame: forwards of the centre")
+    imu_y: float = parameter(0.0, "m", "where it is in base_frame: to the left of the centre")
+    acceleration_bias_deviation: float = parameter(
+        0.1, "m/s²", "of either bias at the start; 0: there is none", at_least=0
+    )
+    acceleration_bias_walk: float = parameter(0.0002, "m/s²/√s", "how much they wander", at_least=0)
     scale_deviation: float = parameter(
         0.01, "", "of the encoders' distance: slip, and a wrong wheel radius", at_least=0
     )
@@ -56,10 +62,16 @@ class LocalizationOptions:
         math.pi, "rad", "of that; above initial_heading_limit: gravity or a fix tells", above=0
     )
     initial_position_limit: float = parameter(
-        0.2, "m", "deviation above which nothing is published at the start", above=0
+        0.2,
+        "m",
+        "deviation above which nothing is published at the start, and which is told",
+        above=0,
     )
     initial_heading_limit: float = parameter(
-        0.1, "rad", "deviation above which nothing is published at the start", above=0
+        0.1,
+        "rad",
+        "deviation above which nothing is published at the start, and which is told",
+        above=0,
     )
     gate_probability: float = parameter(
         0.999, "", "share of good fixes that pass the gate", above=0, at_most=0.999999

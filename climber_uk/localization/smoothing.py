@@ -36,3 +36,14 @@ class Smoothing:
 def bounded(share: float, size: float, most: float) -> float:
     """`share`, or less where that of `size` is above `most`."""
     return share if share * size <= most else most / size
+
+
+def between(estimate: Array, output: Array) -> tuple[float, float, float]:
+    """Place (x, y) [m] and angle [rad] of the output's frame in that of the estimate.
+
+    Both are poses (3,) of the climber, at the same time, each in its own.
+    """
+    angle = float(estimate[2] - output[2])
+    cosine, sine, (x, y) = math.cos(angle), math.sin(angle), output[:2].tolist()
+    turned = cosine * x - sine * y, sine * x + cosine * y
+    return float(estimate[0]) - turned[0], float(estimate[1]) - turned[1], angle

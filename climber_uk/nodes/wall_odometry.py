@@ -7,7 +7,13 @@ none: a controller then waits.
 import math
 
 import numpy as np
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import (
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    TransformStamped,
+    Vector3,
+)
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
@@ -15,14 +21,31 @@ from climber_uk.localization import models
 from climber_uk.localization.gate import Fix
 from climber_uk.localization.localizer import Localizer, Located
 from climber_uk.localization.options import LocalizationOptions
+from climber_uk.localization.smoothing import between
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading_sensors, writing
 from climber_uk.messages.topics import IMU, JOINTS, LOCALIZATION, ODOMETRY, POSE
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.output import Output
-from climber_uk.ros.running import BEST_EFFORT, WALL_CLOCK, ClimberNode, run
+from climber_uk.ros.running import (
+    BEST_EFFORT,
+    PUBLISH_PERIOD,
+    WALL_CLOCK,
+    ClimberNode,
+    Throttle,
+    run,
+)
 
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # it comes with a ROS installation, not with the wheels
+    TFMessage = None
+
+PLANAR_POSE = (
+    *("pose.position.x", "pose.position.y"),
+    *("pose.orientation.z", "pose.orientation.w"),
+)
 PATIENCE = 0.05  # [s] of the wall clock that encoders wait for an IMU's sample, at least
 NOWHERE = State(np.zeros(3), np.zeros(3))
 
@@ -35,7 +58,15 @@ class SensorFrames:
     imu_yaw: float = parameter(
         0.0, "rad", "from the climber's x to the IMU's, anticlockwise; both have z off the wall"
     )
-    pose_frame: str = parameter("", "", "frame of pose, which is the wall's; empty: odom_frame")
+    pose_frame: str = parameter("", "", "frame of pose; empty: odom_frame")
+    pose_frame_x: float = parameter(0.0, "m", "where its origin is in odom_frame: x")
+    pose_frame_y: float = parameter(0.0, "m", "where its origin is in odom_frame: y")
+    pose_frame_yaw: float = parameter(
+        0.0, "rad", "from the x of odom_frame to its own, anticlockwise; both have z off the wall"
+    )
+    map_frame: str = parameter(
+        "map", "", "frame in which the estimate is right at once; see docs/localization.md"
+    )
 
 
 class WallOdometry(ClimberNode):
@@ -56,6 +87,11 @@ class WallOdometry(ClimberNode):
         names = self.names
         odometry = writing.odometry(NOWHERE, 0, names.odom_frame, names.base_frame)
         self.odometry = Output(self.publisher(Odometry, ODOMETRY), odometry, writing.LOCATED)
+        here = PoseStamped()
+        here.header.frame_id = self.frames.map_frame
+        self.map_to_odom = Output(self.publisher(PoseStamped, "~/map_to_odom"), here, PLANAR_POSE)
+        self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
+        self.is_map_due = Throttle(PUBLISH_PERIOD)
         self.subscription(JointState, JOINTS, self.on_joints, BEST_EFFORT)
         self.subscription(Imu, IMU, self.on_imu, BEST_EFFORT)
         self.subscription(PoseWithCovarianceStamped, POSE, self.on_pose, BEST_EFFORT)
@@ -107,12 +143,15 @@ class WallOdometry(ClimberNode):
     def on_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Take the parts of a pose that are measured."""
         try:
-            pose = reading_sensors.pose(message, self.frames.pose_frame or self.names.odom_frame)
+            frames = self.frames
+            pose = reading_sensors.pose(message, frames.pose_frame or self.names.odom_frame)
+            place = frames.pose_frame_x, frames.pose_frame_y, frames.pose_frame_yaw
+            fix = Fix(*pose).moved(*place)
         except ValueError as error:
             self.report(POSE, "refused", str(error))
             return
         self.report(POSE, "")
-        self.localizer.on_fix(Fix(*pose))
+        self.localizer.on_fix(fix)
         self.tell_remarks()
 
     def lose_patience(self) -> None:
@@ -151,6 +190,24 @@ class WallOdometry(ClimberNode):
             writing.planar_covariance(twist),
         )
 
+        if self.is_map_due(located.stamp):
+            self.publish_map(located)
+
+    def publish_map(self, located: Located) -> None:
+        """Publish where odom_frame is in map_frame, in which corrections act at once."""
+        motion = located.motion
+        output = np.array([motion.x, motion.y, motion.heading])
+        x, y, angle = between(self.localizer.estimate.mean[:3], output)
+        sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
+        self.map_to_odom.publish(located.stamp, x, y, sine, cosine)
+        if self.transform is not None and self.transform.get_subscription_count():
+            message = TransformStamped(child_frame_id=self.names.odom_frame)
+            message.header.frame_id = self.frames.map_frame
+            message.header.stamp = writing.time(located.stamp)
+            message.transform.translation = Vector3(x=x, y=y)
+            message.transform.rotation = Quaternion(z=sine, w=cosine)
+            self.transform.publish(TFMessage(transforms=[message]))
+
     def tell_remarks(self) -> None:
         """Report what the localizer says of fixes and stamps; that of a good fix ends it."""
         remarks, self.localizer.remarks = self.localizer.remarks, []
@@ -162,10 +219,13 @@ class WallOdometry(ClimberNode):
             self.report("localization", "")
 
     def tell_what_is_missing(self, stamp: int) -> None:
-        """Report an IMU that is not there, and what a start waits for."""
+        """Report an IMU and fixes that are not there, and what is not known: at first, or later."""
         localizer, options = self.localizer, self.options
         absent = not localizer.imu.is_there(stamp)
         self.report("samples of imu", "none: yaw rate by the wheels" * absent, "", is_fault=False)
+        doubts = localizer.doubts
+        self.report("fixes", "they have stopped" * doubts.have_stopped(stamp), "", is_fault=False)
+        self.report("location", "not known any more" * bool(doubts.unknown), doubts.said)
         missing = []
         if localizer.located is None and not localizer.knows_heading:
             missing.append(f"heading to {options.initial_heading_limit:g} rad")
@@ -187,6 +247,8 @@ class WallOdometry(ClimberNode):
             "y [m]": with_deviation(models.Y),
             "heading [rad]": with_deviation(models.HEADING),
             "bias of the gyro [rad/s]": with_deviation(models.BIAS),
+            "bias of the accelerometer, forwards [m/s²]": with_deviation(models.FORWARD_BIAS),
+            "bias of the accelerometer, left [m/s²]": with_deviation(models.LEFT_BIAS),
             "scale error of the encoders": with_deviation(models.SCALE),
             "creep": with_deviation(models.CREEP),
             "gravity along the wall [m/s²]": self.options.gravity_along_wall,

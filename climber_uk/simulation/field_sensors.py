@@ -18,9 +18,12 @@ from climber_uk.simulation.plant import Plant
 
 @parameters
 class ImuErrors:
-    """An IMU at the climber's centre, with the body's axes, and a sample at each odometry."""
+    """An IMU with the axes of the climber's body, but for a yaw, and a sample at each odometry."""
 
     enabled: bool = parameter(False, "", "whether there is one")
+    x: float = parameter(0.0, "m", "where it is: forwards of the centre")
+    y: float = parameter(0.0, "m", "where it is: to the left of the centre")
+    yaw: float = parameter(0.0, "rad", "from the climber's x to its own, anticlockwise")
     gyro_noise: float = parameter(
         0.0, "rad/√s", "deviation of the yaw rate's integral after a second", at_least=0
     )
@@ -92,13 +95,19 @@ class Imu:
         """Sample of a state."""
         errors, climber = self.errors, plant.climber
         acceleration = (state.velocity - self._last.velocity) / self.period
+        turning, square = float(acceleration[2]), float(state.yaw_rate) ** 2
         self._last = state
         down = np.array([*plant.wall.along(climber.inclination, float(state.pose[1])), 0.0])
         force, heading = acceleration - GRAVITY * down, state.heading
         off_wall = plant.wall.into(
             climber.inclination, float(state.pose[1]), float(state.velocity[1])
         )
-        exact = np.array([along(heading, force), across(heading, force), off_wall])
+        forwards = along(heading, force) - turning * errors.y - square * errors.x
+        left = across(heading, force) + turning * errors.x - square * errors.y
+        cosine, sine = math.cos(errors.yaw), math.sin(errors.yaw)
+        exact = np.array(
+            [cosine * forwards + sine * left, cosine * left - sine * forwards, off_wall]
+        )
         bias = np.array([errors.forward_bias, errors.left_bias, 0.0])
         *noise, turning = self._random.normal(size=4).tolist()
         yaw_rate = float(state.yaw_rate) + errors.gyro_bias

@@ -1,4 +1,7 @@
+import itertools
+
 import pytest
+from climbs import PERIOD, Climb
 
 from climber_uk.control.timing import Ages
 from climber_uk.mechanics import SECOND
@@ -29,10 +32,31 @@ def test_the_least_age_is_that_of_the_last_half_to_whole_second(rows, least):
 
 
 @pytest.mark.parametrize(
-    ("least", "offset"), [(0.02, 0.0), (0.021, 0.021), (-0.02, 0.0), (-0.021, -0.021)]
+    ("least", "offset"), [(0.02, 0.0), (0.025, 0.005), (0.09, 0.07), (-0.02, 0.0), (-0.021, -0.021)]
 )
 def test_what_no_latency_explains_is_the_offset_of_the_clocks(least, offset):
     ages = ages_of((10.0, least))
-    assert ages.offset(0.02) == offset
-    for more, latency in ((-0.01, 0.0), (0.01, 0.01), (0.03, 0.02)):
-        assert ages.latency(offset + more, 0.02) == pytest.approx(latency)
+    assert ages.offset(0.02) == pytest.approx(offset)
+    for age in (least, least + 0.01, least + 0.06):
+        assert ages.latency(age, 0.02) == pytest.approx(max(age - offset, 0.0))
+
+
+def test_latency_grows_without_a_step_as_odometry_grows_older():
+    latencies = [ages_of((10.0, 1e-3 * age)).latency(1e-3 * age, 0.02) for age in range(100)]
+    assert max(abs(b - a) for a, b in itertools.pairwise(latencies)) <= 1e-3 + 1e-9
+    assert latencies[-1] == pytest.approx(0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("age", [0.02, 0.03, 0.045, 0.06, 0.08])
+def test_odometry_that_is_always_late_is_followed_without_a_swing(age):
+    states = []
+
+    def late(_, state):
+        states.append(state)
+        return states[max(0, len(states) - 1 - round(age / PERIOD))]
+
+    climb = Climb(learn_delay=False).run(6.0, odometry=late, clock=age)
+    assert not any(mode.is_fault for mode in climb.modes)
+    assert climb.off_the_path() < 0.01
+    assert climb.fastest_turn() < 0.6

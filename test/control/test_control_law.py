@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from climber_uk.control import model
 from climber_uk.control.constraint_set import demanded, rows
-from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
+from climber_uk.control.control_law import Braking, ControlInput, ControlLaw, ControlOptions
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
 from climber_uk.mechanics.climber import Climber
@@ -124,7 +124,7 @@ def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
     if many:
         held = np.repeat(held[:, None], 3, axis=1)
     of = ControlInput(at.motion, Torques(*held), Wrench(drive, turn), PERIOD)
-    for wheels in law.command(of, PAPER.at(0.0).target).wheels, law.braking(of, 5.0):
+    for wheels in law.command(of, PAPER.at(0.0).target).wheels, law.braking(of, Braking(5.0, 5.0)):
         bounds = climber.torque_bounds(at)
         for torque, before, (low, high) in zip(wheels, held, bounds, strict=True):
             assert np.all(np.abs(torque) <= limit)
@@ -206,7 +206,7 @@ def test_holding_torques_keep_the_climber_where_it_is():
     law, plant = ControlLaw(climber, Guidance(), ControlOptions()), Plant(climber, 0.0025)
     state = State.rolling(np.array([0.0, 0.0, 1.0]), 0.3, 0.4)
     for _ in range(1000):
-        torques = law.braking(situation(state), 5.0)
+        torques = law.braking(situation(state), Braking(5.0, 5.0))
         state = plant.advance(state, np.array(torques), steps=2)
     np.testing.assert_allclose(state.velocity, 0, atol=1e-6)
 

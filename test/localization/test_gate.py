@@ -67,3 +67,14 @@ def test_an_estimate_that_is_told_anew_has_the_fix_and_its_noise():
     np.testing.assert_allclose(after.mean[:2] - ESTIMATE.mean[:2], [1.0, 2.0])
     np.testing.assert_allclose(after.covariance[:2, :2], NOISE)
     np.testing.assert_allclose(after.covariance[2:, 2:], ESTIMATE.covariance[2:, 2:])
+
+
+def test_a_fix_in_another_frame_is_turned_and_moved_with_its_noise():
+    noise = np.diag([0.04, 0.01, 0.09])
+    moved = Fix(0, (0, 1, 2), np.array([2.0, 1.0, 0.3]), noise).moved(10.0, 20.0, np.pi / 2)
+    np.testing.assert_allclose(moved.values, (9.0, 22.0, 0.3 + np.pi / 2))
+    np.testing.assert_allclose(moved.noise, np.diag([0.01, 0.04, 0.09]), atol=1e-12)
+    only_y = Fix(0, (1,), np.array([1.0]), noise[:1, :1])
+    assert only_y.moved(10.0, 20.0, 0.0).values.tolist() == [21.0]
+    with pytest.raises(ValueError, match="x and y have to be measured both"):
+        only_y.moved(10.0, 20.0, 0.1)

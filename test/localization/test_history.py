@@ -16,7 +16,7 @@ OPTIONS, STEP = LocalizationOptions(longest_delay=0.5), SECOND // 200
 
 
 def started():
-    return History(OPTIONS, Estimate.start(OPTIONS).with_heading(0.3, 0.02))
+    return History(OPTIONS, Estimate.start(OPTIONS).with_heading(0.3, 0.02, 9.81))
 
 
 def sample(random):
@@ -27,7 +27,7 @@ def sample(random):
 def fix(x, y):
     def correction(estimate):
         off = np.array([x, y]) - estimate.mean[:2]
-        return corrected(estimate, off, np.eye(6)[:2], 1e-3 * np.eye(2))
+        return corrected(estimate, off, np.eye(8)[:2], 1e-3 * np.eye(2))
 
     return correction
 

@@ -20,24 +20,27 @@ from climber_uk.localization.models import BIAS, HEADING, SCALE, Late, Travel
 from climber_uk.localization.options import LocalizationOptions
 
 SEEDS = st.integers(0, 2**32 - 1)
-UPRIGHT, FLOOR = LocalizationOptions(), LocalizationOptions(inclination=0.0)
+UPRIGHT, FLOOR = (
+    LocalizationOptions(acceleration_bias_deviation=0.0),
+    LocalizationOptions(inclination=0.0),
+)
 
 
 def estimate_of(random, size=1.0):
-    root = random.normal(size=(6, 6))
-    return Estimate(random.normal(size=6), size * (root @ root.T + 0.1 * np.eye(6)))
+    root = random.normal(size=(8, 8))
+    return Estimate(random.normal(size=8), size * (root @ root.T + 0.1 * np.eye(8)))
 
 
 @given(seed=SEEDS, parts=st.integers(1, 3))
 def test_a_correction_is_that_of_the_information_form(seed, parts):
     random = np.random.default_rng(seed)
-    before, jacobian = estimate_of(random), random.normal(size=(parts, 6))
+    before, jacobian = estimate_of(random), random.normal(size=(parts, 8))
     noise, innovation = np.diag(random.uniform(0.1, 2, parts)), random.normal(size=parts)
     after = corrected(before, innovation, jacobian, noise)
     weighed = jacobian.T @ np.linalg.inv(noise)
     information = np.linalg.inv(before.covariance) + weighed @ jacobian
     expected = before.mean + np.linalg.solve(information, weighed @ innovation)
-    np.testing.assert_allclose(after.covariance @ information, np.eye(6), atol=1e-6)
+    np.testing.assert_allclose(after.covariance @ information, np.eye(8), atol=1e-6)
     np.testing.assert_allclose(after.mean, expected, atol=1e-6)
 
 
@@ -52,23 +55,44 @@ def test_covariances_stay_symmetric_and_positive_whatever_comes(seed):
         estimate = predicted(estimate, travel._replace(path=abs(travel.path)), UPRIGHT)
         force = random.normal(0, 20, 2)
         estimate = with_gravity(estimate, force, Late(0.01, 0.08), 1e-4, 9.81)
-        estimate = corrected(estimate, random.normal(size=2), np.eye(6)[:2], 1e-8 * np.eye(2))
+        estimate = corrected(estimate, random.normal(size=2), np.eye(8)[:2], 1e-8 * np.eye(2))
     np.testing.assert_array_equal(estimate.covariance, estimate.covariance.T)
     assert np.linalg.eigvalsh(estimate.covariance).min() >= -1e-15
 
 
-def test_on_a_floor_gravity_changes_nothing_but_rounding():
-    before = estimate_of(np.random.default_rng(1))
-    after = with_gravity(before, np.array([0.3, -0.2]), Late(0, 0), 0.01, 0.0)
-    np.testing.assert_allclose(after.mean, before.mean)
-    np.testing.assert_allclose(after.covariance, before.covariance)
+def test_on_a_floor_gravity_tells_the_biases_of_the_accelerometer_and_nothing_else():
+    before = Estimate.start(FLOOR)
+    after = with_gravity(before, np.array([0.3, -0.2]), Late(0, 0), 1e-9, 0.0)
+    np.testing.assert_allclose(after.mean[:6], before.mean[:6])
+    np.testing.assert_allclose(after.covariance[:6], before.covariance[:6])
+    np.testing.assert_allclose(after.mean[6:], (0.3, -0.2), atol=1e-6)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, 3.0])
+def test_a_heading_from_gravity_is_as_uncertain_as_the_accelerometers_biases(heading):
+    options = LocalizationOptions(acceleration_bias_deviation=0.2)
+    true = np.array([0, 0, heading, 0, 0, 0, 0.1, -0.05])
+    force = models.gravity(true, Late(0, 0), 9.81)
+    told = math.atan2(force[0], force[1])
+    estimate = Estimate.start(options).with_heading(told, 0.001, 9.81)
+    for _ in range(20):  # more of the same tells no more
+        estimate = with_gravity(estimate, force, Late(0, 0), 0.001, 9.81)
+    assert estimate.deviation(HEADING) == pytest.approx(0.2 / 9.81, rel=0.02)
+    for half_a_turn in (true, estimate.mean):  # which the gyro tells
+        half_a_turn[HEADING] += math.pi
+    force = models.gravity(true, Late(0, 0), 9.81)
+    for _ in range(100):
+        estimate = with_gravity(estimate, force, Late(0, 0), 0.001, 9.81)
+    np.testing.assert_allclose(estimate.mean[models.FORCE_BIASES], (0.1, -0.05), atol=0.005)
+    assert estimate.mean[HEADING] == pytest.approx(true[HEADING], abs=0.001)
+    assert estimate.deviation(HEADING) < 0.1 * 0.2 / 9.81
 
 
 def test_gravity_tells_the_heading_as_well_as_its_mean_does():
     """n samples of variance R: R / n / g², whatever the heading is."""
     for heading in np.linspace(-3, 3, 7):
-        estimate = Estimate.start(UPRIGHT).with_heading(float(heading) + 0.01, 0.05)
-        true = np.array([0, 0, heading, 0, 0, 0])
+        estimate = Estimate.start(UPRIGHT).with_heading(float(heading) + 0.01, 0.05, 9.81)
+        true = np.array([0, 0, heading, 0, 0, 0, 0, 0])
         force = models.gravity(true, Late(0, 0), 9.81)
         for _ in range(100):
             estimate = with_gravity(estimate, force, Late(0, 0), 0.01, 9.81)
@@ -77,7 +101,7 @@ def test_gravity_tells_the_heading_as_well_as_its_mean_does():
 
 
 def test_a_knock_moves_the_heading_by_a_bounded_amount():
-    before = Estimate.start(UPRIGHT).with_heading(0.0, 0.001)
+    before = Estimate.start(UPRIGHT).with_heading(0.0, 0.001, 9.81)
     moved = []
     for force in (30.0, 300.0):
         after = with_gravity(before, np.array([force, 9.81]), Late(0, 0), 1e-3, 9.81)

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.localization.encoders import LARGEST_SPEED
+from climber_uk.localization.encoders import LARGEST_SPEED, Rolled
 from climber_uk.localization.gate import Fix
+from climber_uk.localization.imu import Imu
 from climber_uk.localization.localizer import Localizer
 from climber_uk.localization.models import BIAS, CREEP, HEADING
 from climber_uk.localization.options import LocalizationOptions
@@ -26,8 +27,9 @@ class Told:
     """A climber of a heading and a speed, and the localizer that is told of it."""
 
     def __init__(self, seed=0, heading=0.0, speed=0.0, bias=0.0, creep=0.0, **options):
+        known = {"initial_heading": 0.0, "acceleration_bias_deviation": 0.0}
         self.options = LocalizationOptions(
-            gyro_noise=GYRO, acceleration_noise=FORCE, initial_heading=0.0, **options
+            gyro_noise=GYRO, acceleration_noise=FORCE, **{**known, **options}
         )
         self.localizer, self.random = Localizer(self.options), np.random.default_rng(seed)
         self.heading, self.speed, self.bias, self.creep = heading, speed, bias, creep
@@ -204,3 +206,48 @@ def test_deviations_are_those_of_the_errors(seed):
     last = told.position - 0.15 * PERIOD * np.array([math.cos(0.7), math.sin(0.7)])
     for part, true in enumerate((*last, 0.7)):
         assert abs(wrapped(float(estimate.mean[part] - true))) < 5 * estimate.deviation(part)
+
+
+def test_a_position_that_is_not_known_any_more_is_in_doubt_until_fixes_are_back():
+    told = Told(speed=1.0, creep_deviation=0.2).go_on(0.5)
+    assert not told.localizer.doubts.unknown
+    told.go_on(2.0)
+    doubts = told.localizer.doubts
+    assert list(doubts.unknown) == ["position"]
+    assert doubts.said.startswith("position by 0.")
+    assert doubts.said.endswith("above 0.2 m")
+    told.fix(deviation=0.18)
+    told.go_on(PERIOD)
+    assert doubts.unknown  # it is less than the limit now, but by a little
+    for _ in range(10):
+        told.fix()
+        told.go_on(PERIOD)
+    assert not doubts.unknown
+
+
+def test_fixes_have_stopped_after_some_times_their_longest_interval_and_some_seconds():
+    told, stopped = Told(), []
+    doubts = told.localizer.doubts
+    assert not told.go_on(6.0).localizer.doubts.have_stopped(told.stamp)  # there were none
+    for interval in (0.1, 2.0, 0.1):
+        told.fix()
+        told.go_on(interval)
+    for second in range(1, 15):
+        told.go_on(1.0)
+        stopped += [second] * doubts.have_stopped(told.stamp)
+    assert stopped == [10, 11, 12, 13, 14]
+    told.fix()
+    assert not doubts.have_stopped(told.stamp)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.1, 0.0), (0.0, -0.1)])
+def test_an_imu_away_from_the_centre_tells_the_same_weight(place):
+    """Of a climber that turns on the spot on a floor, by 2 sin(5 t) rad/s."""
+    (x, y), imu, weights = place, Imu(*place), []
+    for number in range(400):
+        time = number * PERIOD
+        rate, faster = 2 * math.sin(5 * time), 10 * math.cos(5 * time)
+        imu.add(round(time * SECOND), rate, -(rate**2) * x - faster * y, faster * x - rate**2 * y)
+        weights.append(imu.weight(Rolled(PERIOD, 0.0, 0.0, rate, False), rate))
+    forces = [(weight.forwards, weight.left) for weight in weights[100:] if weight is not None]
+    np.testing.assert_allclose(forces, 0, atol=0.03)  # of up to 1 m/s²

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.output_speed import OutputSpeed
-from climber_uk.localization.smoothing import Smoothing
+from climber_uk.localization.smoothing import Smoothing, between
 
 OPTIONS, STEP = LocalizationOptions(), 0.005
 METRES = st.floats(-3, 3)
@@ -34,6 +34,16 @@ def test_after_a_long_pause_the_output_is_at_the_estimate_and_not_beyond():
     smoothing.corrected(np.zeros(3), np.array([0.01, 0.0, 0.001]))
     smoothing.go_on(10.0)
     np.testing.assert_array_equal(smoothing.offset, 0)
+
+
+@given(x=METRES, y=METRES, heading=METRES)
+def test_the_estimate_is_the_output_as_seen_in_the_map(x, y, heading):
+    estimate, output = np.array([x, y, heading]), np.array([y - 1, x, heading + 0.2])
+    ahead, beside, angle = between(estimate, output)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    np.testing.assert_allclose((ahead, beside) + turn @ output[:2], estimate[:2], atol=1e-12)
+    assert angle == pytest.approx(-0.2)
+    assert between(estimate, estimate) == pytest.approx((0, 0, 0))
 
 
 def test_the_speed_is_smoother_than_counts_and_as_early_as_the_truth_with_a_biased_imu():

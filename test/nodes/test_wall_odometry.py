@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 from world import CONFIG, command
@@ -83,6 +83,7 @@ def stamp_of(message):
 def test_each_message_of_the_encoders_is_answered_with_a_heading_that_nobody_told(world):
     world.start(NODE, "--ros-args", "-r", "__ns:=/climber_1")
     told = Told(world, heading=-2.0, namespace="climber_1")
+    places = world.listen(PoseStamped, f"climber_1/{NODE}/map_to_odom")
     world.wait(told.go_on, "first odometry")
     for _ in range(100):
         odometry = told.answered()
@@ -96,6 +97,10 @@ def test_each_message_of_the_encoders_is_answered_with_a_heading_that_nobody_tol
     assert (np.diagonal(np.array(odometry.twist.covariance).reshape(6, 6)) > 0).all()
     stamps = [stamp_of(message) for message in told.odometry]
     assert np.diff(stamps[-50:]).tolist() == [STEP] * 49
+    told.pose(x=0.02)
+    told.answered()
+    world.wait(lambda: told.go_on() and places[-1].pose.position.x > 0.001, "correction in the map")
+    assert places[-1].header.frame_id == "map"
 
 
 def test_what_is_refused_has_one_line_that_says_why_and_is_told_in_diagnostics(world):
@@ -123,6 +128,13 @@ def test_what_is_refused_has_one_line_that_says_why_and_is_told_in_diagnostics(w
     assert "times what may be" in values()["last remark"]
     assert "±" in values()["bias of the gyro [rad/s]"]
     assert world.log(NODE).count("must have 'left_wheel_joint' once") == 1
+    told.pose()
+    told.answered()
+    told.stamp += 6 * SECOND
+    said = "fixes: they have stopped"
+    world.wait(lambda: told.go_on() and said in world.log(NODE), said)
+    told.pose()
+    world.wait(lambda: told.go_on() and "fixes: ok again" in world.log(NODE), "fixes")
 
 
 def test_an_imu_that_stops_is_told_and_the_encoders_go_on(world):

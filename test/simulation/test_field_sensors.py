@@ -58,6 +58,17 @@ def test_moving_it_shows_the_accelerations_of_the_motion_too():
     np.testing.assert_allclose(sample.force[:2], [0.4, 0.2 * 0.5], atol=1e-3)
 
 
+def test_an_imu_away_from_the_centre_shows_what_turning_does_to_it_in_its_own_axes():
+    before, after = at(0.0), at(0.0, 0.0, 2.0 * PERIOD)  # which turns ever faster, by 2 rad/s²
+    level = Plant(Climber(inclination=0.0), PERIOD)
+    sample = Imu(ImuErrors(x=0.1, y=0.05), PERIOD, before).measure(after, level)
+    np.testing.assert_allclose(sample.force[:2], [-0.1, 0.2], atol=1e-4)
+    turning = at(0.0, 0.0, 3.0)
+    for yaw, expected in ((0.0, (-0.9, -0.45)), (math.pi / 2, (-0.45, 0.9))):
+        imu = Imu(ImuErrors(x=0.1, y=0.05, yaw=yaw), PERIOD, turning)
+        np.testing.assert_allclose(imu.measure(turning, level).force[:2], expected, atol=1e-9)
+
+
 def test_noise_of_an_imu_has_the_size_that_was_asked_for_at_any_rate():
     errors = ImuErrors(gyro_noise=0.002, acceleration_noise=0.004, forward_bias=0.1)
     for period in (0.005, 0.02):

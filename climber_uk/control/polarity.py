@@ -1,0 +1,91 @@
+"""Whether a measured speed follows its torque, which tells its sign, whoever else may doubt it.
+
+What brakes may push where a sign is wrong: of the torque, or of the speed. A torque that opposes a
+speed that has followed its torques so far brakes it, and one with it brakes what has gone against
+them. Where neither is known, nothing brakes.
+"""
+
+import math
+
+from climber_uk.control.estimator import Observed
+from climber_uk.mechanics.climber import Climber
+
+SWING_TIME = 0.15  # [s] what changes more slowly is left out: weight, friction, load
+MEMORY = 1.0  # [s]
+LEAST_SWING = 0.005  # [m/s] of a rim that torques should cause, RMS, to tell anything
+# correlation of what they should cause with what is measured, for a sign that is right, and wrong:
+# odometry that is late by a third of an oscillation goes against its torques, too
+RIGHT, WRONG = 0.5, -0.85
+TINY = 1e-30
+
+
+class Swing:
+    """What of a speed is quick, by two high-passes: nothing of one that grows steadily."""
+
+    def __init__(self) -> None:
+        self._first = self.value = 0.0
+
+    def add(self, change: float, kept: float) -> float:
+        """Take a change, of which a share is `kept`; what is quick."""
+        before = self._first
+        self._first = kept * (before + change)
+        self.value = kept * (self.value + self._first - before)
+        return self.value
+
+
+class Polarity:
+    """Of one speed: compares its swings with those that the torques should cause."""
+
+    def __init__(self) -> None:
+        self._expected, self._measured = Swing(), Swing()
+        self._squares = self._products = self._squares_measured = 0.0  # [m²/s]
+
+    def add(self, expected: float, measured: float, time: float) -> None:
+        """Take changes of a rim's speed [m/s] within `time` [s]."""
+        kept, left = math.exp(-time / SWING_TIME), math.exp(-time / MEMORY)
+        should, does = self._expected.add(expected, kept), self._measured.add(measured, kept)
+        self._squares = left * self._squares + time * should * should
+        self._products = left * self._products + time * should * does
+        self._squares_measured = left * self._squares_measured + time * does * does
+
+    @property
+    def sign(self) -> int:
+        """1 where it follows its torque, -1 where it goes against it; 0: nobody knows."""
+        if self._squares < LEAST_SWING**2 * MEMORY:
+            return 0
+        correlation = self._products / math.sqrt(self._squares * self._squares_measured + TINY)
+        return int(correlation > RIGHT) - int(correlation < WRONG)
+
+
+class Polarities:
+    """Of speed and yaw rate of a climber."""
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Know nothing."""
+        self.drive, self.yaw = Polarity(), Polarity()
+
+    def forget_unknown(self) -> None:
+        """Begin anew with what is not known: what nobody caused would hide an answer."""
+        self.drive = self.drive if self.drive.sign else Polarity()
+        self.yaw = self.yaw if self.yaw.sign else Polarity()
+
+    def add(self, climber: Climber, observed: Observed) -> None:
+        """Take what an odometry tells of the time since the last."""
+        before, after, time = observed.before, observed.after, observed.time
+        if time <= 0:
+            return
+        force, moment = climber.wrench(*observed.torques)
+        mass, inertia, friction, weight = climber.inertial
+        force -= weight * after.sine + math.copysign(friction, after.speed)
+        self.drive.add(force / mass * time, after.speed - before.speed, time)
+        lever = climber.half_track
+        turn = lever * (after.yaw_rate - before.yaw_rate)
+        self.yaw.add(lever * moment / inertia * time, turn, time)
+
+    @property
+    def signs(self) -> tuple[int, int]:
+        """Of speed and yaw rate; see `Polarity.sign`."""
+        return self.drive.sign, self.yaw.sign
