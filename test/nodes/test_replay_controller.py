@@ -46,16 +46,18 @@ class Lockstep:
         world.start("record_bag", "--output", str(world.directory / "bag"))
         for publisher in (self.odometry, self.clock, self.pressure, reference):
             world.wait(lambda p=publisher: p.get_subscription_count() >= 2, "the recorder")
-        of_controller = f"{NAME}/constraint_force"  # which the recorder knows from nobody else
-        world.wait(lambda: world.node.count_subscribers(of_controller), "the recorder")
-        world.wait(self.is_recorded, "recorded odometry")
+        world.wait(self.is_recorded, "recorded odometry and parameters")
         points = [reference_point(CIRCLE.at(time), time) for time in np.arange(0, 5, 0.05)]
         reference.publish(writing.reference(points, SECOND, "odom", "base_link"))
 
     def is_recorded(self):
-        """Tell the first odometry once more, and look whether it is in the bag by now."""
+        """Tell the first odometry once more, and look whether it is in the bag by now.
+
+        And the controller's latched message, with which the recorder gets all others of it.
+        """
         self.tell()
-        return "/odom" in {topic for topic, *_ in read_messages(self.world.directory / "bag")}
+        recorded = {topic for topic, *_ in read_messages(self.world.directory / "bag")}
+        return recorded >= {"/odom", f"/{NAME}/parameters"}
 
     def tell(self, frame="odom"):
         time = self.step * 0.005
