@@ -93,11 +93,10 @@ class Imu:
         errors, climber = self.errors, plant.climber
         acceleration = (state.velocity - self._last.velocity) / self.period
         self._last = state
-        down = np.array([*plant.wall.along(climber.inclination, float(state.pose[1])), 0.0])
+        (x, y, _), (x_speed, y_speed, _) = state.pose.tolist(), state.velocity.tolist()
+        down = np.array([*plant.wall.along(climber.inclination, x, y), 0.0])
         force, heading = acceleration - GRAVITY * down, state.heading
-        off_wall = plant.wall.into(
-            climber.inclination, float(state.pose[1]), float(state.velocity[1])
-        )
+        off_wall = plant.wall.into(climber.inclination, x, y, x_speed, y_speed)
         exact = np.array([along(heading, force), across(heading, force), off_wall])
         bias = np.array([errors.forward_bias, errors.left_bias, 0.0])
         *noise, turning = self._random.normal(size=4).tolist()
