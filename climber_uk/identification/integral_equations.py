@@ -131,8 +131,8 @@ def friction_load(motion: RecordedMotion, climber: Climber, site: Site) -> Array
 
 def gravity_ahead(motion: RecordedMotion, climber: Climber, site: Site) -> Array:
     """Gravity along the heading (n,) [m/s²]."""
-    _, y, heading = motion.pose.T
-    s_x, s_y = site.wall.along(climber.inclination, y)
+    x, y, heading = motion.pose.T
+    s_x, s_y = site.wall.along(climber.inclination, x, y)
     along: Array = GRAVITY * (s_x * np.cos(heading) + s_y * np.sin(heading))
     return along
 

@@ -2,17 +2,21 @@
 
     plane      s = sin(inclination), towards -y turned by `tilt`;  g_n = g cos(inclination)
     cylinder   the same with inclination(y) = inclination + y/R, and ẏ²/R more into the wall
+    tank       curved along x, its axis along y: gravity turned by x/R about y, and ẋ²/R
+    cone       the same inclination everywhere, uphill to its apex (or from it)
+    sphere     curved either way: gravity turned by √(x² + y²)/R, and (ẋ² + ẏ²)/R
 
-x and y are lengths on the wall: a cylinder unrolls without stretching, so that nothing else in the
-equations of motion changes. A new wall is one class, a `Wall`, and one entry in `WALLS`, or an
-entry point `climber_uk.walls` of another package.
+x and y are lengths on the wall. Cylinders, tanks and cones unroll without stretching: nothing
+else in the equations of motion changes. A sphere does not: lengths are right on lines through the
+origin, and across them by (x² + y²)/6R² too long, which is neglected. A new wall is one class, a
+`Wall`, and one entry in `WALLS`, or an entry point `climber_uk.walls` of another package.
 """
 
 import math
 from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY
-from climber_uk.mechanics.elementary import cos, sin
+from climber_uk.mechanics.elementary import cos, select, sin, sqrt
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
@@ -22,11 +26,11 @@ class Wall(Protocol):
 
     flat: ClassVar[bool]
 
-    def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
-        """Components (s_x, s_y) of gravity along the wall, by g, at y (...) [m]; each (...)."""
+    def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """Components (s_x, s_y) of gravity along the wall, by g, at (x, y) [m]; each (...)."""
 
-    def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
-        """g_n (...) [m/s²] into the wall, with the centripetal part at ẏ = `y_speed` [m/s]."""
+    def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
+        """g_n (...) [m/s²] into the wall, with the centripetal part at (ẋ, ẏ) (...) [m/s]."""
 
 
 @parameters
@@ -39,12 +43,12 @@ class Plane(Wall):
 
     flat: ClassVar[bool] = True
 
-    def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
+    def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
         pull, tilt = sin(inclination * DEGREE), math.radians(self.tilt)
         return pull * math.sin(tilt) + 0.0 * y, -pull * math.cos(tilt) + 0.0 * y
 
-    def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
+    def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
         """See `Wall`."""
         return GRAVITY * cos(inclination * DEGREE) + 0.0 * y
 
@@ -58,17 +62,124 @@ class Cylinder(Wall):
     flat: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        if self.radius == 0:
-            raise ValueError("radius=0.0 must not be 0 [m]")
+        _check_radius(self.radius)
 
-    def along(self, inclination: Any, y: Any) -> tuple[Any, Any]:
+    def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
         return 0.0 * y, -sin(inclination * DEGREE + y / self.radius)
 
-    def into(self, inclination: Any, y: Any, y_speed: Any) -> Any:
+    def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
         """See `Wall`."""
         steep = inclination * DEGREE + y / self.radius
         return GRAVITY * cos(steep) + y_speed * y_speed / self.radius
 
 
-WALLS = Variants[type[Wall]]({"plane": Plane, "cylinder": Cylinder}, "walls")
+@parameters
+class Tank(Wall):
+    """A tank or a hull whose axis is along y: upright where `inclination` is 90."""
+
+    radius: float = parameter(5.0, "m", "radius R: > 0 inside the tank, < 0 on its outside")
+
+    flat: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        _check_radius(self.radius)
+
+    def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """See `Wall`."""
+        ahead, _ = _turned(inclination, 0.0, x / self.radius)
+        return ahead, -sin(inclination * DEGREE) + 0.0 * y
+
+    def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
+        """See `Wall`."""
+        _, into = _turned(inclination, 0.0, x / self.radius)
+        return GRAVITY * into + x_speed * x_speed / self.radius
+
+
+@parameters
+class Cone(Wall):
+    """A cone with a vertical axis; its apex is uphill of the origin, or downhill.
+
+    Uphill: a roof, or for an `inclination` above 90 the inside of an upturned funnel; downhill: the
+    inside of a hopper, or its outside. An inclination of 90 is none: that is a `Tank`.
+    """
+
+    distance: float = parameter(
+        5.0, "m", "from the origin to the apex: > 0 it is uphill, < 0 downhill"
+    )
+
+    flat: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        if self.distance == 0:
+            raise ValueError("distance=0.0 must not be 0 [m]")
+
+    def _to_apex(self, x: Any, y: Any) -> tuple[Any, Any, Any]:
+        """Direction (e_x, e_y) to the apex, and how far it is [m]."""
+        ahead = self.distance - y
+        far = sqrt(x * x + ahead * ahead)
+        return -x / far, ahead / far, far
+
+    def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """See `Wall`."""
+        e_x, e_y, _ = self._to_apex(x, y)
+        downhill = -math.copysign(1.0, self.distance) * sin(inclination * DEGREE)
+        return downhill * e_x, downhill * e_y
+
+    def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
+        """See `Wall`; across the generator the curvature is tan(inclination) by the distance."""
+        e_x, e_y, far = self._to_apex(x, y)
+        around = x_speed * e_y - y_speed * e_x
+        steepness = sin(inclination * DEGREE) / cos(inclination * DEGREE)
+        curvature = -math.copysign(1.0, self.distance) * steepness / far
+        return GRAVITY * cos(inclination * DEGREE) + curvature * around * around
+
+
+@parameters
+class Sphere(Wall):
+    """A spherical tank or bulb."""
+
+    radius: float = parameter(5.0, "m", "radius R: > 0 inside the sphere, < 0 on its outside")
+
+    flat: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        _check_radius(self.radius)
+
+    def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """See `Wall`."""
+        e_x, e_y, far = self._from_origin(x, y)
+        before = -sin(inclination * DEGREE) * e_y
+        change = _turned(inclination, before, far / self.radius)[0] - before
+        return change * e_x, -sin(inclination * DEGREE) + change * e_y
+
+    def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
+        """See `Wall`."""
+        _, e_y, far = self._from_origin(x, y)
+        _, into = _turned(inclination, -sin(inclination * DEGREE) * e_y, far / self.radius)
+        return GRAVITY * into + (x_speed * x_speed + y_speed * y_speed) / self.radius
+
+    def _from_origin(self, x: Any, y: Any) -> tuple[Any, Any, Any]:
+        """Direction (e_x, e_y) from the origin, and how far it is [m]."""
+        far = sqrt(x * x + y * y)
+        safe = select(far > 0, far, 1.0)
+        return x / safe, y / safe, far
+
+
+def _turned(inclination: Any, ahead: Any, angle: Any) -> tuple[Any, Any]:
+    """Gravity ahead and into the wall, by g, once the wall has turned upwards by `angle` [rad].
+
+    At first it is `ahead` and cos(inclination).
+    """
+    into = cos(inclination * DEGREE)
+    return ahead * cos(angle) - into * sin(angle), into * cos(angle) + ahead * sin(angle)
+
+
+def _check_radius(radius: float) -> None:
+    if radius == 0:
+        raise ValueError("radius=0.0 must not be 0 [m]")
+
+
+WALLS = Variants[type[Wall]](
+    {"plane": Plane, "cylinder": Cylinder, "tank": Tank, "cone": Cone, "sphere": Sphere}, "walls"
+)

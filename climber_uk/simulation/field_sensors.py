@@ -97,11 +97,10 @@ class Imu:
         acceleration = (state.velocity - self._last.velocity) / self.period
         turning, square = float(acceleration[2]), float(state.yaw_rate) ** 2
         self._last = state
-        down = np.array([*plant.wall.along(climber.inclination, float(state.pose[1])), 0.0])
+        (x, y, _), (x_speed, y_speed, _) = state.pose.tolist(), state.velocity.tolist()
+        down = np.array([*plant.wall.along(climber.inclination, x, y), 0.0])
         force, heading = acceleration - GRAVITY * down, state.heading
-        off_wall = plant.wall.into(
-            climber.inclination, float(state.pose[1]), float(state.velocity[1])
-        )
+        off_wall = plant.wall.into(climber.inclination, x, y, x_speed, y_speed)
         forwards = along(heading, force) - turning * errors.y - square * errors.x
         left = across(heading, force) + turning * errors.x - square * errors.y
         cosine, sine = math.cos(errors.yaw), math.sin(errors.yaw)

@@ -50,32 +50,34 @@ class RigidBody:
     # a plane's are the same everywhere
     @cached_property
     def _weight_on_plane(self) -> tuple[float, float]:
-        return self._weight(0.0)
+        return self._weight(0.0, 0.0)
 
     @cached_property
     def _gravity_on_plane(self) -> tuple[float, float]:
-        return self._gravity(0.0, 0.0)
+        return self._gravity(0.0, 0.0, 0.0, 0.0)
 
-    def _weight(self, height: float) -> tuple[float, float]:
-        """Weight along the wall (x, y) [N], at y = `height` [m]."""
-        s_x, s_y = self.wall.along(self.climber.inclination, height)
+    def _weight(self, x: float, height: float) -> tuple[float, float]:
+        """Weight along the wall (x, y) [N], at x and y = `height` [m]."""
+        s_x, s_y = self.wall.along(self.climber.inclination, x, height)
         weight = self.climber.mass * GRAVITY
         return weight * s_x, weight * s_y
 
-    def _gravity(self, height: float, y_speed: float) -> tuple[float, float]:
+    def _gravity(
+        self, x: float, height: float, x_speed: float, y_speed: float
+    ) -> tuple[float, float]:
         inclination = self.climber.inclination
-        into = self.wall.into(inclination, height, y_speed)
-        return float(into), GRAVITY * math.hypot(*self.wall.along(inclination, height))
+        into = self.wall.into(inclination, x, height, x_speed, y_speed)
+        return float(into), GRAVITY * math.hypot(*self.wall.along(inclination, x, height))
 
-    def outside(self, height: float, inputs: Inputs) -> tuple[float, float]:
-        """Weight and push along the wall (x, y) [N], at y = `height` [m]."""
-        w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
+    def outside(self, x: float, height: float, inputs: Inputs) -> tuple[float, float]:
+        """Weight and push along the wall (x, y) [N], at x and y = `height` [m]."""
+        w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(x, height)
         return inputs.push_x + w_x, inputs.push_y + w_y
 
     def push(self, y: Array, inputs: Inputs) -> float:
         """Force along the climber, without friction [N]."""
-        _, height, heading, *_ = y.tolist()
-        f_x, f_y = self.outside(height, inputs)
+        x, height, heading, *_ = y.tolist()
+        f_x, f_y = self.outside(x, height, inputs)
         return float(inputs.force + f_x * math.cos(heading) + f_y * math.sin(heading))
 
     def lateral(self, y: Array, inputs: Inputs, mass: float) -> float:
@@ -84,13 +86,16 @@ class RigidBody:
 
     def across(self, y: Array, inputs: Inputs) -> float:
         """What of weight and push pulls to the left [N]."""
-        _, height, heading, *_ = y.tolist()
-        f_x, f_y = self.outside(height, inputs)
+        x, height, heading, *_ = y.tolist()
+        f_x, f_y = self.outside(x, height, inputs)
         return float(f_y * math.cos(heading) - f_x * math.sin(heading))
 
     def gravity(self, y: Array) -> tuple[float, float]:
         """g_n into the wall, with the centripetal part of a curved one, and g_t along it [m/s²]."""
-        return self._gravity_on_plane if self.wall.flat else self._gravity(float(y[1]), float(y[4]))
+        if self.wall.flat:
+            return self._gravity_on_plane
+        x, height, _, v_x, v_y, *_ = y.tolist()
+        return self._gravity(x, height, v_x, v_y)
 
     def into_wall(self, y: Array) -> float:
         """g_n [m/s²], see `gravity`."""
@@ -115,7 +120,7 @@ class RigidBody:
         climber: [cosθ sinθ 0] is a second row with b_q = b = 0. For None see `_ring`.
         """
         climber = self.climber
-        _, height, heading, v_x, v_y, yaw_rate, *deflection = y.tolist()
+        x, height, heading, v_x, v_y, yaw_rate, *deflection = y.tolist()
         cosine, sine = math.cos(heading), math.sin(heading)
         force, moment = inputs.force, inputs.moment + inputs.push_moment
         bending = [0.0] * len(deflection)
@@ -134,7 +139,7 @@ class RigidBody:
             force = force - self.contact.friction.level(self.friction, sliding) * direction
 
         # as `outside`, without the call: this is where the plant spends its time
-        w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(height)
+        w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(x, height)
         f_x, f_y = inputs.push_x + w_x, inputs.push_y + w_y
         a_x = (force * cosine + f_x) / climber.mass
         a_y = (force * sine + f_y) / climber.mass

@@ -144,7 +144,8 @@ class SimulatedRobot:
         climber, creep = self.plant.climber, self.parts.physics.creep
         right, left = turned.tolist()
         way = creep * climber.wheel_radius * (abs(right) + abs(left)) / 2
-        x, y = self.plant.wall.along(climber.inclination, float(state.pose[1]))
+        at_x, at_y, _ = state.pose.tolist()
+        x, y = self.plant.wall.along(climber.inclination, at_x, at_y)
         return replace(state, pose=state.pose + way * np.array([x, y, 0.0]))
 
     def _pump(self) -> float:

@@ -92,7 +92,7 @@ class ContactStepper:
         u = v_y * cosine - v_x * sine if self.slip else 0.0
         sliding = np.array([v, u, self.body.contact.grip.seal_radius * omega])
 
-        f_x, f_y = self.body.outside(height, inputs)
+        f_x, f_y = self.body.outside(x, height, inputs)
         pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, inputs.push_moment])
         against, drag = self._smooth_friction(sliding, np.array(deflection), h)
         masses = np.array([self.mass, self.mass, self.yaw_inertia])

@@ -42,7 +42,7 @@ FAULTS = {
     "degrees per second": ("heading", "in degrees per second"),
     "no twist": ("heading", "is zero"),
     "world-frame twist": ("twist", "twist.linear is in odom, not in base_link"),
-    "centimetres": ("twist", "100 times"),
+    "centimetres": ("twist", "times as fast as twist.linear"),
     "sideways": ("slip", "sideways"),
     "not a number": ("finite", "nan"),
     "no orientation": ("finite", "unit turn about z"),

@@ -299,7 +299,7 @@ def energy(plant, state):
     climber, wall = plant.climber, plant.wall
     x, y, _ = state.pose
     if wall.flat:
-        s_x, s_y = wall.along(climber.inclination, 0.0)
+        s_x, s_y = wall.along(climber.inclination, 0.0, 0.0)
         height = -(s_x * x + s_y * y)
     else:
         height = -wall.radius * np.cos(np.radians(climber.inclination) + y / wall.radius)
