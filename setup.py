@@ -55,6 +55,7 @@ setup(
                 "identify": "identification.identify",
                 "replay_controller": "replay.replay_controller",
                 "export_tum": "report.export_tum",
+                "localize": "replay.localize",
                 "reproduce_paper": "paper.reproduce_paper",
                 "campaign": "campaign.command",
             }.items()

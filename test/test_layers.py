@@ -25,7 +25,7 @@ BELOW = {
     "ros": MATHEMATICS | {"system", "control", "simulation", "messages"},
     "report": DATA | {"system", "bags"},
     "identification": DATA | {"system", "bags", "report"},
-    "replay": DATA | {"system", "bags", "report"},
+    "replay": DATA | {"system", "bags", "report", "localization"},
     "campaign": DATA | {"system", "bags", "report"},
     "paper": DATA | {"system", "bags", "report"},
     "driver_check": DATA | {"system", "ros"},
