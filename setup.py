@@ -58,6 +58,7 @@ setup(
                 "replay_controller": "replay.replay_controller",
                 "animate_bag": "report.animate_bag",
                 "export_tum": "report.export_tum",
+                "localize": "replay.localize",
                 "reproduce_paper": "paper.reproduce_paper",
                 "campaign": "campaign.command",
             }.items()

@@ -15,7 +15,7 @@ from identification_experiments import SCENARIOS
 from scipy.stats import chi2
 
 from climber_uk.closed_loop.simulate import sampled
-from climber_uk.control.control_law import ControlLaw
+from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.timing import Timing
 from climber_uk.localization.gate import Fix
@@ -91,7 +91,8 @@ class Loop:
     def __init__(self, case: Case, seed: int) -> None:
         self.case = case
         believed = replace(RUN.believed, inclination=case.inclination)
-        law = ControlLaw(believed, RUN.guidance)
+        options = ControlOptions() if case.believes_truth else ControlOptions(friction_speed=0.01)
+        law = ControlLaw(believed, RUN.guidance, options)
         self.controller = Controller(Settings(law, timing=Timing(control_period=PERIOD)))
         turned = np.random.default_rng(seed).uniform(-math.pi, math.pi) if case.rests else 0.0
         pose = RUN.start.pose + np.array([0.0, 0.0, turned])
@@ -104,8 +105,7 @@ class Loop:
             for number, errors in enumerate((case.imu, case.encoders, case.fixes))
         ]
         self.sensors = FieldSensors(*seeded, PERIOD, start)
-        options = replace(case.options, inclination=case.inclination)
-        self.localizer = Localizer(options)
+        self.localizer = Localizer(replace(case.options, inclination=case.inclination))
         self.torques: Array = np.zeros(2)
         self.record, self.sent = Record(), []
 

@@ -26,7 +26,7 @@ BELOW = {
     "ros": MATHEMATICS | {"planning", "system", "control", "simulation", "messages"},
     "report": DATA | {"system", "bags"},
     "identification": DATA | {"system", "bags", "report"},
-    "replay": DATA | {"system", "bags", "report"},
+    "replay": DATA | {"system", "bags", "report", "localization"},
     "campaign": DATA | {"system", "bags", "report"},
     "paper": DATA | {"system", "bags", "report"},
     "driver_check": DATA | {"system", "ros"},

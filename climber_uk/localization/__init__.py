@@ -6,5 +6,6 @@ specific force -> `imu` (between two samples of the encoders) -> `models.Travel`
 which a fix corrects the state of its own stamp, and all that came after it is done again. `gate`
 refuses fixes, until some agree; `doubts` tell what is not known any more; `smoothing` lets the
 output go after the estimate without a jump, `output_speed` makes its speed and yaw rate.
-`localizer.Localizer` calls these in their turn.
+`localizer.Localizer` calls these in their turn; `sensor_frames` is how sensors are mounted. Of a
+recording, the `smoother` goes through all of it backwards.
 """

@@ -56,6 +56,7 @@ class Entry:
     sample: Sample
     estimate: Estimate
     corrections: list[Correction] = field(default_factory=list)
+    anew: bool = False  # whether something was believed against the estimate of before
 
     def pose(self, stamp: int) -> Array:
         """Pose (3,) a little later, at `stamp` [ns]."""
@@ -97,9 +98,10 @@ class History:
         found = bisect.bisect_right(self.entries, stamp, key=lambda entry: entry.stamp)
         return found - 1 if found else None
 
-    def correct(self, number: int, correction: Correction) -> None:
-        """Correct the estimate of an entry, and do again all that came after it."""
+    def correct(self, number: int, correction: Correction, anew: bool = False) -> None:
+        """Correct the estimate of an entry, or begin it `anew`; do again all that came after it."""
         entry = self.entries[number]
+        entry.anew = entry.anew or anew
         entry.corrections.append(correction)
         entry.estimate = estimate = correction(entry.estimate)
         for later in self.entries[number + 1 :]:

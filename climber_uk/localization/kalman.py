@@ -61,6 +61,14 @@ class Estimate:
 
 def predicted(estimate: Estimate, travel: Travel, options: LocalizationOptions) -> Estimate:
     """Estimate after a `travel`; the encoders' scale goes back to 1 in its time."""
+    after, _ = predicted_with_jacobian(estimate, travel, options)
+    return after
+
+
+def predicted_with_jacobian(
+    estimate: Estimate, travel: Travel, options: LocalizationOptions
+) -> tuple[Estimate, Array]:
+    """The same, and the derivative (8, 8) of its mean by the one before."""
     pull = models.share_along_wall(options)
     mean = models.advanced(estimate.mean, travel, pull)
     jacobian = models.advanced_jacobian(estimate.mean, travel, pull)
@@ -69,7 +77,7 @@ def predicted(estimate: Estimate, travel: Travel, options: LocalizationOptions) 
     jacobian[SCALE, SCALE] = kept
     covariance = jacobian @ estimate.covariance @ jacobian.T
     covariance.flat[:: SIZE + 1] += models.process_noise(travel, options)
-    return Estimate(mean, covariance)
+    return Estimate(mean, covariance), jacobian
 
 
 def corrected(

@@ -168,7 +168,9 @@ class Localizer:
         near = float(before[HEADING]) + wrapped(heading - float(before[HEADING]))
         last = len(self.history.entries) - 1
         pull = self.options.gravity_along_wall
-        self.history.correct(last, lambda estimate: estimate.with_heading(near, deviation, pull))
+        self.history.correct(
+            last, lambda estimate: estimate.with_heading(near, deviation, pull), anew=True
+        )
         self._smooth(before)
 
     def on_fix(self, fix: Fix) -> None:
@@ -204,7 +206,9 @@ class Localizer:
             return
         after = told_anew if verdict.believed else corrected_by
         before = self.estimate.mean[:3]
-        self.history.correct(number, lambda estimate: after(estimate, fix, innovation(estimate)))
+        self.history.correct(
+            number, lambda estimate: after(estimate, fix, innovation(estimate)), verdict.believed
+        )
         self._smooth(before)
         self.fixed, self.last_was_taken = fix.stamp, True
         self.doubts.on_fix(fix.stamp)

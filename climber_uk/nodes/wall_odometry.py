@@ -21,12 +21,12 @@ from climber_uk.localization import models
 from climber_uk.localization.gate import Fix
 from climber_uk.localization.localizer import Localizer, Located
 from climber_uk.localization.options import LocalizationOptions
+from climber_uk.localization.sensor_frames import SensorFrames
 from climber_uk.localization.smoothing import between
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading_sensors, writing
 from climber_uk.messages.topics import IMU, JOINTS, LOCALIZATION, ODOMETRY, POSE
-from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros.output import Output
 from climber_uk.ros.running import (
     BEST_EFFORT,
@@ -48,25 +48,6 @@ PLANAR_POSE = (
 )
 PATIENCE = 0.05  # [s] of the wall clock that encoders wait for an IMU's sample, at least
 NOWHERE = State(np.zeros(3), np.zeros(3))
-
-
-@parameters
-class SensorFrames:
-    """Frames of the sensors, and how the IMU is mounted."""
-
-    imu_frame: str = parameter("", "", "frame of imu; empty: base_frame")
-    imu_yaw: float = parameter(
-        0.0, "rad", "from the climber's x to the IMU's, anticlockwise; both have z off the wall"
-    )
-    pose_frame: str = parameter("", "", "frame of pose; empty: odom_frame")
-    pose_frame_x: float = parameter(0.0, "m", "where its origin is in odom_frame: x")
-    pose_frame_y: float = parameter(0.0, "m", "where its origin is in odom_frame: y")
-    pose_frame_yaw: float = parameter(
-        0.0, "rad", "from the x of odom_frame to its own, anticlockwise; both have z off the wall"
-    )
-    map_frame: str = parameter(
-        "map", "", "frame in which the estimate is right at once; see docs/localization.md"
-    )
 
 
 class WallOdometry(ClimberNode):
@@ -133,20 +114,15 @@ class WallOdometry(ClimberNode):
             self.report(IMU, "refused", str(error))
             return
         self.report(IMU, "")
-        cosine, sine = math.cos(self.frames.imu_yaw), math.sin(self.frames.imu_yaw)
-        x, y = sample.force
-        forwards, left = x * cosine - y * sine, x * sine + y * cosine
-        self.localizer.on_imu(sample.stamp, sample.yaw_rate, forwards, left)
+        self.localizer.on_imu(sample.stamp, sample.yaw_rate, *self.frames.force(*sample.force))
         if self.waiting is not None and not self.localizer.imu.is_due(self.waiting[0]):
             self.go_on()
 
     def on_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Take the parts of a pose that are measured."""
         try:
-            frames = self.frames
-            pose = reading_sensors.pose(message, frames.pose_frame or self.names.odom_frame)
-            place = frames.pose_frame_x, frames.pose_frame_y, frames.pose_frame_yaw
-            fix = Fix(*pose).moved(*place)
+            pose = reading_sensors.pose(message, self.frames.pose_frame or self.names.odom_frame)
+            fix = self.frames.fix(Fix(*pose))
         except ValueError as error:
             self.report(POSE, "refused", str(error))
             return

@@ -1,0 +1,106 @@
+"""Encoders, IMU and fixes of a bag, in the order of their stamps, as `wall_odometry` reads them."""
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from climber_uk.bags.bag import Bag
+from climber_uk.bags.topics import Topics
+from climber_uk.localization.gate import Fix
+from climber_uk.localization.localizer import Localizer
+from climber_uk.localization.sensor_frames import SensorFrames
+from climber_uk.mechanics import SECOND, Array, Stamps
+from climber_uk.messages import reading_sensors
+from climber_uk.messages.names import Names
+from climber_uk.messages.topics import IMU, JOINTS, POSE, TRUTH
+
+Tell = Callable[[Localizer], Any]
+ORDER = {IMU: 0, JOINTS: 1, POSE: 2}  # of one stamp
+
+
+@dataclass
+class RecordedSensors:
+    """What a bag has of one climber."""
+
+    events: list[tuple[int, int, Tell]] = field(default_factory=list)  # stamp [ns], order, what
+    counts: Counter[str] = field(default_factory=Counter)  # by topic
+    refused: Counter[str] = field(default_factory=Counter)  # by topic and why
+    fixes: list[Fix] = field(default_factory=list)
+    true: list[tuple[float, ...]] = field(default_factory=list)  # stamp [ns], x, y, heading
+
+    def tell(self, localizer: Localizer) -> None:
+        """Tell a localizer all of it, in the order of the stamps."""
+        self.events.sort(key=lambda event: event[:2])
+        for _, _, tell in self.events:
+            try:
+                tell(localizer)
+            except ValueError as error:
+                self.refused[f"{JOINTS}: {error}"] += 1
+
+    def truth(self, stamps: Stamps) -> Array:
+        """True poses at stamps (n,) [ns], (n, 3); nan where none was recorded."""
+        if not self.true:
+            return np.full((len(stamps), 3), math.nan)
+        at, x, y, heading = np.array(sorted(self.true)).T
+        return np.column_stack(
+            [
+                np.interp(stamps, at, values, left=math.nan, right=math.nan)
+                for values in (x, y, np.unwrap(heading))
+            ]
+        )
+
+
+def read_sensors(bag: Bag, namespace: str, names: Names, frames: SensorFrames) -> RecordedSensors:
+    """Sensors of the climber in `namespace`; what is unfit is counted, with the reason.
+
+    Raises `ValueError` if there are no encoders, or none that are fit.
+    """
+    found, names = RecordedSensors(), names.within(namespace)
+    topics = {Topics().full(name, namespace): name for name in (IMU, JOINTS, POSE, TRUTH)}
+    for connection, _, _, message in bag.messages(topics):
+        name = topics[connection.topic]
+        found.counts[name] += 1
+        try:
+            _take(found, name, message, names, frames)
+        except ValueError as error:
+            found.refused[f"{name}: {error}"] += 1
+    if not found.counts[JOINTS]:
+        topic = Topics().full(JOINTS, namespace)
+        raise ValueError("; ".join([f"{bag.path} has no message on {topic}", *bag.losses]))
+    if not any(order == ORDER[JOINTS] for _, order, _ in found.events):
+        raise ValueError(f"{bag.path}: {found.refused.most_common(1)[0][0]}")
+    return found
+
+
+def _take(
+    found: RecordedSensors, name: str, message: Any, names: Names, frames: SensorFrames
+) -> None:
+    if name == TRUTH:
+        position, q = message.pose.pose.position, message.pose.pose.orientation
+        heading = 2 * math.atan2(q.z, q.w)
+        stamp = reading_sensors.stamp_of(message)
+        found.true.append((stamp, float(position.x), float(position.y), heading))
+        return
+    if name == JOINTS:
+        joints = names.left_wheel_joint, names.right_wheel_joint
+        angles = reading_sensors.wheel_angles(message, *joints)
+        stamp = reading_sensors.stamp_of(message)
+        found.events.append((stamp, ORDER[name], lambda it: it.on_encoders(stamp, *angles)))
+    elif name == IMU:
+        sample = reading_sensors.imu(message, frames.imu_frame or names.base_frame)
+        told = sample.stamp, sample.yaw_rate, *frames.force(*sample.force)
+        found.events.append((sample.stamp, ORDER[name], lambda it: it.on_imu(*told)))
+    else:
+        pose = reading_sensors.pose(message, frames.pose_frame or names.odom_frame)
+        fix = frames.fix(Fix(*pose))
+        found.fixes.append(fix)
+        found.events.append((fix.stamp, ORDER[name], lambda it: it.on_fix(fix)))
+
+
+def seconds(stamps: Stamps) -> Array:
+    """Times (n,) [s] since the first stamp."""
+    return np.asarray((stamps - stamps[0]) / SECOND, dtype=float)

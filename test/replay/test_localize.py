@@ -1,0 +1,100 @@
+"""`localize` over bags that were made of a climber's known way."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from made_bag import ODOMETRY, SECOND, message, turn, write
+
+from climber_uk.mechanics.climber import GRAVITY
+
+IMU, JOINTS = "sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState"
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+PERIOD, SPEED, HEADING, CREEP = 0.02, 0.2, 0.5, 0.05
+RADIUS = 0.027
+
+
+def a_bag(path, seconds=20.0, late=0.3, has_imu=True):
+    """A climber that goes straight and sags; fixes of 2 cm, five a second, that come late."""
+    random, messages = np.random.default_rng(0), []
+    for number in range(round(seconds / PERIOD)):
+        time = number * PERIOD
+        stamp = 10 * SECOND + round(time * SECOND)
+        way = SPEED * time
+        x, y = way * math.cos(HEADING), way * math.sin(HEADING) - CREEP * way
+        angles = np.full(2, way / RADIUS)
+        names = ["left_wheel_joint", "right_wheel_joint"]
+        joints = message(JOINTS, stamp, "base_link", name=names, position=angles)
+        noise = random.normal(0, 0.02, 3)
+        imu = message(
+            IMU,
+            stamp,
+            "base_link",
+            angular_velocity__z=0.01 + noise[0],
+            linear_acceleration__x=GRAVITY * math.sin(HEADING) + noise[1],
+            linear_acceleration__y=GRAVITY * math.cos(HEADING) + noise[2],
+        )
+        truth = message(ODOMETRY, stamp, pose__pose__position__x=x, pose__pose__position__y=y)
+        truth.pose.pose.orientation = turn(HEADING)
+        messages.append(("/joint_states", JOINTS, stamp, joints))
+        messages.append(("/ground_truth", ODOMETRY, stamp, truth))
+        if has_imu:
+            messages.append(("/imu", IMU, stamp, imu))
+        if number % 10 == 0:
+            off = random.normal(0, 0.02, 2)
+            fix = message(
+                POSE, stamp, pose__pose__position__x=x + off[0], pose__pose__position__y=y + off[1]
+            )
+            fix.pose.pose.orientation = turn(0.0)
+            fix.pose.covariance = np.diag([4e-4, 4e-4, 1.0, 1.0, 1.0, 100.0]).ravel()
+            messages.append(("/pose", POSE, stamp + round(late * SECOND), fix))
+    return write(path, messages)
+
+
+def run(*arguments):
+    code = "from climber_uk.replay.localize import main; main()"
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_bag_is_localized_forwards_and_backwards(tmp_path):
+    bag = a_bag(tmp_path / "bag")
+    given = ["-p", "acceleration_bias_deviation:=0.0", "-p", "creep_deviation:=0.1"]
+    done = run(bag, *given, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    files = ["forward.tum", "localization.json", "localization.png", "smoothed.tum"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
+    numbers = json.loads((tmp_path / "out" / "localization.json").read_text())["numbers"]
+    assert numbers["fixes taken"] >= 95
+    assert numbers["creep"] == pytest.approx(CREEP, abs=0.01)
+    assert numbers["bias of the gyro [rad/s]"] == pytest.approx(0.01, abs=0.003)
+    forward, backward = (
+        numbers[f"distance from the truth, {name}, RMS [m]"] for name in ("forwards", "smoothed")
+    )
+    assert backward < 0.01
+    assert backward < 0.8 * forward
+    assert f"{numbers['creep']:.4g}" in done.stdout
+    lines = (tmp_path / "out" / "smoothed.tum").read_text().splitlines()
+    assert len(lines) == numbers["samples of the encoders"]
+    assert lines[-1].startswith("29.98")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["-p", "wheel_radios:=1.0"], "wheel_radios is no parameter of wall_odometry"),
+        (["-p", "wheel_radius:=-1.0"], "wheel_radius=-1.0 must be > 0"),
+        (["-p", "left_wheel_joint:=other"], "must have 'other' once"),
+        (["-p", "inclination:=0.0"], "heading never known"),
+        (["--namespace", "robot"], "has no message on /robot/joint_states"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(tmp_path, arguments, said):
+    done = run(a_bag(tmp_path / "bag", seconds=0.5), *arguments)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert said in done.stderr
+    assert not (tmp_path / "bag" / "localization").exists()
