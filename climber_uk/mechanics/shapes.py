@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.lanes import Lanes
 from climber_uk.mechanics.waypoints import Waypoints
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
@@ -154,6 +155,7 @@ SHAPES = Variants[type[Shape]](
         "line": Line,
         "sine_wave": SineWave,
         "waypoints": Waypoints,
+        "lanes": Lanes,
     },
     "shapes",
 )

@@ -23,12 +23,14 @@ def read_waypoints(file: str) -> Array:
     Raises `ValueError` naming the file, the line and what was wanted.
     """
     try:
-        return _points(_text(Path(file).expanduser()))
+        return read_waypoint_text(read_text(file))
     except ValueError as error:
         raise ValueError(f"file={file!r}: {error}") from None
 
 
-def _text(path: Path) -> str:
+def read_text(file: str) -> str:
+    """Text of a file, of any encoding that is found there; `ValueError` if it is none."""
+    path = Path(file).expanduser()
     if not path.exists():
         raise ValueError("not found")
     if not path.is_file():
@@ -55,7 +57,8 @@ class _Columns:
     y: int = 1
 
 
-def _points(text: str) -> Array:
+def read_waypoint_text(text: str) -> Array:
+    """Points (n, 2) [m] of the text of a file; `ValueError` naming the line."""
     lines = list(enumerate(re.split(r"\r\n|\r|\n", text), start=1))
     rows = [(n, bare) for n, line in lines if (bare := COMMENT.sub("", line).strip(" \t"))]
     if not rows:

@@ -43,7 +43,7 @@ def test_a_summary_has_the_sizes_of_its_shape(shape, length, speed, yaw_rate, ra
 
 
 def test_every_shape_has_known_sizes_or_a_test_of_its_own():
-    assert SIZES.keys() | {"waypoints"} == SHAPES.keys()
+    assert SIZES.keys() | {"waypoints", "lanes"} == SHAPES.keys()
 
 
 @pytest.mark.parametrize("laps", [1, 3, 10**6])

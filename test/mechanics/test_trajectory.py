@@ -1,13 +1,16 @@
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from climber_uk.mechanics.lanes import Lanes
 from climber_uk.mechanics.shapes import SHAPES, Circle, Ellipse, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.waypoints import Waypoints
 
+FACADE = Path(__file__).parents[2] / "config" / "facade.csv"
 CORNERS = [[0, 0], [1, 0], [1.5, 1], [0, 2]]
 
 
@@ -29,6 +32,8 @@ def shape(request, waypoints):
         return waypoints([*CORNERS, CORNERS[0]])
     if request.param == "waypoints there and back":
         return waypoints([*CORNERS, [1.5, 0.8], [1.5, 1.0], [0, 1.9]])
+    if request.param == "lanes":
+        return Lanes(area=str(FACADE))
     return SHAPES[request.param]()
 
 

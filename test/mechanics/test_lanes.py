@@ -1,0 +1,145 @@
+"""Lanes cover what can be reached of an area, clear of its edge and its holes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from climber_uk.mechanics.area import Area, read_area
+from climber_uk.mechanics.lanes import Lanes, joined, lanes_of
+from climber_uk.mechanics.shapes import Circle
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+
+FACADE = Path(__file__).parents[2] / "config" / "facade.csv"
+TOLERANCE, STEP = 0.004, 0.02  # [m] of the path, and of the raster
+WINDOWS = "1 .6\n1.5 .6\n1.5 1.4\n1 1.4\n\n2.5 .6\n3 .6\n3 1.4\n2.5 1.4"
+HOLE = "0.9 0.9\n1.3 0.7\n1.5 1.2\n1 1.3"
+# whose passages above and below a hole are too narrow
+PARTED = "0 0\n4 0\n4 1\n2.1 1\n2.1 0.9\n1.9 0.9\n1.9 1\n0 1\n\n1.8 0.3\n2.2 0.3\n2.2 0.6\n1.8 0.6"
+AREAS = {
+    "a facade with a window": FACADE.read_text(),
+    "a hole in a corner": "0 0\n2 0\n2 2\n0 2\n\n0.1 0.1\n0.6 0.1\n0.6 0.6\n0.1 0.6",
+    "notched, with a hole": f"0 0\n4 0\n4.5 2\n2 1.4\n2.2 3\n0 3\n\n{HOLE}",
+    "clockwise": "0;0\n0;1\n1,5;1\n1,5;0",
+    "an L": "0 0\n2 0\n2 1\n1 1\n1 2\n0 2",
+    "two windows": f"0 0\n4 0\n4 2\n0 2\n\n{WINDOWS}",
+    "round": "\n".join(f"{np.cos(a)} {np.sin(a)}" for a in np.arange(0, 6.28, 0.4)),
+    "a strip": "0 0\n3 0\n3 0.45\n0 0.45",
+}
+
+
+def made(folder, text, **parameters):
+    file = folder / "area.txt"
+    file.write_text(text)
+    return Lanes(area=str(file), tolerance=TOLERANCE, **parameters)
+
+
+def distance(points, area):
+    """Distances (n,) [m] of points from the edges of an area, by dense points on these."""
+    begin, end = (ends[:, None] for ends in area.edges)
+    on_edges = (begin + np.linspace(0, 1, 2001)[:, None] * (end - begin)).reshape(-1, 2)
+    return cKDTree(on_edges).query(points)[0]
+
+
+def is_inside(points, area):
+    """Whether points (n, 2) are in the area, by the winding of each ring around them."""
+    inside = np.zeros(len(points), bool)
+    for ring in area.rings:
+        a = np.arctan2(*np.moveaxis(ring[None] - points[:, None], -1, 0)[::-1])
+        turns = np.diff(np.unwrap(np.c_[a, a[:, :1]], axis=1)[:, [0, -1]], axis=1)[:, 0]
+        inside ^= np.abs(turns) > np.pi
+    return inside
+
+
+def covered(area, way, width):
+    """Share of a raster that is covered, of all within half a width of where the centre may be."""
+    corners = np.concatenate(area.rings)
+    x, y = (
+        np.arange(low, high, STEP) + STEP / 2
+        for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True)
+    )
+    raster = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    may_be = is_inside(raster, area) & (distance(raster, area) >= area.clearance)
+    reachable = cKDTree(raster[may_be]).query(raster)[0] <= width / 2
+    driven = cKDTree(way).query(raster)[0] <= width / 2
+    return (reachable & driven).sum() / reachable.sum()
+
+
+@pytest.mark.parametrize(
+    ("text", "direction"),
+    [
+        *((text, 0.5) for text in AREAS.values()),
+        (FACADE.read_text(), 0.0),
+        (AREAS["an L"], np.pi / 2),
+    ],
+    ids=[*AREAS, "across the facade", "up the L"],
+)
+def test_lanes_cover_what_can_be_reached_and_keep_clear(text, direction, tmp_path):
+    lanes = made(tmp_path, text, direction=direction)
+    path = Trajectory(lanes, RestToRest(rate=0.2)).path(20_001)[:, :2]
+    area = read_area(lanes.area, lanes.clearance)
+    assert is_inside(path, area).all()
+    assert distance(path, area).min() >= lanes.clearance - 1e-4
+    assert covered(area, path, lanes.width) >= 0.99
+
+
+def test_without_lanes_along_edges_it_is_shorter_and_leaves_their_ends(tmp_path):
+    with_edges, without = (
+        Trajectory(made(tmp_path, AREAS["an L"], edges=edges), RestToRest(rate=0.2))
+        for edges in (True, False)
+    )
+    assert without.course.length < with_edges.course.length
+    area = read_area(without.shape.area, 0.2)
+    assert covered(area, without.path(20_001)[:, :2], 0.2) > 0.9
+
+
+def test_lanes_are_straight_evenly_apart_and_no_further_than_asked(tmp_path):
+    lanes = made(tmp_path, "0 0\n3 0\n3 1.41\n0 1.41", edges=False, overlap=0.05)
+    area = read_area(lanes.area, 0.204)
+    found = lanes_of(area, 0.15, edges=False)
+    heights = found[:, :, 1]
+    np.testing.assert_array_equal(heights[:, 0], heights[:, 1])
+    apart = np.diff(heights[:, 0])
+    np.testing.assert_allclose(apart, apart[0])
+    assert 0.1 < apart[0] <= 0.15
+    np.testing.assert_allclose(found[:, :, 0], [[0.204, 2.796]] * len(found), atol=1e-6)
+
+
+def test_it_begins_at_the_corner_that_is_nearest(tmp_path):
+    for x, y in ((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0)):
+        lanes = made(tmp_path, AREAS["a facade with a window"], start_x=x, start_y=y)
+        assert np.hypot(*(lanes.given()[0] - [x, y])) <= 0.3
+
+
+def test_every_lane_is_driven_whole_from_end_to_end():
+    area = Area((np.array([[0, 0], [3, 0], [3, 2], [0, 2.0]]),), 0.2)
+    lanes = lanes_of(area, 0.2, edges=True)
+    way = joined(area, lanes, np.zeros(2))
+    steps = {tuple(map(tuple, pair)) for pair in np.stack([way[:-1], way[1:]], axis=1).round(9)}
+    for first, last in lanes.round(9).tolist():
+        assert {(tuple(first), tuple(last)), (tuple(last), tuple(first))} & steps
+
+
+@pytest.mark.parametrize(
+    ("text", "how", "why"),
+    [
+        ("0 0\n1 0", {}, r"area='.*': ring 1: 2 corner\(s\), want >= 3"),
+        ("0 0\n1 0\n1 1\n\n0 0\n1 x\n0 1", {}, "ring 2: line 2: 'x' must be a number"),
+        ("0 0\n0.3 0\n0.3 0.3\n0 0.3", {}, "m between the clearances"),
+        ("0 0\n3000 0\n3000 2000\n0 2000", {}, "want 0 to 500 lanes of 0.2 m"),
+        ("0 0\n1 0\n1 1\n0 1", {"overlap": 0.2}, "overlap=0.2 must be < width=0.2"),
+        (PARTED, {}, r"no way leads on to \(.*\) m: drive the area in parts"),
+    ],
+)
+def test_what_cannot_be_covered_is_refused_in_words(text, how, why, tmp_path):
+    with pytest.raises(ValueError, match=why):
+        made(tmp_path, text, **how)
+
+
+def test_shapes_of_one_ring_are_like_any_other_file_of_points(tmp_path):
+    file = tmp_path / "ring.csv"
+    points = Circle(1.0).derivatives(np.arange(0.0, 6.2, 0.1))[0]
+    np.savetxt(file, points, header="x y", comments="# ")
+    np.testing.assert_allclose(read_area(str(file), 0.1).rings[0], points, atol=1e-9)
