@@ -13,7 +13,7 @@ from rclpy.qos import (
 
 from climber_uk.bags.storage import Qos
 
-QUEUE_DEPTH = 5000  # messages of one topic that may wait: seconds, even at 1 kHz
+QUEUE_DEPTH = 12_000  # messages of one topic that may wait: more than localhost.xml has kept
 
 
 def request_for(offers: Sequence[QoSProfile]) -> QoSProfile:

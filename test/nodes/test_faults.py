@@ -164,7 +164,7 @@ def test_odometry_that_was_overtaken_is_ignored(world):
     loop.follows()
     begin = len(loop.torques)
     newer = loop.tell()
-    overtaken = loop.tell(age=SECOND // 20)
+    overtaken = loop.tell(at=newer - SECOND // 20)
     last = loop.tell()
 
     def answered():

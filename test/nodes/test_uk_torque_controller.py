@@ -51,8 +51,8 @@ class Loop:
         points = [reference_point(CIRCLE.at(time), time) for time in times]
         self.reference.publish(writing.reference(points, self.begin, "odom", "base_link"))
 
-    def tell(self, spoil=lambda message: None, age=0):
-        stamp = self.now() - age
+    def tell(self, spoil=lambda message: None, age=0, at=None):
+        stamp = at or self.now() - age
         here = CIRCLE.at((stamp - self.begin) * 1e-9)
         message = writing.odometry(State(here.pose, here.velocity), stamp, "odom", "base_link")
         spoil(message)
