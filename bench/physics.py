@@ -135,7 +135,7 @@ def both(robot: str, path: str) -> str:
         f"{ours.rms:.2f}, {ours.largest:.2f}",
         f"{theirs.rms:.2f}, {theirs.largest:.2f}",
         f"{ours.side_slip:.1f}, {theirs.side_slip:.1f}",
-        f"{ours.half_track:.3f}, {theirs.half_track:.3f}",
+        ", ".join(f"{row.half_track:.3f}" for row in (ours, theirs)).replace("nan, nan", ""),
     ]
     return f"| {robot} | {path} | {' | '.join(cells)} |"
 

@@ -229,9 +229,11 @@ class MujocoClimber:
         climber, contact = self.plant.climber, self.plant.contact
         tilt = self.plant.wall.tilt * DEGREE if isinstance(self.plant.wall, Plane) else 0.0
         steep = climber.inclination * DEGREE
-        pulled = GRAVITY * math.sin(steep) * along
+        # the climber's weight, though its mass contains rims that turn and weigh nothing here
+        gravity = GRAVITY * climber.mass / (climber.mass - 2 * self.model_of.rim)
+        pulled = gravity * math.sin(steep) * along
         down = math.sin(tilt), -math.cos(tilt)
-        self.model.opt.gravity[:] = *(pulled * part for part in down), -GRAVITY * math.cos(steep)
+        self.model.opt.gravity[:] = *(pulled * part for part in down), -gravity * math.cos(steep)
         body = self.model.body("climber").id
         self.data.xfrc_applied[body, 2] = -contact.adhesion.force(climber)
         for number, _ in enumerate(self.model_of.pads):

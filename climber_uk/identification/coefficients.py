@@ -5,6 +5,7 @@ a = (1/(m r), μ/m, c/m)      b = (d/(J r), C/J, D/J)      and with wheel angles
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
@@ -33,12 +34,22 @@ SURE = 2.0  # half widths of its interval from zero, above which a friction is s
 Columns = Mapping[str, tuple[int, ...]]
 
 
+class Given(NamedTuple):
+    """Geometry that wheel angles do not tell."""
+
+    track: float | None = None  # half track of the contacts [m]
+    radius: float | None = None  # [m]
+
+
+NONE = Given()
+
+
 def parameters(
-    fits: Mapping[str, WindowFit], columns: Columns, climber: Climber, track: float | None = None
+    fits: Mapping[str, WindowFit], columns: Columns, climber: Climber, given: Given = NONE
 ) -> tuple[Array, Widths, Choice]:
     """Values (8,), half widths, and which were sought, from the fits by kind of equation.
 
-    `track` is the half track of the contacts [m], if it is not to be taken from the wheel angles.
+    What is `given` is not taken from the wheel angles.
     """
     r, d = climber.wheel_radius, climber.half_track
     coefficients = np.array([np.nan, 0, 0, np.nan, 0, 0, r, r / d])
@@ -47,7 +58,7 @@ def parameters(
         chosen[kind] = [FIRST[kind] + column for column in columns[kind] if column != LATE]
         coefficients[chosen[kind]] = fit.coefficients[: len(chosen[kind])]
         sought[chosen[kind]] = True
-    values, slopes = _parameters(coefficients, track), _slopes(coefficients, track)
+    values, slopes = _parameters(coefficients, given), _slopes(coefficients, given)
     squares, white, bias = [], np.zeros(len(NAMES)), np.zeros(len(NAMES))
     freedom = np.full(len(NAMES), np.inf)  # windows more than coefficients
     for kind, fit in fits.items():
@@ -64,11 +75,13 @@ def parameters(
     return values, Widths(*(np.where(known, width, np.inf) for width in widths)), sought
 
 
-def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identified:
+def with_scrub(found: Identified, columns: Columns, climber: Climber, slips: bool) -> Identified:
     """The same, corrected where wheels scrub, or may: their angles show too wide a track.
 
     Inertia and moments need the track of the contacts: that of `climber` is taken, and its
-    difference from the one that the angles show is added to their intervals.
+    difference from the one that the angles show is added to their intervals. Where the wheels'
+    way does not fit that of the odometry, it `slips`: angles show no radius then, and that of
+    `climber` is taken for all that is made of torques.
     """
     number = NAMES.index("turning_friction")
     scrubs = found.values[number] > SURE * found.half_widths[number]
@@ -76,28 +89,30 @@ def with_scrub(found: Identified, columns: Columns, climber: Climber) -> Identif
     if HEADING not in found.fits or (is_told and not scrubs):
         return found
     track, effective = climber.half_track, found["half_track"]
-    values, widths, _ = parameters(found.fits, columns, climber, track)
+    given = Given(track, climber.wheel_radius if slips else None)
+    values, widths, _ = parameters(found.fits, columns, climber, given)
+    effective = float(values[-1])
     known = np.isin(NAMES, OF_TURNING) & np.isfinite(values) & np.isfinite(effective)
     bias = widths.bias.copy()
     bias[known] += abs(effective / track - 1) * np.abs(values[known])
-    values[-1] = effective
     wider = widths._replace(bias=bias)
-    return replace(found, values=values, widths=wider, has_effective_track=True)
+    return replace(found, values=values, widths=wider, has_effective_track=True, slips=slips)
 
 
-def _parameters(coefficients: Array, track: float | None) -> Array:
+def _parameters(coefficients: Array, given: Given) -> Array:
     """Parameters (8,) of coefficients (8,)."""
     a_1, a_2, a_3, b_1, b_2, b_3, r, per_track = coefficients
     with np.errstate(all="ignore"):  # what was not fitted is not finite
-        d = r / per_track
-        m, J = 1 / (r * a_1), (track or d) / (r * b_1)
+        lever = given.radius or r
+        d = lever / per_track
+        m, J = 1 / (lever * a_1), (given.track or d) / (lever * b_1)
         return np.array([m, a_2 * m, a_3 * m, J, b_2 * J, b_3 * J, r, d])
 
 
-def _slopes(coefficients: Array, track: float | None) -> Array:
+def _slopes(coefficients: Array, given: Given) -> Array:
     """Derivatives of the parameters by the coefficients (8, 8); exact, by a complex step."""
     step = 1e-20
-    moved = [_parameters(coefficients + 1j * step * unit, track) for unit in np.eye(len(NAMES))]
+    moved = [_parameters(coefficients + 1j * step * unit, given) for unit in np.eye(len(NAMES))]
     slopes = np.stack(moved, axis=1).imag / step
     return np.where(np.isfinite(slopes), slopes, 0.0)
 

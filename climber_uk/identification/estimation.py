@@ -69,7 +69,8 @@ def identify(
     left_out = sum(len(task.windows[kind]) - len(kept.windows[kind]) for kind in (DRIVE, YAW))
     values = parameters(fits, columns, climber)
     found = Identified(*values, fits, task.extent, kept.windows, site, left_out, late)
-    found = with_scrub(found, columns, climber)
+    slips = any(lack.kind == WAY and not lack.fits for lack in lacks(found, motion, climber))
+    found = with_scrub(found, columns, climber, slips)
     found = replace(found, lacks=tuple(lacks(found, motion, climber)))
     return replace(found, reasons=reasons(found, motion, climber, cut))
 

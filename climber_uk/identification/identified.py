@@ -117,6 +117,7 @@ class Identified:
     left_out: int = 0  # windows that fit much worse than the others
     late: tuple[float, float] = IN_TIME  # [s] delay and lag of the torques beyond what is assumed
     has_effective_track: bool = False  # of wheels that scrub, or may
+    slips: bool = False  # whether its wheels slip along their way: their angles show no radius
     lacks: Sequence[Lack] = ()  # the test of fit, by kind of equation
     reasons: Mapping[str, Reason] = field(default_factory=dict)  # by name, of undetermined ones
 
@@ -155,8 +156,8 @@ class Identified:
     @property
     def tells_effective_track(self) -> bool:
         """Whether wheel angles tell a half track well, but that of wheels that scrub."""
-        is_well_told = bool(self.uncertainty[-1] <= KNOWN) and "wheel_radius" not in self.reasons
-        return self.has_effective_track and is_well_told
+        is_odometrys = "wheel_radius" in self.reasons and not self.slips
+        return self.has_effective_track and self.uncertainty[-1] <= KNOWN and not is_odometrys
 
     @property
     def uncertainty(self) -> Array:

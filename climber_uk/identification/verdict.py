@@ -121,6 +121,11 @@ def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
         scrub = "wheels scrub" if found.is_clear("turning_friction") else "wheels may scrub"
         words = f"{scrub}: their angles show an effective one of {found['half_track']:.4g} m"
         yield "half_track", Reason("absent", words)
+        if found.slips:
+            words = (
+                f"wheels slip: their angles show an effective one of {found['wheel_radius']:.4g} m"
+            )
+            yield "wheel_radius", Reason("absent", words)
 
 
 def _lumped(found: Identified) -> Iterator[tuple[str, Reason]]:

@@ -91,9 +91,10 @@ class UkTorqueController(ManagedNode):
 
         self.read_odometry = NumberReader(Odometry, *reading.ODOMETRY)
         self.read_reference = PreviewReader()
-        self.joints = self.names.wheels
-        zeros = self.joints.rates(0.0, 0.0)
-        torques = JointState(name=self.joints.all, velocity=zeros, effort=zeros)
+        joints = self.names.wheels
+        self.wheels = len(joints.left), len(joints.right)
+        zeros = joints.rates(0.0, 0.0)
+        torques = JointState(name=joints.all, velocity=zeros, effort=zeros)
         self.torques = Output(self.publisher(JointState, TORQUES), torques, writing.WHEEL_COMMAND)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         zero, base_frame = (0.0, 0.0, 0.0), self.names.base_frame
@@ -263,17 +264,20 @@ class UkTorqueController(ManagedNode):
             self.positions[controller.mode].publish(stamp, *divmod(position, SECOND))
 
     def publish_torques(self, answer: Answer) -> None:
-        """Publish torques and speeds with the stamp of the odometry that they answer."""
-        right, left = answer.wheels
+        """Publish torques and speeds with the stamp of the odometry that they answer.
+
+        Wheels of a side share its torque, and turn at the same rate.
+        """
+        (right, left), (lefts, rights) = answer.wheels, self.wheels
         right_rate, left_rate = self.controller.law.climber.rim_rates(answer.speeds)
-        rates, torques = self.joints.rates(left_rate, right_rate), self.joints.torques(left, right)
+        rates = [left_rate] * lefts + [right_rate] * rights
+        torques = [left / lefts] * lefts + [right / rights] * rights
         self.torques.publish(answer.stamp, rates, torques)
         if self.options.publish_cmd_vel:
             self.twist.publish(answer.stamp, *answer.speeds)
         if self.options.effort_commands:
-            count = len(self.joints.left)
             is_left_first = self.options.effort_order == "left_right"
-            ordered = torques if is_left_first else torques[count:] + torques[:count]
+            ordered = torques if is_left_first else torques[lefts:] + torques[:lefts]
             self.efforts.publish(Float64MultiArray(data=ordered))
 
     def publish_causes(self, stamp: int, command: Command, motion: Motion) -> None:

@@ -46,6 +46,7 @@ def moved(
     scrub=0.0,
     lacking=(0.0, 0.0),
     effective=1.0,
+    rolls=1.0,
 ):
     """Motion as (11) and (15) have it, written out; `noise` in mm, mrad, cm/s and crad/s.
 
@@ -70,7 +71,7 @@ def moved(
         pressure=np.full(len(TIME), true.suction_pressure),
         stretch=np.zeros(len(TIME), int),
         wheel_angles=since_start(
-            np.column_stack([v + effective * d * omega, v - effective * d * omega]) / r
+            np.column_stack([rolls * v + side * effective * d * omega for side in (1, -1)]) / r
         )
         if wheels
         else None,
@@ -393,6 +394,22 @@ def test_wheels_that_scrub_tell_an_effective_half_track_and_not_where_they_are(e
     assert f"an effective one of {0.3 * effective:.3g}"[:-1] in said_of(found) + str(found.reasons)
     assert not wrong(found, turning_friction=30.0)
     assert ("yaw_inertia" in found.reasons) == (effective > 1.1)
+
+
+def test_wheels_that_slip_along_their_way_leave_mass_and_friction_as_they_are():
+    """As those that scrub do: the radius that their angles show is none."""
+    _, omega, _ = WINDING
+    rolls = 1 + 0.1 * np.abs(omega) / np.abs(omega).max()
+    believed = replace(BELIEVED, wheel_radius=TRUE.wheel_radius)
+    motion = moved(scrub=30.0, effective=1.2, rolls=rolls, noise=1.0, wheels=True)
+    found = identify(motion, believed)
+    assert {"wheel_radius", "half_track"} <= set(found.reasons)
+    assert "wheels slip: their angles show an effective one" in table(found, believed)
+    assert found["mass"] == pytest.approx(6.5, rel=0.002)
+    assert not wrong(found, turning_friction=30.0)
+    plant = changes(found, believed)["plant_simulator"]
+    assert not {"wheel_radius", "half_track"} & set(plant)
+    assert plant["effective_half_track"] == pytest.approx(0.3 * 1.2, rel=0.01)
 
 
 def test_odometry_that_is_made_of_the_wheels_does_not_measure_them():
