@@ -162,6 +162,11 @@ ROWS = {
     "fixes of 25 mm at 1 Hz, 100 ms late": Case(fixes=FixErrors(1.0, 0.1, 0.025)),
     "no fixes from 20 to 50 s": Case(gap=(20.0, 50.0)),
     "no fixes at all, 1 % creep": Case(fixes=NO_FIXES, creep=0.01),
+    "no fixes, 1 % creep, known from a bag": Case(
+        fixes=NO_FIXES,
+        creep=0.01,
+        options=replace(FILTER, initial_creep=0.01, creep_deviation=0.002),
+    ),
     "5 % of fixes off by 3 m": Case(fixes=replace(FIXES, outlier_share=0.05)),
     "fixes off by 0.5 m from 25 s on": Case(moved=(25.0, 0.5)),
     "IMU off by 0.02 g forwards": Case(imu=replace(IMU, forward_bias=0.2)),

@@ -160,6 +160,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="runs of each row (default: 5)")
+    parser.add_argument("--duration", type=float, default=57.0, help="[s] (default: 57)")
     options = parser.parse_args()
     print(f"{'':<44}{'mm rms':>8}{'at end':>8}{'deg rms':>9}")
     for name, fixes, creep in (
@@ -167,7 +168,7 @@ def main() -> None:
         ("fixes of 25 mm at 1 Hz", replace(FIXES, period=1.0), 0.03),
         ("no fixes, 1 % creep", NO_FIXES, 0.01),
     ):
-        case = Case(believes_truth=True, fixes=fixes, creep=creep)
+        case = Case(believes_truth=True, fixes=fixes, creep=creep, duration=options.duration)
         loops = [Loop(case, seed) for seed in range(options.seeds)]
         for loop in loops:
             loop.localizer = Others(loop)  # type: ignore[assignment]

@@ -41,7 +41,8 @@ class Estimate:
         deviations[HEADING], deviations[BIAS] = o.initial_heading_deviation, o.gyro_bias_deviation
         deviations[SCALE], deviations[CREEP] = o.scale_deviation, o.creep_deviation
         deviations[models.FORCE_BIASES] = o.acceleration_bias_deviation
-        mean = np.array([o.initial_x, o.initial_y, o.initial_heading, *[0.0] * 5])
+        pose = o.initial_x, o.initial_y, o.initial_heading
+        mean = np.array([*pose, 0.0, 0.0, o.initial_creep, 0.0, 0.0])
         return cls(mean, np.diag(deviations**2))
 
     def with_heading(self, heading: float, deviation: float, along_wall: float) -> "Estimate":

@@ -54,6 +54,13 @@ class LocalizationOptions:
     )
     initial_x: float = parameter(0.0, "m", "x at the start")
     initial_y: float = parameter(0.0, "m", "y at the start")
+    initial_creep: float = parameter(
+        0.0,
+        "",
+        "creep at the start, as `localize` has told of an earlier run",
+        at_least=-1,
+        at_most=1,
+    )
     initial_heading: float = parameter(0.0, "rad", "heading at the start")
     initial_position_deviation: float = parameter(
         0.01, "m", "of both; above initial_position_limit: a fix is waited for", above=0

@@ -126,3 +126,9 @@ def test_the_scale_error_forgets_in_its_time_and_keeps_its_deviation():
         estimate = predicted(estimate, Travel(0.01, 0.0, 0.0, 0.0, True), UPRIGHT)
     assert estimate.mean[SCALE] == pytest.approx(0.02 / math.e, rel=1e-6)
     assert estimate.deviation(SCALE) == pytest.approx(UPRIGHT.scale_deviation, rel=1e-3)
+
+
+def test_what_an_earlier_run_has_told_of_creep_is_where_it_starts():
+    start = Estimate.start(LocalizationOptions(initial_creep=0.03, creep_deviation=0.002))
+    assert start.mean[models.CREEP] == 0.03
+    assert start.deviation(models.CREEP) == 0.002

@@ -93,7 +93,7 @@ def test_each_message_of_the_encoders_is_answered_with_a_heading_that_nobody_tol
     covariance = np.array(odometry.pose.covariance).reshape(6, 6)
     assert (np.linalg.eigvalsh(covariance) > 0).all()
     assert covariance[0, 0] == pytest.approx(0.01**2, rel=0.01)
-    assert 1e-5 < math.sqrt(covariance[5, 5]) < 0.01
+    assert math.sqrt(covariance[5, 5]) == pytest.approx(0.1 / 9.81, rel=0.02)  # by biases
     assert (np.diagonal(np.array(odometry.twist.covariance).reshape(6, 6)) > 0).all()
     stamps = [stamp_of(message) for message in told.odometry]
     assert np.diff(stamps[-50:]).tolist() == [STEP] * 49
