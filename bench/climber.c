@@ -9,13 +9,13 @@ typedef struct { double x, y, heading, cosine, sine, speed, yaw_rate; } Motion;
 typedef struct { double drive, turn; } Wrench;
 typedef struct { double x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, j_y; } Target;
 typedef struct { double mass, inertia, radius, half_track, friction, weight, limit; } Climber;
-typedef struct { double k_x, k_y, rate, omega_n, v_s, share, v_c, radius, turn_rate; } Gains;
+typedef struct { double omega, damping, omega_n, k_y, v_s, share, v_c, radius, turn_rate; } Gains;
 typedef struct { Climber climber; Gains gains; double friction_speed, bandwidth; } Law;
 typedef struct { double force, turn, force_1, turn_1, friction; } Learnt;
 typedef struct { Motion motion; Wrench held; Learnt learnt; double learning, direction; } Memory;
 typedef struct {
   double x, y, heading, c, s, v, v_1, omega, omega_1;
-  double wait, wait_1, hurry, hurry_1, turn, turn_1, g, g_1, g_2;
+  double wait, hurry, turn, g, g_1, g_2;
 } Track;
 
 #define SLOW 0.01
@@ -61,11 +61,8 @@ static Track track(const Gains *k, const Target *t) {
   int below = more < k->v_c;
   double hurry = sqrt(fade / 4 + (below ? more * more : k->v_c * k->v_c));
   double turn = root / k->radius;
-  int slower = turn < k->turn_rate;
   Track found = {t->x, t->y, t->heading, c, s, v, v_1, t->omega, t->omega_1,
-                 wait, v * v_1 / wait,
-                 hurry, below ? k->share * k->share * v * v_1 / hurry : 0,
-                 slower ? turn : k->turn_rate, slower ? v * v_1 / (root * k->radius) : 0,
+                 wait, hurry, fmin(turn, k->turn_rate),
                  k->k_y * v / root, k->k_y * g_1,
                  k->k_y * (slope * v_2 - 3 * g_1 * v * v_1 / square)};
   return found;
@@ -79,19 +76,16 @@ INLINE void demand(const Gains *k, const Track *t, Motion m, double *v_1, double
   double v_x = m.speed * (m.cosine * t->c + m.sine * t->s);
   double sine_e = m.sine * t->c - m.cosine * t->s, omega = m.yaw_rate - t->omega;
   double e_x1 = v_x - t->v + t->omega * e_y, e_y1 = m.speed * sine_e - t->omega * e_x;
-  int ahead = e_x * t->v > 0;
-  double most = ahead ? t->wait : t->hurry, most_1 = ahead ? t->wait_1 : t->hurry_1;
-  double u = k->k_x * e_x / most, part = tanh(u), inside = 1 - part * part;
-  double v = t->v - most * part;
-  *v_1 = t->v_1 - (k->k_x * inside * e_x1 + (part - u * inside) * most_1) - k->rate * (m.speed - v);
+  double most = e_x * t->v > 0 ? t->wait : t->hurry;
+  double v = t->v - most * tanh(k->omega / k->damping * e_x / most);
+  *v_1 = t->v_1 - k->damping * k->omega * (m.speed - v);
   double e_y2 = *v_1 * sine_e + v_x * omega - t->omega_1 * e_x - t->omega * e_x1;
   double w = t->g * e_y, w_1 = t->g_1 * e_y + t->g * e_y1;
   double w_2 = t->g_2 * e_y + 2 * t->g_1 * e_y1 + t->g * e_y2;
   double slope = 1 / (1 + w * w), steered = slope * w_1, led = turned + atan(w);
   double led_1 = omega + steered, led_2 = slope * w_2 - 2 * w * steered * steered;
-  u = k->omega_n * led / t->turn, part = tanh(u), inside = 1 - part * part;
-  *turning = t->omega_1 - led_2 - k->omega_n * (inside * led_1 + led_1 + t->turn * part) -
-             t->turn_1 * (part - u * inside);
+  double rate = led_1 + t->turn * tanh(k->omega_n / k->damping * led / t->turn);
+  *turning = t->omega_1 - led_2 - k->damping * k->omega_n * rate;
   *wanted = v * t->v < 0 ? 0 : v;
 }
 

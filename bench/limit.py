@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from climber_uk.control.control_law import ControlLaw
-from climber_uk.control.guidance import Guidance
+from climber_uk.control.guidance import HEADING_SHARE, Guidance
 from climber_uk.control.model import Observer
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
@@ -52,8 +52,8 @@ def law_numbers(law: ControlLaw, observer: Observer) -> Array:
     gains = law.constraints
     assert isinstance(gains, Guidance)
     numbers = (
-        *(gains.along_track_gain, gains.cross_track_gain, gains.speed_rate),
-        *(gains.heading_frequency, gains.fade_speed, gains.catch_up_share, gains.catch_up_speed),
+        *(gains.frequency, 2 * gains.damping, HEADING_SHARE * gains.frequency),
+        *(gains.cross_track_gain, gains.fade_speed, gains.catch_up_share, gains.catch_up_speed),
         *(gains.turn_radius, gains.turn_rate, law.options.friction_speed, observer.bandwidth),
     )
     return np.concatenate([climber_numbers(law.climber, 1)[:, 0], numbers])

@@ -20,7 +20,7 @@ from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.guard import UNGUARDED
-from climber_uk.control.guidance import Guidance
+from climber_uk.control.guidance import HEADING_SHARE, Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.mechanics import Array
@@ -48,10 +48,13 @@ class Channel:
     @classmethod
     def both(cls, gains: Guidance, speed: float) -> "tuple[Channel, Channel]":
         """Of the guidance, along a line."""
-        k_x, rate, omega_n = gains.along_track_gain, gains.speed_rate, gains.heading_frequency
+        omega, damping = gains.frequency, 2 * gains.damping
+        omega_n = HEADING_SHARE * omega
         g = gains.cross_track_gain * speed / np.hypot(speed, gains.fade_speed)
-        turn = [omega_n**2 * g, omega_n**2 + 2 * omega_n * g * speed, 2 * omega_n + g * speed]
-        return cls(0.0, np.array([0.0, k_x * rate, k_x + rate])), cls(speed, np.array(turn))
+        turn = [omega_n**2 * g, omega_n**2 + damping * omega_n * g * speed]
+        turn += [damping * omega_n + g * speed]
+        drive = [0.0, omega**2, damping * omega]
+        return cls(0.0, np.array(drive)), cls(speed, np.array(turn))
 
     def over(self, time: float, lag: float = 0.0) -> tuple[Array, Array]:
         """Matrix (n, n) and input (n,) of `time` [s], with the motor's torque where it lags."""

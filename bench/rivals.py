@@ -12,7 +12,7 @@ from scipy.linalg import solve_continuous_are
 
 from climber_uk.control.control_law import Command, ForceLaw
 from climber_uk.control.controller import Controller
-from climber_uk.control.guidance import Guidance
+from climber_uk.control.guidance import HEADING_SHARE, Guidance
 from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import Array
@@ -249,6 +249,7 @@ def constraint_errors(
     g = gains.cross_track_gain * target.speed / np.hypot(target.speed, gains.fade_speed)
     w = g * e_y
     w_1 = g * (motion.speed * sin(turned) - target.yaw_rate * e_x)
-    heading = turning + w_1 / (1 + w**2) + gains.heading_frequency * (turned + arctan(w))
+    rate = HEADING_SHARE * gains.frequency / (2 * gains.damping)
+    heading = turning + w_1 / (1 + w**2) + rate * (turned + arctan(w))
     _, _, wanted, _ = gains.desired_acceleration(gains.prepare(target), motion)
     return motion.speed - float(wanted), float(heading)

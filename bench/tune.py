@@ -69,7 +69,7 @@ def missed(make: Make, scenario: Scenario, link: Link) -> float:
 def ours_by(gains: list[float]) -> Make:
     """Ours, with one set of gains."""
     *guidance, bandwidth = gains
-    names = "along_track_gain", "cross_track_gain", "speed_rate", "heading_frequency"
+    names = "frequency", "damping", "cross_track_gain"
     tuned = Guidance(**dict(zip(names, guidance, strict=True)))
     observer = Observer(bandwidth=bandwidth)
     return lambda climber, _=None, delay=0.0: ours(climber, tuned, delay, observer)
@@ -90,10 +90,9 @@ BY: dict[str, tuple[Callable[[list[float]], Make], tuple[float, ...]]] = {
     "ours": (
         ours_by,
         (
-            DEFAULTS.along_track_gain,
+            DEFAULTS.frequency,
+            DEFAULTS.damping,
             DEFAULTS.cross_track_gain,
-            DEFAULTS.speed_rate,
-            DEFAULTS.heading_frequency,
             Observer().bandwidth,
         ),
     ),

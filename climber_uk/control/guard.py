@@ -57,7 +57,7 @@ class GuardOptions:
     attempts: int = parameter(
         3, "", "faults within `memory`, after which ~/enable is waited for", at_least=1
     )
-    memory: float = parameter(20.0, "s", "for which a fault counts", above=0)
+    memory: float = parameter(30.0, "s", "for which a fault counts", above=0)
 
 
 UNGUARDED = GuardOptions(

@@ -1,9 +1,10 @@
 """The guidance law: v̇ and θ̈ that lead speed and heading back to the reference.
 
     wanted = v_d - L tanh(k_x e_x / L)                        the speed that leads back
-    d/dt (v - wanted) = -λ (v - wanted)                       gives v̇
+    v̇ = v̇_d - 2 ζ ω (v - wanted),  k_x = ω / 2ζ               ë_x + 2 ζ ω ė_x + ω² e_x = 0, nearby
     ψ = θ - θ_d + atan(g e_y),  g = k_y v_d / √(v_d² + v_s²)  0 for the heading that leads back
-    s = ψ̇ + R tanh(ω_n ψ / R),  ṡ = -ω_n s                    gives θ̈
+    s = ψ̇ + R tanh(k_ψ ψ / R),  k_ψ = ω_n / 2ζ                the rate of turning off the one wanted
+    ψ̈ = -2 ζ ω_n s,  ω_n = 2/3 ω                              gives θ̈
 
 Derived line by line in docs/theory.md, §5; the gains are fields of `Guidance`. A number that ends a
 name is a derivative by time: `v_1` is v̇, `e_x1` is ė_x (§1.3). Errors and their rates are in the
@@ -17,7 +18,6 @@ from climber_uk.mechanics.elementary import (
     arctan,
     clipped,
     cos,
-    either,
     select,
     sin,
     sqrt,
@@ -26,6 +26,9 @@ from climber_uk.mechanics.elementary import (
 )
 from climber_uk.mechanics.quantities import DesiredAcceleration, Motion, ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
+
+HEADING_SHARE = 2 / 3  # of the frequency: what the heading leads back is one integral away
+COMES = 2e-3  # [m/s] of a reference, from which on it comes without a doubt
 
 
 class PreparedTarget(NamedTuple):
@@ -40,34 +43,34 @@ class PreparedTarget(NamedTuple):
     acceleration: Any  # v̇_d [m/s²]
     yaw_rate: Any  # ω_d [rad/s]
     yaw_acceleration: Any  # ω̇_d [rad/s²]
-    slow_down: tuple[Any, Any]  # L, and L̇, of a climber ahead: most by which it slows down [m/s]
-    catch_up: tuple[Any, Any]  # L, and L̇, of one behind: most by which it is faster [m/s]
-    turn_rate: tuple[Any, Any]  # R [rad/s], and Ṙ
+    slow_down: Any  # L of a climber ahead: most by which it slows down [m/s]
+    catch_up: Any  # L of one behind: most by which it is faster [m/s]
+    turn_rate: Any  # R [rad/s]
     gain: tuple[Any, Any, Any]  # g [1/m], ġ and g̈
-
-
-COMES = 2e-3  # [m/s] of a reference, from which on it comes without a doubt
 
 
 @parameters(slots=True)
 class Guidance:
     """Speed and heading that lead back to the reference; never singular, and so good at rest.
 
-    v = v_d - L tanh(k_x e_x / L), first order with rate λ;  ψ = θ - θ_d + atan(g e_y) to 0 by
-    ψ̇ = -R tanh(ω_n ψ / R), that with rate ω_n: critically damped, and never faster than R;
-    g = k_y v_d / √(v_d² + v_s²) fades where steering cannot help and changes sign in reverse gear.
-    With the no-slip row, A is orthonormal.
+    Near the reference the error along the track and ψ = θ - θ_d + atan(g e_y) are oscillators with
+    the damping ζ: the former with ω = `frequency`, ψ with 2/3 of it, as it is ψ that leads the
+    error across the track back, at g v. g = k_y v_d / √(v_d² + v_s²) fades where steering cannot
+    help and changes sign in reverse gear. With the no-slip row, A is orthonormal.
 
     L bounds how much the speed differs from the reference's. Behind it, L = √(v_s²/4 + (c v_d)²),
     where c v_d is at most v_c. Ahead of it, L = √(v_d² + v_s²/4): a climber slows down and waits
-    for its reference, for driving backwards it would steer away. R = √(v_d² + v_s²) / ρ, at most
-    `turn_rate`.
+    for its reference, for driving backwards it would steer away. R bounds how fast it turns back:
+    R = √(v_d² + v_s²) / ρ, at most `turn_rate`.
     """
 
-    along_track_gain: float = parameter(5.0, "1/s", "k_x", above=0, runtime=True)
-    cross_track_gain: float = parameter(1.0, "1/m", "k_y", at_least=0, runtime=True)
-    speed_rate: float = parameter(10.0, "1/s", "λ of the speed", above=0, runtime=True)
-    heading_frequency: float = parameter(12.0, "rad/s", "ω_n of the heading", above=0, runtime=True)
+    frequency: float = parameter(
+        18.0, "rad/s", "ω, how fast errors vanish; of the heading 2/3 of it", above=0, runtime=True
+    )
+    damping: float = parameter(
+        0.7, "", "ζ; 1: no overshoot, lower: faster", above=0.5, at_most=2, runtime=True
+    )
+    cross_track_gain: float = parameter(1.2, "1/m", "k_y", at_least=0, runtime=True)
     fade_speed: float = parameter(1.0, "m/s", "v_s, below which k_y fades", above=0, runtime=True)
     catch_up_share: float = parameter(
         0.25, "", "c, share of its speed that is added behind the reference", above=0, runtime=True
@@ -92,7 +95,7 @@ class Guidance:
         return speed + hurry, yaw_rate + return_rate + steering
 
     def prepare(self, target: ReferencePoint) -> PreparedTarget:
-        """Prepare a reference, given in the wall's frame to the jerk: L, R and g with their rates.
+        """Prepare a reference, given in the wall's frame to the jerk: L, R, and g with its rates.
 
         None of them depends on where the climber is: a controller that computes its answer twice,
         or for many climbers on one reference, prepares it once.
@@ -113,18 +116,13 @@ class Guidance:
         fade, slope = v / root, v_s2 / (root * root2)
         fade_1 = slope * v_1
         fade_2 = slope * v_2 - 3.0 * fade_1 * v * v_1 / root2
-        # ahead L = √(v_d² + v_s²/4), L̇ = v_d v̇_d / L; behind L = √(v_s²/4 + min(c |v_d|, v_c)²),
-        # L̇ = c² v_d v̇_d / L, or 0 at the ceiling v_c
-        slow = sqrt(v2 + 0.25 * v_s2)
-        slow_down = slow, v * v_1 / slow
+        # ahead L = √(v_d² + v_s²/4), behind L = √(v_s²/4 + min(c |v_d|, v_c)²)
+        slow_down = sqrt(v2 + 0.25 * v_s2)
         is_below_ceiling = c * abs(v) < self.catch_up_speed
-        fast = sqrt(0.25 * v_s2 + select(is_below_ceiling, c * c * v2, self.catch_up_speed**2))
-        catch_up = fast, select(is_below_ceiling, c * c * v * v_1 / fast, 0.0)
+        catch_up = sqrt(0.25 * v_s2 + select(is_below_ceiling, c * c * v2, self.catch_up_speed**2))
         # R = min(√(v_d² + v_s²)/ρ, R_max)
         tightest = root / self.turn_radius
-        is_slower = tightest < self.turn_rate
-        slower = tightest, v * v_1 / (root * self.turn_radius)
-        return_rate = either(is_slower, slower, (self.turn_rate, 0.0))
+        return_rate = select(tightest < self.turn_rate, tightest, self.turn_rate)
         gain = k_y * fade, k_y * fade_1, k_y * fade_2
         limits = slow_down, catch_up, return_rate
         return PreparedTarget(x, y, heading, cosine, sine, v, v_1, omega, omega_1, *limits, gain)
@@ -134,7 +132,7 @@ class Guidance:
         # unpacked by position: this runs twice for each odometry, and attributes would take longer
         x, y, heading, cosine, sine, v, omega = motion
         (x_d, y_d, heading_d, cosine_d, sine_d, v_d, v_d1, omega_d, omega_d1, slow_down, catch_up,
-         (R, R_1), (g, g_1, g_2)) = prepared  # fmt: skip
+         R, (g, g_1, g_2)) = prepared  # fmt: skip
         # errors, actual minus wanted (§5.1); Δ = heading_error:
         #   ė_x = v cosΔ - v_d + ω_d e_y,  ė_y = v sinΔ - ω_d e_x,  Δ̇ = yaw_rate_error = ω - ω_d
         offset_x, offset_y, heading_error = x - x_d, y - y_d, wrapped(heading - heading_d)
@@ -145,18 +143,11 @@ class Guidance:
         yaw_rate_error = omega - omega_d
         e_x1, e_y1 = v_along - v_d + omega_d * e_y, v_across - omega_d * e_x
 
-        # speed (§5.2), with u = k_x e_x / L, so that u̇ = k_x ė_x / L - u L̇ / L:
-        #   d/dt (L tanh u) = k_x (1 - tanh² u) ė_x + (tanh u - u (1 - tanh² u)) L̇
-        #   v̇ = v̇_d - d/dt (L tanh u) - λ (v - wanted)
-        is_ahead = e_x * v_d > 0.0
-        limit, limit_1 = either(is_ahead, slow_down, catch_up)
-        k_x = self.along_track_gain
-        u = k_x * e_x / limit
-        tanh_u = tanh(u)
-        sech2_u = 1.0 - tanh_u * tanh_u
-        wanted = v_d - limit * tanh_u
-        back_1 = k_x * sech2_u * e_x1 + (tanh_u - u * sech2_u) * limit_1
-        v_1 = v_d1 - back_1 - self.speed_rate * (v - wanted)
+        # speed (§5.2): v̇ = v̇_d - 2 ζ ω (v - wanted)
+        omega_x, damping = self.frequency, 2.0 * self.damping
+        limit = select(e_x * v_d > 0.0, slow_down, catch_up)
+        wanted = v_d - limit * tanh(omega_x / damping * e_x / limit)
+        v_1 = v_d1 - damping * omega_x * (v - wanted)
 
         # heading (§5.3), with w = g e_y:
         #   ë_y = v̇ sinΔ + v cosΔ Δ̇ - ω̇_d e_x - ω_d ė_x
@@ -171,15 +162,10 @@ class Guidance:
         # what of ψ̈ = θ̈ - ω̇_d + … is not θ̈ - ω̇_d
         psi_2 = slope * w_2 - 2.0 * w * steered_1 * steered_1
 
-        # ṡ = -ω_n s, with u = ω_n ψ / R:
-        #   ψ̈ + ω_n (1 - tanh² u) ψ̇ + (tanh u - u (1 - tanh² u)) Ṙ = -ω_n s,  solved for θ̈
-        omega_n = self.heading_frequency
-        u = omega_n * psi / R
-        tanh_u = tanh(u)
-        sech2_u = 1.0 - tanh_u * tanh_u
-        s = psi_1 + R * tanh_u  # s: 0 when it turns back as fast as it should
-        theta_2 = omega_d1 - psi_2 - omega_n * (sech2_u * psi_1 + s)
-        theta_2 = theta_2 - R_1 * (tanh_u - u * sech2_u)
+        # s: 0 when it turns back as fast as it should; ψ̈ = -2 ζ ω_n s, solved for θ̈
+        omega_n = HEADING_SHARE * omega_x
+        s = psi_1 + R * tanh(omega_n / damping * psi / R)
+        theta_2 = omega_d1 - psi_2 - damping * omega_n * s
         # ahead of a reference that comes it waits, and overcomes no friction to go back; gradually,
         # for the sign of the speed of a reference at rest is but rounding
         fade = clipped(1.0 - abs(v_d) / COMES, 0.0, 1.0)

@@ -138,9 +138,9 @@ class Observer:
 
     With measured speeds it is a momentum observer of second order: a disturbance that grows
     steadily leaves no error. Both poles are at K, or lower: K (2 T + δ) <= `MOST_LEARNT`, with T
-    the period and δ the delay that is known. Without measured speeds it is a critically damped
-    filter of poses (fading memory of third order, or of second order if K = 0). What stiction
-    balances is not learnt: the model expects no motion.
+    the period and δ the delay that is known. Without measured speeds it is a filter of poses with
+    two poles at `pose_bandwidth`, and one at K/2. What stiction balances is not learnt: the model
+    expects no motion.
     """
 
     bandwidth: float = parameter(
@@ -232,12 +232,14 @@ class Observer:
         beside = (measured.y - y) * cosine - (measured.x - x) * sine
         heading_change = wrapped(measured.heading - heading)
 
+        # two poles of the filter, and one of the disturbance, which as the observer's two is 2 / K
+        # late; 1 if there is none, so that k = 0
         memory = exp(-self.pose_bandwidth * time)
-        new, learns = 1 - memory, self.bandwidth > 0
-        g = select(learns, 1 - memory**3, 1 - memory**2)
-        h = select(learns, 1.5 * (1 - memory**2) * new, new**2)
-        k = select(learns, new**3, 0.0)
-        learnt = chosen(learns, learnt, _faded(learnt, time))
+        slow = exp(-0.5 * self.bandwidth * time)
+        new = 1 - memory
+        g, k = 1 - memory * memory * slow, new * new * (1 - slow)
+        h = 3 - g - 0.5 * k - 2 * memory - slow
+        learnt = chosen(self.bandwidth > 0, learnt, _faded(learnt, time))
         x, y = x + g * (ahead * cosine - beside * sine), y + g * (ahead * sine + beside * cosine)
         v, omega = v + h / time * ahead, omega + h / time * heading_change
         motion = Motion(x, y, *rotated(heading, cosine, sine, g * heading_change), v, omega)

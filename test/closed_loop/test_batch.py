@@ -61,7 +61,7 @@ CASES = {
         EIGHT,
         ON_EIGHT,
         replace(BUILT, mass=around(5.0), seal_friction_coefficient=around(0.6)),
-        replace(SLOW, along_track_gain=around(5.0)),
+        replace(SLOW, frequency=around(12.0)),
         {},
         2,
         0,

@@ -78,13 +78,12 @@ def test_at_rest_the_sign_of_the_references_speed_changes_nothing(ahead):
 
 @settings(deadline=None)
 @given(cases)
-def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
+def test_guidance_makes_speed_and_heading_errors_decay_as_it_says(case):
     trajectory, time, *_ = case
     gains = Guidance(
-        along_track_gain=2.0,
+        frequency=6.0,
+        damping=0.8,
         cross_track_gain=1.3,
-        speed_rate=7.0,
-        heading_frequency=6.0,
         fade_speed=0.4,
         catch_up_share=0.8,
         catch_up_speed=1.5,
@@ -104,25 +103,21 @@ def test_guidance_makes_speed_and_heading_errors_decay_at_their_rates(case):
         most = np.hypot(0.2, min(0.8 * abs(v_d), 1.5))
         if e_x * v_d > 0:
             most = np.hypot(v_d, 0.2)
-        return state.forward_speed - v_d + most * np.tanh(2.0 * e_x / most)
+        return state.forward_speed - v_d + most * np.tanh(6.0 / 1.6 * e_x / most)
 
     def heading_error(state, time):
         reference = trajectory.at(time)
         _, e_y, turned = tracking_error(state.pose, reference)
         return turned + np.arctan(1.3 * reference.speed / np.hypot(reference.speed, 0.4) * e_y)
 
-    value, rate, _ = differences(speed_error, state, demand, time)
-    assert rate == pytest.approx(-7.0 * value, abs=1e-5 * (1 + abs(value)))
-
-    def fastest_turn(_, time):
-        return min(np.hypot(trajectory.at(time).speed, 0.4) / 0.5, 3.0)
+    reference_rate = differences(lambda _, time: trajectory.at(time).speed, state, demand, time)[1]
+    value, _, _ = differences(speed_error, state, demand, time)
+    expected = reference_rate - 2 * 0.8 * 6.0 * value
+    assert demand.forward == pytest.approx(expected, abs=1e-5 * (1 + abs(expected)))
 
     value, rate, second = differences(heading_error, state, demand, time)
-    fastest, fastest_rate, _ = differences(fastest_turn, state, demand, time)
-    u = 6.0 * value / fastest
-    part = np.tanh(u)
-    wanted_rate = (1 - part**2) * (6.0 * rate - u * fastest_rate) + fastest_rate * part
-    expected = -wanted_rate - 6.0 * (rate + fastest * part)
+    fastest = min(np.hypot(speed, 0.4) / 0.5, 3.0)
+    expected = -2 * 0.8 * 4.0 * (rate + fastest * np.tanh(4.0 / 1.6 * value / fastest))
     assert second == pytest.approx(expected, abs=1e-4 * (1 + abs(second)))
 
 

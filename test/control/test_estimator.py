@@ -37,6 +37,7 @@ BUILT = Climber(
 )
 BUILT_GAINS = Guidance(cross_track_gain=3.0, fade_speed=0.1)
 FIXED_MODEL = Observer(bandwidth=0.0)
+GUIDANCE_STIFFNESS = Guidance().frequency ** 2
 GUIDANCE, LAW, OBSERVER, TIMING, PACING = (
     Guidance(),
     ControlOptions(),
@@ -80,7 +81,7 @@ def test_prediction_takes_the_error_of_holding_a_torque_away():
         )
         return run.rms(after=1.0)
 
-    assert error() < error(ControlOptions(predict=False)) / 50
+    assert error() < error(ControlOptions(predict=False)) / 40
     assert error(delay=0.005) < error(delay=0.005, known=False) / 50
 
 
@@ -98,7 +99,11 @@ def test_friction_that_is_not_known_is_learnt(share):
     assert lap(ours, other).rms(after=2.0) < 0.02e-3
     more = other.seal_friction - CLIMBER.seal_friction
     assert ours.estimator.disturbance[0] == pytest.approx(-more, abs=0.1)
-    assert lap(controller(observer=FIXED_MODEL), other).rms(after=2.0) > 0.1
+    off = (
+        abs(more) / CLIMBER.mass / GUIDANCE_STIFFNESS
+    )  # what holds against a force that is not known
+    unlearnt = lap(controller(observer=FIXED_MODEL), other).rms(after=2.0)
+    assert unlearnt == pytest.approx(off, rel=0.1)
 
 
 @pytest.mark.parametrize("pressure", [2000.0, np.array([2000.0, 7000.0])])
@@ -270,7 +275,7 @@ def test_stalled_it_waits_on_the_path_without_chatter():
 
 
 def test_gains_change_without_a_jump_of_the_torque():
-    before, after = Guidance(), Guidance(along_track_gain=6.0, heading_frequency=20.0)
+    before, after = Guidance(), Guidance(frequency=24.0, damping=0.8)
 
     def steps(change):
         ours = controller(constraints=before)
@@ -298,12 +303,12 @@ def retune(ours, constraints):
 
 
 def test_changed_gains_act_in_full_half_a_second_later():
-    ours, after = controller(), Guidance(along_track_gain=6.0)
+    ours, after = controller(), Guidance(frequency=24.0)
     ours.estimator.see(SECOND, START.motion)
     retune(ours, after)
-    assert ours.constraints.along_track_gain == 5.0
+    assert ours.constraints.frequency == 18.0
     ours.estimator.stamp += SECOND // 4
-    assert ours.constraints.along_track_gain == pytest.approx(5.5)
+    assert ours.constraints.frequency == pytest.approx(21.0)
     ours.estimator.stamp += SECOND // 4
     assert ours.constraints is after
 
@@ -318,9 +323,9 @@ class Named(Guidance):
 def test_what_is_no_gain_changes_at_once():
     ours = controller(constraints=Named())
     ours.estimator.see(SECOND, START.motion)
-    retune(ours, Named(along_track_gain=6.0, kind="fast"))
+    retune(ours, Named(frequency=24.0, kind="fast"))
     ours.estimator.stamp += SECOND // 4
-    assert ours.constraints == Named(along_track_gain=5.5, kind="fast")
+    assert ours.constraints == Named(frequency=21.0, kind="fast")
 
 
 def test_a_torque_limit_does_not_wind_the_observer_up():

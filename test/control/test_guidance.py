@@ -9,7 +9,7 @@ from climber_uk.control.guidance import Guidance
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.reference import Reference
 
-CLIMBER_YAML = Guidance(cross_track_gain=3.0, fade_speed=0.1)
+CLIMBER_YAML = Guidance(frequency=12.0, cross_track_gain=12.0, fade_speed=0.1)
 
 
 def steering(gains, v_d):
@@ -38,7 +38,7 @@ def wanted_speed(gains, v_d, e_x):
     half = gains.fade_speed / 2
     behind = np.minimum(gains.catch_up_share * np.abs(v_d), gains.catch_up_speed)
     limit = np.hypot(np.where(e_x * v_d > 0, v_d, behind), half)
-    return v_d - limit * np.tanh(gains.along_track_gain * e_x / limit)
+    return v_d - limit * np.tanh(gains.frequency / (2 * gains.damping) * e_x / limit)
 
 
 def approach(gains, v_d, e_x, e_y, omega_d):
@@ -66,9 +66,9 @@ def largest_approach(gains, slowest, fastest, radius, where=(-np.pi, np.pi)):
     ("gains", "slowest"),
     [
         (Guidance(), 1.0),
-        (Guidance(cross_track_gain=0.5), 1.0),  # k_y v_s / k_x = 0.1
-        (Guidance(cross_track_gain=3.0, fade_speed=0.2), 1.0),
-        (CLIMBER_YAML, 1.2),
+        (Guidance(frequency=12.0, damping=1.0, cross_track_gain=0.54), 1.0),  # k_y v_s / k_x = 0.09
+        (Guidance(cross_track_gain=3.3, fade_speed=0.2), 1.2),  # 0.051
+        (CLIMBER_YAML, 1.0),
     ],
 )
 def test_the_distance_shrinks_within_twice_the_look_ahead(gains, slowest):
@@ -80,7 +80,7 @@ def test_behind_a_reference_of_any_speed_it_does_so_with_any_gains(gains):
     assert largest_approach(gains, 0.05, 12.0, 2.0, (np.pi / 2, 3 * np.pi / 2)) < 0
 
 
-@pytest.mark.parametrize(("speed", "radius"), [(0.7, 1.4), (0.5, 0.7), (0.3, 0.32)])
+@pytest.mark.parametrize(("speed", "radius"), [(0.7, 0.85), (0.5, 0.45), (0.3, 0.21)])
 def test_ahead_of_a_slower_reference_the_disc_is_smaller(speed, radius):
     assert largest_approach(Guidance(), speed, speed, radius) < 0
     assert largest_approach(Guidance(), speed, speed, 1.1 * radius) > 0

@@ -58,7 +58,7 @@ def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, *
 def test_what_nobody_told_ends_in_no_limit_cycle(link, guidance):
     run, _ = drive(link, guidance)
     assert run.rms() < 2e-3
-    assert run.chatter() < 0.05
+    assert run.chatter(1.0) < 0.05  # before, friction is overcome in a step
 
 
 @pytest.mark.slow

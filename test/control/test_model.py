@@ -106,7 +106,7 @@ def test_without_a_twist_it_finds_friction_and_speeds_from_poses():
     observer = Observer(velocity_source="pose")
     wheels = believed.torques(30.0, 0.1)
     start = State(np.zeros(3), np.zeros(3))
-    state, seen, found = learn(observer, SLIPPERY, believed, start, wheels)
+    state, seen, found = learn(observer, SLIPPERY, believed, start, wheels, steps=300)
     less = believed.seal_friction - SLIPPERY.seal_friction
     assert found[0] == pytest.approx(less, abs=0.1)
     assert seen.speed == pytest.approx(state.forward_speed, abs=2e-3)
@@ -219,10 +219,12 @@ def test_many_that_stop_roll_as_each_of_them_does():
         assert (many.speed[i], many.x[i]) == pytest.approx((one.speed, one.x), abs=1e-15)
 
 
-@pytest.mark.parametrize(("bandwidth", "order"), [(14.0, 3), (0.0, 2)], ids=["learning", "off"])
+@pytest.mark.parametrize("bandwidth", [14.0, 0.0], ids=["learning", "off"])
 @pytest.mark.parametrize("part", ["speed", "yaw_rate"])
-def test_errors_of_the_pose_filter_decay_with_all_poles_at_one_place(bandwidth, order, part):
-    """With memory z = exp(-ω T): (1 - z B)ⁿ e = 0, where B takes the error of a period before."""
+def test_errors_of_the_pose_filter_decay_with_its_two_poles_and_that_of_the_disturbance(
+    bandwidth, part
+):
+    """With z = exp(-p T) of each: Π (1 - z B) e = 0, where B takes the error of a period before."""
     h, rubs_nothing = 0.005, Climber(seal_friction_coefficient=0.0, **FLOOR)
     observer = Observer(bandwidth=bandwidth, velocity_source="pose")
     turns = part == "yaw_rate"
@@ -235,7 +237,8 @@ def test_errors_of_the_pose_filter_decay_with_all_poles_at_one_place(bandwidth, 
         shares = observer.shares(h, delay=0.0)
         seen, learnt = observer.corrected(rubs_nothing, learnt, expected, true, h, shares)
         errors.append(getattr(seen, part) - getattr(true, part))
-    decays = np.poly([np.exp(-observer.pose_bandwidth * h)] * order)
+    poles = [observer.pose_bandwidth] * 2 + [bandwidth / 2] * (bandwidth > 0)
+    decays = np.poly(np.exp(-h * np.array(poles)))
     np.testing.assert_allclose(np.convolve(errors, decays, mode="valid"), 0, atol=1e-12)
     assert abs(errors[0]) > 0.01
 

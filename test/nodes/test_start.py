@@ -18,7 +18,7 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
         ("trajectory_publisher", ["time_law:=constant_rate", "shape:=line"], "'rest_to_rest'"),
         ("trajectory_publisher", ["preview:=0.1"], r"preview=0.1 must be >= 2 publish_period"),
         ("uk_torque_controller", ["mass:=-5.0"], "mass=-5.0 must be > 0 [kg]"),
-        ("uk_torque_controller", ["guidance.speed_rate:=0.0"], "guidance.speed_rate=0.0 must be"),
+        ("uk_torque_controller", ["guidance.frequency:=0.0"], "guidance.frequency=0.0 must be"),
         ("uk_torque_controller", ["mass:=five"], "mass='five' must be a finite number [kg]"),
         (
             "uk_torque_controller",

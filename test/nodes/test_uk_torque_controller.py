@@ -228,11 +228,11 @@ def test_a_reference_that_moves_sideways_is_refused_with_numbers_and_the_last_on
 
 def test_gains_change_while_running_but_not_geometry_and_not_beyond_bounds(world):
     world.start_node(NAME)
-    assert set_parameter(world, "guidance.speed_rate", 20.0).successful
-    assert set_parameter(world, "guidance.speed_rate", 20).successful
-    refused = set_parameter(world, "guidance.speed_rate", -1.0)
+    assert set_parameter(world, "guidance.frequency", 20.0).successful
+    assert set_parameter(world, "guidance.frequency", 20).successful
+    refused = set_parameter(world, "guidance.frequency", -1.0)
     assert not refused.successful
-    assert "speed_rate" in refused.reason
+    assert "frequency" in refused.reason
     assert not set_parameter(world, "wheel_radius", 0.05).successful
 
 
