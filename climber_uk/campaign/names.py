@@ -48,6 +48,7 @@ NODES_ONLY = {
         "stop_time",
         "reaction",
         "speed",
+        *(f"by_hand.{name}" for name in ("input", "speed", "yaw_rate", "ramp_time", "timeout")),
         "effort_commands",
         "effort_order",
         "publish_cmd_vel",

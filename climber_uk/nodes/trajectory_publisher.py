@@ -15,7 +15,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from climber_uk.mechanics import SECOND
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
@@ -33,9 +33,10 @@ from climber_uk.messages.topics import (
     private,
 )
 from climber_uk.parameters.declaration import parameter, parameters
+from climber_uk.planning.by_hand import ByHand, HandOptions
 from climber_uk.planning.course import Course, CourseOptions
 from climber_uk.planning.given_path import Manner
-from climber_uk.planning.progress import FOLLOWING, WAITING, Odometer, Progress, progress
+from climber_uk.planning.progress import BY_HAND, FOLLOWING, WAITING, Odometer, Progress, progress
 from climber_uk.ros.path_intake import PathIntake
 from climber_uk.ros.running import (
     BEST_EFFORT,
@@ -46,7 +47,9 @@ from climber_uk.ros.running import (
     Throttle,
     run,
 )
+from climber_uk.ros.stick import listen_to_stick
 
+PATH, HAND, BACK = "path", "by hand", "back on the path"  # what may begin
 STANDSTILL = 0.2  # [s] of wall-clock time without a change, after which a clock stands still
 ODOMETRY_AGE = 1.0  # [s] of an odometry, above which it does not start a trajectory
 PROGRESS_PERIOD = SECOND // 10  # [ns]
@@ -74,14 +77,18 @@ class TrajectoryPublisher(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__(PLANNER)
-        for kind, prefix in [*TYPES, (PublisherOptions, ""), (CourseOptions, "")]:
+        kinds = (PublisherOptions, ""), (CourseOptions, ""), (HandOptions, "by_hand.")
+        for kind, prefix in [*TYPES, *kinds]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(CourseOptions)
         self.planned = build_trajectory(self.parameters.read)
         self.planned_name = self.parameters.read(TrajectoryParameters).shape
         self.course: Course[Row] | None = None  # the one under way
-        self.waits_for_rest = False  # to start: the one under way comes to rest first
+        self.hand: ByHand[Row] | None = None  # while it is driven by hand, in the course's place
+        self.left = 0.0  # [s] own time of the course, when it was left to drive by hand
+        self.next = PATH  # what begins at the next odometry that is waited for
+        self.waits_for_rest = False  # until what is under way rests, for the next to begin
         self.is_paused, self.has_told_done = False, False
         self.followed: int | None = None  # [ns] how far a controller has come
         self.mode = ""  # what it does; empty: none tells
@@ -96,6 +103,7 @@ class TrajectoryPublisher(ClimberNode):
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.subscription(Float64, "~/speed", self.on_speed)
         self.given = PathIntake(self, GIVEN_PATH, self.manner)
+        listen_to_stick(self, self.parameters.read(HandOptions, "by_hand.").input, self.on_stick)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_service(SetBool, "~/pause", self.on_pause)
@@ -127,7 +135,7 @@ class TrajectoryPublisher(ClimberNode):
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/start: start from the beginning, at the next odometry."""
         self.is_paused = False
-        response.success, response.message = True, self.begin()
+        response.success, response.message = True, self.begin(PATH)
         return response
 
     def on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -152,7 +160,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def on_parameters(self) -> None:
         """Take up another speed."""
-        if self.course is not None:
+        if self.course is not None and self.hand is None:
             self.course.set_speed(self.speed, self.position)
 
     @property
@@ -165,6 +173,9 @@ class TrajectoryPublisher(ClimberNode):
         if self.course is None:
             return False, "not started"
         self.is_paused = True
+        if self.hand is not None:
+            self.hand.stop()
+            return self.said("brakes; a stick that is moved drives on")
         self.course.pause(self.position)
         return self.said(f"comes to rest within {self.course.ramp_time:.3g} s")
 
@@ -173,6 +184,10 @@ class TrajectoryPublisher(ClimberNode):
         if self.course is None:
             return False, "not started"
         self.is_paused = False
+        if self.hand is not None:
+            if direction < 0:
+                return False, "driven by hand: first back to the path, by ~/pause false"
+            return self.said(f"back to the path: {self.begin(BACK)}")
         if self.waits_for_rest and direction > 0:
             return True, self.begin()
         self.waits_for_rest = False
@@ -186,15 +201,32 @@ class TrajectoryPublisher(ClimberNode):
 
     # Beginning
 
-    def begin(self) -> str:
-        """Start what is planned at the next odometry, once the climber rests; say so."""
-        if self.course is not None and self.is_driven and not self.course.rests(self.position):
-            self.course.pause(self.position)
+    def begin(self, what: str = "") -> str:
+        """Begin something else at the next odometry, once the climber rests; say so."""
+        self.next = what or self.next
+        under_way = self.hand or self.course
+        if under_way is not None and self.is_driven and not under_way.rests(self.position):
+            if self.hand is not None:
+                self.hand.stop()
+            elif self.course is not None:
+                self.course.pause(self.position)
             self.waits_for_rest = True
             return "comes to rest, then starts"
         self.waits_for_rest = False
         self.wait_for_odometry()
         return "starts at the next odometry"
+
+    def on_stick(self, speed: float, yaw_rate: float) -> None:
+        """Drive by hand: at once if it is already, else once the climber rests."""
+        if self.hand is not None and not self.waits_for_rest:
+            try:
+                self.hand.command(speed, yaw_rate, self.get_clock().now().nanoseconds)
+            except ValueError as error:
+                self.report("stick", "refused", str(error))
+                return
+            self.report("stick", "")
+        elif (speed or yaw_rate) and self.next != HAND:
+            self.get_logger().info(f"by hand: {self.begin(HAND)}")
 
     @property
     def is_driven(self) -> bool:
@@ -212,7 +244,7 @@ class TrajectoryPublisher(ClimberNode):
             return
         now, stamp = self.get_clock().now().nanoseconds, reading.nanoseconds(message.header.stamp)
         try:
-            reading.state(message, self.names.odom_frame, self.names.base_frame)
+            state = reading.state(message, self.names.odom_frame, self.names.base_frame)
             if not self.reference.get_subscription_count():
                 self.report("start", "waits for a subscriber of reference", is_fault=False)
                 return
@@ -225,35 +257,48 @@ class TrajectoryPublisher(ClimberNode):
         self.destroy_subscription(self.odometry)
         self.odometry = None
         start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
-        make, options = writing.reference_numbers, self.options
-        self.course = Course(self.planned, start, options, make, self.is_paused, self.speed)
+        self.begin_at(start, state.pose)
         self.followed, self.mode, self.has_told_done = None, "", False
         self.last_look = now or stamp  # the odometry may have come before the first clock
         self.publish_around(start)
-        self.get_logger().info(f"{self.planned_name} starts at {start / SECOND:.3f} s")
+        about = self.planned_name if self.next == PATH else self.next
+        self.get_logger().info(f"{about} starts at {start / SECOND:.3f} s")
+        self.next = PATH
         self.publish_path(start)
+
+    def begin_at(self, start: int, pose: Array) -> None:
+        """Begin what is next at `start` [ns], of a climber that is at a `pose` (3,)."""
+        make, options, course = writing.reference_numbers, self.options, self.course
+        if self.next == HAND:
+            self.left = course.own_time(self.position)[0] if course is not None else 0.0
+            hand = self.parameters.read(HandOptions, "by_hand.")
+            self.hand = ByHand(pose, start, options, hand, make)
+            return
+        trajectory, begin = self.planned, 0.0
+        if self.next == BACK and course is not None:
+            trajectory, begin = course.trajectory, course.nearest(pose[:2], self.left)
+        self.hand = None
+        self.course = Course(trajectory, start, options, make, self.is_paused, self.speed, begin)
 
     def on_reference_time(self, message: TimeReference) -> None:
         """Keep how far a controller has come, unless that is of another trajectory."""
         followed = reading.nanoseconds(message.time_ref)
         stamp, now = reading.nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
         is_of_now = stamp < now + ODOMETRY_AGE * SECOND
-        if (
-            self.course is not None
-            and is_of_now
-            and self.course.start <= followed <= stamp + SECOND
-        ):
+        under_way = self.hand or self.course
+        if under_way and is_of_now and under_way.start <= followed <= stamp + SECOND:
             self.followed, self.mode = followed, message.source
 
     @property
     def position(self) -> int:
         """Stamp [ns] that the course has come to: the controller's, else the clock's."""
-        assert self.course is not None
+        under_way = self.hand or self.course
+        assert under_way is not None
         if self.followed is not None:
             return self.followed
         if self.count_publishers(REFERENCE_TIME):
-            return self.course.start
-        return max(self.course.start, self.get_clock().now().nanoseconds)
+            return under_way.start
+        return max(under_way.start, self.get_clock().now().nanoseconds)
 
     def publish_path(self, stamp: int) -> None:
         """Publish the whole path, for display."""
@@ -265,26 +310,30 @@ class TrajectoryPublisher(ClimberNode):
         now = self.get_clock().now().nanoseconds
         if 0 < now < self.last_look - CLOCK_STEP and self.course is not None:
             self.get_logger().warning("the clock went back: starts again at the next odometry")
-            self.course, self.waits_for_rest = None, False
+            self.course, self.hand, self.waits_for_rest = None, None, False
             self.wait_for_odometry()
         self.last_look = now
         given = self.given.ready()
         if given is not None:
             self.planned, described = given
             self.planned_name = "path"
-            begins = self.begin()
+            begins = self.begin(PATH)
             self.get_logger().info(f"path taken: {described}; {begins}")
-        if self.course is not None:
+        under_way = self.hand or self.course
+        if under_way is not None:
             position = self.position
             self.publish_around(position)
-            self.tell_done(self.course, position)
-            if self.waits_for_rest and (self.course.rests(position) or not self.is_driven):
+            self.tell_done(position)
+            if self.waits_for_rest and (under_way.rests(position) or not self.is_driven):
                 self.begin()
         if self.is_progress_due(now) and self.progress.get_subscription_count():
             self.publish_progress(now)
 
-    def tell_done(self, course: Course[Row], position: int) -> None:
+    def tell_done(self, position: int) -> None:
         """Log once that the course has come to its end."""
+        course = self.course
+        if self.hand is not None or course is None:
+            return
         is_done = course.is_done(position)
         if is_done and not self.has_told_done:
             where = "end" if course.direction > 0 else "beginning"
@@ -293,8 +342,8 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_progress(self, now: int) -> None:
         """Publish how far the course is."""
-        how_far = Progress(WAITING)
-        if self.course is not None:
+        how_far = Progress(WAITING if self.hand is None else BY_HAND)
+        if self.course is not None and self.hand is None:
             if self.odometer is None or self.odometer.trajectory is not self.course.trajectory:
                 self.odometer = Odometer(self.course.trajectory)
             how_far = progress(self.course, self.odometer, self.position, self.mode)
@@ -310,8 +359,10 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_around(self, position: int) -> None:
         """Publish the preview at `position` [ns], from a little before it to its end."""
-        assert self.course is not None
-        self.reference.publish(self.serialized(self.course.preview(position), self.course.start))
+        under_way = self.hand or self.course
+        assert under_way is not None
+        points = under_way.preview(position, self.get_clock().now().nanoseconds)
+        self.reference.publish(self.serialized(points, under_way.start))
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
@@ -125,3 +125,32 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.odometry[-1].pose.pose.position.x == pytest.approx(4.0, abs=0.01)
     assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
     assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01
+
+
+def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2"]
+    heading = ["initial_heading:=0.0"]
+    climb = Operated(world, {PLANNER: [*line, *by_hand], "plant_simulator": heading})
+    climb.drives(0.28, 0.31)
+    stick = world.speak(TwistStamped, "cmd_vel")
+    asked = TwistStamped()
+    asked.twist.linear.x, asked.twist.angular.z = 1.0, 0.3  # cut to 0.2
+
+    def drives_by_hand():
+        stick.publish(asked)
+        last = [m.twist.twist for m in climb.odometry[-60:]]
+        return all(
+            abs(twist.linear.x - 0.2) < 0.01 and abs(twist.angular.z - 0.3) < 0.02 for twist in last
+        )
+
+    world.wait(drives_by_hand, "a turn by hand")
+    climb.drives(-1e-3, 1e-3)  # the stick is silent
+    climb.is_told_to_be("by hand")
+    left = climb.odometry[-1].pose.pose.position
+    assert left.y > 3.02
+    assert "back to the path" in climb.pause(False).message
+    climb.is_told_to_be("following")
+    climb.is_told_to_be("done")
+    end = climb.odometry[-1].pose.pose.position
+    assert (end.x, end.y) == pytest.approx((4.0, 3.0), abs=0.01)
