@@ -57,6 +57,7 @@ setup(
                 "export_tum": "report.export_tum",
                 "reproduce_paper": "paper.reproduce_paper",
                 "campaign": "campaign.command",
+                "check_path": "path_check.check_path",
             }.items()
         ]
     },

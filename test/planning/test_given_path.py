@@ -60,7 +60,8 @@ class Sent(UnderWay):
         assert np.abs(self.sent[first:]).max() <= LIMIT
         assert np.abs(np.diff(self.sent[max(first - 1, 0) :], axis=0)).max() <= 0.2 + 1e-9
         speeds = np.array([abs(state.forward_speed) for state in self.states[first:]])
-        assert speeds[follows].max() <= 1.05 * RATE
+        # one that begins behind its reference may be a quarter faster: `guidance.catch_up_share`
+        assert speeds[follows].max() <= 1.26 * RATE
 
 
 def drive_at_random(random, number):
