@@ -31,6 +31,8 @@ setup(
         "fast": ["numba"],
         # the same on all of an accelerator, or faster on a CPU
         "accelerator": ["jax"],
+        # completion of the command `climber` in shells
+        "completion": ["argcomplete"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo", "coverage"],
     },
     zip_safe=False,
@@ -57,6 +59,7 @@ setup(
                 "export_tum": "report.export_tum",
                 "reproduce_paper": "paper.reproduce_paper",
                 "campaign": "campaign.command",
+                "climber": "operating.command",
                 "check_path": "path_check.check_path",
             }.items()
         ]

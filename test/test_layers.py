@@ -33,9 +33,10 @@ BELOW = {
     "driver_check": DATA | {"system", "ros"},
     "nodes": DATA | {"localization", "planning", "system", "ros"},
     "recording": {"system", "ros", "bags"},
+    "operating": DATA | {"system", "ros"},
     "demo": DATA | {"system", "ros"},
 }
-ROS_ALLOWED = {"ros", "nodes", "recording", "driver_check", "demo", "messages"}
+ROS_ALLOWED = {"ros", "nodes", "recording", "driver_check", "operating", "demo", "messages"}
 # what a node has no use for: importing it would make every start longer
 TOOLS = "closed_loop", "bags", "report", "identification", "campaign", "paper", "path_check"
 UNUSED = {
