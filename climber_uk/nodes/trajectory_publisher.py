@@ -15,7 +15,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
@@ -33,9 +33,10 @@ from climber_uk.messages.topics import (
     private,
 )
 from climber_uk.parameters.declaration import parameter, parameters
-from climber_uk.planning.by_hand import ByHand, HandOptions
-from climber_uk.planning.course import Course, CourseOptions
+from climber_uk.planning.by_hand import HandOptions
+from climber_uk.planning.course import CourseOptions
 from climber_uk.planning.given_path import Manner
+from climber_uk.planning.journey import BACK, HAND, PATH, Journey, Said
 from climber_uk.planning.progress import BY_HAND, FOLLOWING, WAITING, Odometer, Progress, progress
 from climber_uk.ros.path_intake import PathIntake
 from climber_uk.ros.running import (
@@ -49,7 +50,6 @@ from climber_uk.ros.running import (
 )
 from climber_uk.ros.stick import listen_to_stick
 
-PATH, HAND, BACK = "path", "by hand", "back on the path"  # what may begin
 STANDSTILL = 0.2  # [s] of wall-clock time without a change, after which a clock stands still
 ODOMETRY_AGE = 1.0  # [s] of an odometry, above which it does not start a trajectory
 PROGRESS_PERIOD = SECOND // 10  # [ns]
@@ -82,14 +82,12 @@ class TrajectoryPublisher(ClimberNode):
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(CourseOptions)
-        self.planned = build_trajectory(self.parameters.read)
-        self.planned_name = self.parameters.read(TrajectoryParameters).shape
-        self.course: Course[Row] | None = None  # the one under way
-        self.hand: ByHand[Row] | None = None  # while it is driven by hand, in the course's place
-        self.left = 0.0  # [s] own time of the course, when it was left to drive by hand
-        self.next = PATH  # what begins at the next odometry that is waited for
-        self.waits_for_rest = False  # until what is under way rests, for the next to begin
-        self.is_paused, self.has_told_done = False, False
+        self.shape = self.parameters.read(TrajectoryParameters).shape
+        hand = self.parameters.read(HandOptions, "by_hand.")
+        planned, make = build_trajectory(self.parameters.read), writing.reference_numbers
+        self.journey: Journey[Row] = Journey(planned, self.options, hand, make)
+        self.journey.speed = self.parameters.read(PublisherOptions).speed
+        self.has_told_done = False
         self.followed: int | None = None  # [ns] how far a controller has come
         self.mode = ""  # what it does; empty: none tells
         self.last_look = self.stood_at = 0  # [ns] of the clock
@@ -103,7 +101,7 @@ class TrajectoryPublisher(ClimberNode):
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.subscription(Float64, "~/speed", self.on_speed)
         self.given = PathIntake(self, GIVEN_PATH, self.manner)
-        listen_to_stick(self, self.parameters.read(HandOptions, "by_hand.").input, self.on_stick)
+        listen_to_stick(self, hand.input, self.on_stick)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_service(SetBool, "~/pause", self.on_pause)
@@ -117,9 +115,9 @@ class TrajectoryPublisher(ClimberNode):
 
     def summary(self) -> str:
         """Extremes of the trajectory, for the log."""
-        described = summary(self.planned)
+        described = summary(self.journey.planned)
         self.parameters.remarks += described.remarks
-        return f"{self.planned_name}, {described}"
+        return f"{self.shape}, {described}"
 
     def manner(self) -> Manner:
         """How a path is driven that comes from outside: as waypoints would be."""
@@ -127,30 +125,37 @@ class TrajectoryPublisher(ClimberNode):
         return Manner(
             rounding=self.parameters.read(Rounding, "waypoints."),
             law=self.parameters.read(TIME_LAWS[law], f"{law}."),
-            reverse_gear=self.planned.reverse_gear,
+            reverse_gear=self.journey.planned.reverse_gear,
         )
 
     # What an operator asks for
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/start: start from the beginning, at the next odometry."""
-        self.is_paused = False
+        self.journey.is_paused = False
         response.success, response.message = True, self.begin(PATH)
         return response
 
     def on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/stop: come to rest on the path, as ~/pause does."""
-        response.success, response.message = self.pause()
+        response.success, response.message = self.said(self.journey.pause(self.position))
         return response
 
     def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         """Service ~/pause: come to rest on the path (true), or go on along it (false)."""
-        response.success, response.message = self.pause() if request.data else self.go_on(1)
+        if request.data:
+            said = self.journey.pause(self.position)
+        elif self.journey.hand is not None:
+            self.journey.is_paused = False
+            said = True, f"back to the path: {self.begin(BACK)}"
+        else:
+            said = self.journey.go_on(self.position)
+        response.success, response.message = self.said(said)
         return response
 
     def on_retreat(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/retreat: go back along the path as it was driven, the heading kept."""
-        response.success, response.message = self.go_on(-1)
+        response.success, response.message = self.said(self.journey.retreat(self.position))
         return response
 
     def on_speed(self, message: Float64) -> None:
@@ -160,73 +165,33 @@ class TrajectoryPublisher(ClimberNode):
 
     def on_parameters(self) -> None:
         """Take up another speed."""
-        if self.course is not None and self.hand is None:
-            self.course.set_speed(self.speed, self.position)
-
-    @property
-    def speed(self) -> float:
-        """Share of the planned speed."""
-        return self.parameters.read(PublisherOptions).speed
-
-    def pause(self) -> tuple[bool, str]:
-        """Come to rest on the path; whether it does, and where."""
-        if self.course is None:
-            return False, "not started"
-        self.is_paused = True
-        if self.hand is not None:
-            self.hand.stop()
-            return self.said("brakes; a stick that is moved drives on")
-        self.course.pause(self.position)
-        return self.said(f"comes to rest within {self.course.ramp_time:.3g} s")
-
-    def go_on(self, direction: int) -> tuple[bool, str]:
-        """Go on along the path, or back (-1); whether it does."""
-        if self.course is None:
-            return False, "not started"
-        self.is_paused = False
-        if self.hand is not None:
-            if direction < 0:
-                return False, "driven by hand: first back to the path, by ~/pause false"
-            return self.said(f"back to the path: {self.begin(BACK)}")
-        if self.waits_for_rest and direction > 0:
-            return True, self.begin()
-        self.waits_for_rest = False
-        self.course.go_on(self.position, direction)
-        return self.said("goes on" if direction > 0 else "goes back along the path")
-
-    def said(self, what: str) -> tuple[bool, str]:
-        """Log what is done for a service."""
-        self.get_logger().info(what)
-        return True, what
-
-    # Beginning
-
-    def begin(self, what: str = "") -> str:
-        """Begin something else at the next odometry, once the climber rests; say so."""
-        self.next = what or self.next
-        under_way = self.hand or self.course
-        if under_way is not None and self.is_driven and not under_way.rests(self.position):
-            if self.hand is not None:
-                self.hand.stop()
-            elif self.course is not None:
-                self.course.pause(self.position)
-            self.waits_for_rest = True
-            return "comes to rest, then starts"
-        self.waits_for_rest = False
-        self.wait_for_odometry()
-        return "starts at the next odometry"
+        self.journey.set_speed(self.parameters.read(PublisherOptions).speed, self.position)
 
     def on_stick(self, speed: float, yaw_rate: float) -> None:
         """Drive by hand: at once if it is already, else once the climber rests."""
-        if self.hand is not None and not self.waits_for_rest:
-            try:
-                self.hand.command(speed, yaw_rate, self.get_clock().now().nanoseconds)
-            except ValueError as error:
-                self.report("stick", "refused", str(error))
-                return
-            self.report("stick", "")
-        elif (speed or yaw_rate) and self.next != HAND:
-            self.get_logger().info(f"by hand: {self.begin(HAND)}")
+        try:
+            now = self.get_clock().now().nanoseconds
+            if self.journey.takes_over(speed, yaw_rate, now):
+                self.said((True, f"by hand: {self.begin(HAND)}"))
+        except ValueError as error:
+            self.report("stick", "refused", str(error))
+            return
+        self.report("stick", "")
+
+    def said(self, said: Said) -> Said:
+        """Log what is done for an operator."""
+        if said[0]:
+            self.get_logger().info(said[1])
+        return said
+
+    # Beginning
+
+    def begin(self, what: str) -> str:
+        """Begin something at the next odometry, once the climber rests; say so."""
+        is_now, said = self.journey.begin(what, self.position, self.is_driven)
+        if is_now:
+            self.wait_for_odometry()
+        return said
 
     @property
     def is_driven(self) -> bool:
@@ -257,43 +222,29 @@ class TrajectoryPublisher(ClimberNode):
         self.destroy_subscription(self.odometry)
         self.odometry = None
         start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
-        self.begin_at(start, state.pose)
+        what = self.shape if self.journey.next == PATH else self.journey.next
+        self.journey.start(start, state.pose, self.position)
         self.followed, self.mode, self.has_told_done = None, "", False
         self.last_look = now or stamp  # the odometry may have come before the first clock
         self.publish_around(start)
-        about = self.planned_name if self.next == PATH else self.next
-        self.get_logger().info(f"{about} starts at {start / SECOND:.3f} s")
-        self.next = PATH
+        self.get_logger().info(f"{what} starts at {start / SECOND:.3f} s")
         self.publish_path(start)
-
-    def begin_at(self, start: int, pose: Array) -> None:
-        """Begin what is next at `start` [ns], of a climber that is at a `pose` (3,)."""
-        make, options, course = writing.reference_numbers, self.options, self.course
-        if self.next == HAND:
-            self.left = course.own_time(self.position)[0] if course is not None else 0.0
-            hand = self.parameters.read(HandOptions, "by_hand.")
-            self.hand = ByHand(pose, start, options, hand, make)
-            return
-        trajectory, begin = self.planned, 0.0
-        if self.next == BACK and course is not None:
-            trajectory, begin = course.trajectory, course.nearest(pose[:2], self.left)
-        self.hand = None
-        self.course = Course(trajectory, start, options, make, self.is_paused, self.speed, begin)
 
     def on_reference_time(self, message: TimeReference) -> None:
         """Keep how far a controller has come, unless that is of another trajectory."""
         followed = reading.nanoseconds(message.time_ref)
         stamp, now = reading.nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
         is_of_now = stamp < now + ODOMETRY_AGE * SECOND
-        under_way = self.hand or self.course
+        under_way = self.journey.under_way
         if under_way and is_of_now and under_way.start <= followed <= stamp + SECOND:
             self.followed, self.mode = followed, message.source
 
     @property
     def position(self) -> int:
-        """Stamp [ns] that the course has come to: the controller's, else the clock's."""
-        under_way = self.hand or self.course
-        assert under_way is not None
+        """Stamp [ns] that what is under way has come to: the controller's, else the clock's."""
+        under_way = self.journey.under_way
+        if under_way is None:
+            return 0
         if self.followed is not None:
             return self.followed
         if self.count_publishers(REFERENCE_TIME):
@@ -302,37 +253,36 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_path(self, stamp: int) -> None:
         """Publish the whole path, for display."""
-        path = self.planned.path(points=400)
+        path = self.journey.planned.path(points=400)
         self.path.publish(writing.path(path, stamp, self.names.odom_frame))
 
     def publish(self) -> None:
         """Publish the preview from where the trajectory has come to."""
         now = self.get_clock().now().nanoseconds
-        if 0 < now < self.last_look - CLOCK_STEP and self.course is not None:
+        if 0 < now < self.last_look - CLOCK_STEP and self.journey.under_way is not None:
             self.get_logger().warning("the clock went back: starts again at the next odometry")
-            self.course, self.hand, self.waits_for_rest = None, None, False
+            self.journey.forget()
             self.wait_for_odometry()
         self.last_look = now
         given = self.given.ready()
         if given is not None:
-            self.planned, described = given
-            self.planned_name = "path"
-            begins = self.begin(PATH)
+            self.journey.planned, described = given
+            self.shape, begins = "path", self.begin(PATH)
             self.get_logger().info(f"path taken: {described}; {begins}")
-        under_way = self.hand or self.course
+        under_way = self.journey.under_way
         if under_way is not None:
             position = self.position
             self.publish_around(position)
             self.tell_done(position)
-            if self.waits_for_rest and (under_way.rests(position) or not self.is_driven):
-                self.begin()
+            if self.journey.waits_for_rest:
+                self.begin(self.journey.next)
         if self.is_progress_due(now) and self.progress.get_subscription_count():
             self.publish_progress(now)
 
     def tell_done(self, position: int) -> None:
         """Log once that the course has come to its end."""
-        course = self.course
-        if self.hand is not None or course is None:
+        course = self.journey.course
+        if self.journey.hand is not None or course is None:
             return
         is_done = course.is_done(position)
         if is_done and not self.has_told_done:
@@ -342,11 +292,12 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_progress(self, now: int) -> None:
         """Publish how far the course is."""
-        how_far = Progress(WAITING if self.hand is None else BY_HAND)
-        if self.course is not None and self.hand is None:
-            if self.odometer is None or self.odometer.trajectory is not self.course.trajectory:
-                self.odometer = Odometer(self.course.trajectory)
-            how_far = progress(self.course, self.odometer, self.position, self.mode)
+        course, by_hand = self.journey.course, self.journey.hand is not None
+        how_far = Progress(BY_HAND if by_hand else WAITING)
+        if course is not None and not by_hand:
+            if self.odometer is None or self.odometer.trajectory is not course.trajectory:
+                self.odometer = Odometer(course.trajectory)
+            how_far = progress(course, self.odometer, self.position, self.mode)
         name = self.get_fully_qualified_name()
         self.progress.publish(writing.progress(name, vars(how_far), now))
 
@@ -359,7 +310,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_around(self, position: int) -> None:
         """Publish the preview at `position` [ns], from a little before it to its end."""
-        under_way = self.hand or self.course
+        under_way = self.journey.under_way
         assert under_way is not None
         points = under_way.preview(position, self.get_clock().now().nanoseconds)
         self.reference.publish(self.serialized(points, under_way.start))
