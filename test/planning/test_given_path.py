@@ -94,6 +94,7 @@ def test_random_paths_are_driven_or_refused_in_words():
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(3600)
 def test_a_hundred_random_paths():
     assert drive_at_random(np.random.default_rng(4), 100) > 0
 
