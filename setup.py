@@ -33,6 +33,8 @@ setup(
         "accelerator": ["jax"],
         # examples/mujoco_driver.py: a climber of other physics
         "physics": ["mujoco"],
+        # completion of the command `climber` in shells
+        "completion": ["argcomplete"],
         "test": ["pytest<9", "pytest-timeout", "pytest-xdist", "hypothesis", "evo", "coverage"],
     },
     zip_safe=False,
@@ -61,6 +63,8 @@ setup(
                 "localize": "replay.localize",
                 "reproduce_paper": "paper.reproduce_paper",
                 "campaign": "campaign.command",
+                "climber": "operating.command",
+                "check_path": "path_check.check_path",
             }.items()
         ]
     },

@@ -50,7 +50,8 @@ CONTENTS = {
     topics.TORQUES: "`effort` [N m] and `velocity` [rad/s] by joint name, of which motors "
     "take one; the stamp is that of the odometry it answers",
     "effort_controller/commands": "the torques again, in the order of `effort_order`",
-    "cmd_vel": "the speeds again, of the climber, if `publish_cmd_vel`: forward, about z",
+    topics.STICK: "of the controller: the speeds again, if `publish_cmd_vel`: forward, about z; of "
+    "the planner: a stick's, by `by_hand.input`",
     topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
     topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels",
     topics.IMU: "yaw rate [rad/s] and specific force [m/s²], gravity in it: on a vertical "

@@ -28,15 +28,17 @@ BELOW = {
     "identification": DATA | {"system", "bags", "report"},
     "replay": DATA | {"system", "bags", "report", "localization"},
     "campaign": DATA | {"system", "bags", "report"},
+    "path_check": DATA | {"system", "bags", "report"},
     "paper": DATA | {"system", "bags", "report"},
     "driver_check": DATA | {"system", "ros"},
     "nodes": DATA | {"localization", "planning", "system", "ros"},
     "recording": {"system", "ros", "bags"},
+    "operating": DATA | {"system", "ros"},
     "demo": DATA | {"system", "ros"},
 }
-ROS_ALLOWED = {"ros", "nodes", "recording", "driver_check", "demo", "messages"}
+ROS_ALLOWED = {"ros", "nodes", "recording", "driver_check", "operating", "demo", "messages"}
 # what a node has no use for: importing it would make every start longer
-TOOLS = "closed_loop", "bags", "report", "identification", "campaign", "paper"
+TOOLS = "closed_loop", "bags", "report", "identification", "campaign", "paper", "path_check"
 UNUSED = {
     "wall_odometry": ["control", "simulation", "mechanics.shapes", "mechanics.preview", *TOOLS],
     "trajectory_publisher": ["control", "simulation", "mechanics.adhesion", *TOOLS],

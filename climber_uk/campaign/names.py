@@ -45,6 +45,7 @@ PARAMETERS = {
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
     *("stop_time", "reaction", "speed", "exclusive"),
+    *(f"by_hand.{name}" for name in ("input", "speed", "yaw_rate", "ramp_time", "timeout")),
     *("effort_commands", "effort_order", "publish_cmd_vel", "odom_frame", "base_frame"),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames", "qos_overrides"),
     *(at + field.name for at, kind in FIELD_SENSORS.items() for field in dataclasses.fields(kind)),

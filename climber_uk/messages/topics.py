@@ -9,6 +9,7 @@ ODOMETRY, REFERENCE, TORQUES = "odom", "reference", "wheel_torques"
 REFERENCE_TIME = "reference_time"  # where on the reference the climber was
 REFERENCE_PATH = "reference_path"  # all of it, for display
 GIVEN_PATH = "path"  # from a planner, or a person's clicks
+STICK = "cmd_vel"  # speeds: from a stick to the planner, or from the controller to a board
 PROGRESS = f"{PLANNER}/progress"  # how far along its path a climber is
 TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PUSH = "joint_states", "suction_pressure", "push"

@@ -33,9 +33,11 @@ from climber_uk.messages.topics import (
     private,
 )
 from climber_uk.parameters.declaration import parameter, parameters
-from climber_uk.planning.course import Course, CourseOptions
+from climber_uk.planning.by_hand import HandOptions
+from climber_uk.planning.course import CourseOptions
 from climber_uk.planning.given_path import Manner
-from climber_uk.planning.progress import FOLLOWING, WAITING, Odometer, Progress, progress
+from climber_uk.planning.journey import BACK, HAND, PATH, Journey, Said
+from climber_uk.planning.progress import BY_HAND, FOLLOWING, WAITING, Odometer, Progress, progress
 from climber_uk.ros.path_intake import PathIntake
 from climber_uk.ros.running import (
     BEST_EFFORT,
@@ -46,6 +48,7 @@ from climber_uk.ros.running import (
     Throttle,
     run,
 )
+from climber_uk.ros.stick import listen_to_stick
 
 STANDSTILL = 0.2  # [s] of wall-clock time without a change, after which a clock stands still
 ODOMETRY_AGE = 1.0  # [s] of an odometry, above which it does not start a trajectory
@@ -74,15 +77,17 @@ class TrajectoryPublisher(ClimberNode):
 
     def __init__(self) -> None:
         super().__init__(PLANNER)
-        for kind, prefix in [*TYPES, (PublisherOptions, ""), (CourseOptions, "")]:
+        kinds = (PublisherOptions, ""), (CourseOptions, ""), (HandOptions, "by_hand.")
+        for kind, prefix in [*TYPES, *kinds]:
             self.parameters.declare(kind, prefix)
         self.parameters.refuse_unknown("the paper's scenario, up to 10 m/s")
         self.options = self.parameters.read(CourseOptions)
-        self.planned = build_trajectory(self.parameters.read)
-        self.planned_name = self.parameters.read(TrajectoryParameters).shape
-        self.course: Course[Row] | None = None  # the one under way
-        self.waits_for_rest = False  # to start: the one under way comes to rest first
-        self.is_paused, self.has_told_done = False, False
+        self.shape = self.parameters.read(TrajectoryParameters).shape
+        hand = self.parameters.read(HandOptions, "by_hand.")
+        planned, make = build_trajectory(self.parameters.read), writing.reference_numbers
+        self.journey: Journey[Row] = Journey(planned, self.options, hand, make)
+        self.journey.speed = self.parameters.read(PublisherOptions).speed
+        self.has_told_done = False
         self.followed: int | None = None  # [ns] how far a controller has come
         self.mode = ""  # what it does; empty: none tells
         self.last_look = self.stood_at = 0  # [ns] of the clock
@@ -96,6 +101,7 @@ class TrajectoryPublisher(ClimberNode):
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.subscription(Float64, "~/speed", self.on_speed)
         self.given = PathIntake(self, GIVEN_PATH, self.manner)
+        listen_to_stick(self, hand.input, self.on_stick)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_service(SetBool, "~/pause", self.on_pause)
@@ -109,9 +115,9 @@ class TrajectoryPublisher(ClimberNode):
 
     def summary(self) -> str:
         """Extremes of the trajectory, for the log."""
-        described = summary(self.planned)
+        described = summary(self.journey.planned)
         self.parameters.remarks += described.remarks
-        return f"{self.planned_name}, {described}"
+        return f"{self.shape}, {described}"
 
     def manner(self) -> Manner:
         """How a path is driven that comes from outside: as waypoints would be."""
@@ -119,30 +125,37 @@ class TrajectoryPublisher(ClimberNode):
         return Manner(
             rounding=self.parameters.read(Rounding, "waypoints."),
             law=self.parameters.read(TIME_LAWS[law], f"{law}."),
-            reverse_gear=self.planned.reverse_gear,
+            reverse_gear=self.journey.planned.reverse_gear,
         )
 
     # What an operator asks for
 
     def on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/start: start from the beginning, at the next odometry."""
-        self.is_paused = False
-        response.success, response.message = True, self.begin()
+        self.journey.is_paused = False
+        response.success, response.message = True, self.begin(PATH)
         return response
 
     def on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/stop: come to rest on the path, as ~/pause does."""
-        response.success, response.message = self.pause()
+        response.success, response.message = self.said(self.journey.pause(self.position))
         return response
 
     def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         """Service ~/pause: come to rest on the path (true), or go on along it (false)."""
-        response.success, response.message = self.pause() if request.data else self.go_on(1)
+        if request.data:
+            said = self.journey.pause(self.position)
+        elif self.journey.hand is not None:
+            self.journey.is_paused = False
+            said = True, f"back to the path: {self.begin(BACK)}"
+        else:
+            said = self.journey.go_on(self.position)
+        response.success, response.message = self.said(said)
         return response
 
     def on_retreat(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/retreat: go back along the path as it was driven, the heading kept."""
-        response.success, response.message = self.go_on(-1)
+        response.success, response.message = self.said(self.journey.retreat(self.position))
         return response
 
     def on_speed(self, message: Float64) -> None:
@@ -152,49 +165,33 @@ class TrajectoryPublisher(ClimberNode):
 
     def on_parameters(self) -> None:
         """Take up another speed."""
-        if self.course is not None:
-            self.course.set_speed(self.speed, self.position)
+        self.journey.set_speed(self.parameters.read(PublisherOptions).speed, self.position)
 
-    @property
-    def speed(self) -> float:
-        """Share of the planned speed."""
-        return self.parameters.read(PublisherOptions).speed
+    def on_stick(self, speed: float, yaw_rate: float) -> None:
+        """Drive by hand: at once if it is already, else once the climber rests."""
+        try:
+            now = self.get_clock().now().nanoseconds
+            if self.journey.takes_over(speed, yaw_rate, now):
+                self.said((True, f"by hand: {self.begin(HAND)}"))
+        except ValueError as error:
+            self.report("stick", "refused", str(error))
+            return
+        self.report("stick", "")
 
-    def pause(self) -> tuple[bool, str]:
-        """Come to rest on the path; whether it does, and where."""
-        if self.course is None:
-            return False, "not started"
-        self.is_paused = True
-        self.course.pause(self.position)
-        return self.said(f"comes to rest within {self.course.ramp_time:.3g} s")
-
-    def go_on(self, direction: int) -> tuple[bool, str]:
-        """Go on along the path, or back (-1); whether it does."""
-        if self.course is None:
-            return False, "not started"
-        self.is_paused = False
-        if self.waits_for_rest and direction > 0:
-            return True, self.begin()
-        self.waits_for_rest = False
-        self.course.go_on(self.position, direction)
-        return self.said("goes on" if direction > 0 else "goes back along the path")
-
-    def said(self, what: str) -> tuple[bool, str]:
-        """Log what is done for a service."""
-        self.get_logger().info(what)
-        return True, what
+    def said(self, said: Said) -> Said:
+        """Log what is done for an operator."""
+        if said[0]:
+            self.get_logger().info(said[1])
+        return said
 
     # Beginning
 
-    def begin(self) -> str:
-        """Start what is planned at the next odometry, once the climber rests; say so."""
-        if self.course is not None and self.is_driven and not self.course.rests(self.position):
-            self.course.pause(self.position)
-            self.waits_for_rest = True
-            return "comes to rest, then starts"
-        self.waits_for_rest = False
-        self.wait_for_odometry()
-        return "starts at the next odometry"
+    def begin(self, what: str) -> str:
+        """Begin something at the next odometry, once the climber rests; say so."""
+        is_now, said = self.journey.begin(what, self.position, self.is_driven)
+        if is_now:
+            self.wait_for_odometry()
+        return said
 
     @property
     def is_driven(self) -> bool:
@@ -212,7 +209,7 @@ class TrajectoryPublisher(ClimberNode):
             return
         now, stamp = self.get_clock().now().nanoseconds, reading.nanoseconds(message.header.stamp)
         try:
-            reading.state(message, self.names.odom_frame, self.names.base_frame)
+            state = reading.state(message, self.names.odom_frame, self.names.base_frame)
             if not self.reference.get_subscription_count():
                 self.report("start", "waits for a subscriber of reference", is_fault=False)
                 return
@@ -225,12 +222,12 @@ class TrajectoryPublisher(ClimberNode):
         self.destroy_subscription(self.odometry)
         self.odometry = None
         start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
-        make, options = writing.reference_numbers, self.options
-        self.course = Course(self.planned, start, options, make, self.is_paused, self.speed)
+        what = self.shape if self.journey.next == PATH else self.journey.next
+        self.journey.start(start, state.pose, self.position)
         self.followed, self.mode, self.has_told_done = None, "", False
         self.last_look = now or stamp  # the odometry may have come before the first clock
         self.publish_around(start)
-        self.get_logger().info(f"{self.planned_name} starts at {start / SECOND:.3f} s")
+        self.get_logger().info(f"{what} starts at {start / SECOND:.3f} s")
         self.publish_path(start)
 
     def on_reference_time(self, message: TimeReference) -> None:
@@ -238,53 +235,55 @@ class TrajectoryPublisher(ClimberNode):
         followed = reading.nanoseconds(message.time_ref)
         stamp, now = reading.nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
         is_of_now = stamp < now + ODOMETRY_AGE * SECOND
-        if (
-            self.course is not None
-            and is_of_now
-            and self.course.start <= followed <= stamp + SECOND
-        ):
+        under_way = self.journey.under_way
+        if under_way and is_of_now and under_way.start <= followed <= stamp + SECOND:
             self.followed, self.mode = followed, message.source
 
     @property
     def position(self) -> int:
-        """Stamp [ns] that the course has come to: the controller's, else the clock's."""
-        assert self.course is not None
+        """Stamp [ns] that what is under way has come to: the controller's, else the clock's."""
+        under_way = self.journey.under_way
+        if under_way is None:
+            return 0
         if self.followed is not None:
             return self.followed
         if self.count_publishers(REFERENCE_TIME):
-            return self.course.start
-        return max(self.course.start, self.get_clock().now().nanoseconds)
+            return under_way.start
+        return max(under_way.start, self.get_clock().now().nanoseconds)
 
     def publish_path(self, stamp: int) -> None:
         """Publish the whole path, for display."""
-        path = self.planned.path(points=400)
+        path = self.journey.planned.path(points=400)
         self.path.publish(writing.path(path, stamp, self.names.odom_frame))
 
     def publish(self) -> None:
         """Publish the preview from where the trajectory has come to."""
         now = self.get_clock().now().nanoseconds
-        if 0 < now < self.last_look - CLOCK_STEP and self.course is not None:
+        if 0 < now < self.last_look - CLOCK_STEP and self.journey.under_way is not None:
             self.get_logger().warning("the clock went back: starts again at the next odometry")
-            self.course, self.waits_for_rest = None, False
+            self.journey.forget()
             self.wait_for_odometry()
         self.last_look = now
         given = self.given.ready()
         if given is not None:
-            self.planned, described = given
-            self.planned_name = "path"
-            begins = self.begin()
+            self.journey.planned, described = given
+            self.shape, begins = "path", self.begin(PATH)
             self.get_logger().info(f"path taken: {described}; {begins}")
-        if self.course is not None:
+        under_way = self.journey.under_way
+        if under_way is not None:
             position = self.position
             self.publish_around(position)
-            self.tell_done(self.course, position)
-            if self.waits_for_rest and (self.course.rests(position) or not self.is_driven):
-                self.begin()
+            self.tell_done(position)
+            if self.journey.waits_for_rest:
+                self.begin(self.journey.next)
         if self.is_progress_due(now) and self.progress.get_subscription_count():
             self.publish_progress(now)
 
-    def tell_done(self, course: Course[Row], position: int) -> None:
+    def tell_done(self, position: int) -> None:
         """Log once that the course has come to its end."""
+        course = self.journey.course
+        if self.journey.hand is not None or course is None:
+            return
         is_done = course.is_done(position)
         if is_done and not self.has_told_done:
             where = "end" if course.direction > 0 else "beginning"
@@ -293,11 +292,12 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_progress(self, now: int) -> None:
         """Publish how far the course is."""
-        how_far = Progress(WAITING)
-        if self.course is not None:
-            if self.odometer is None or self.odometer.trajectory is not self.course.trajectory:
-                self.odometer = Odometer(self.course.trajectory)
-            how_far = progress(self.course, self.odometer, self.position, self.mode)
+        course, by_hand = self.journey.course, self.journey.hand is not None
+        how_far = Progress(BY_HAND if by_hand else WAITING)
+        if course is not None and not by_hand:
+            if self.odometer is None or self.odometer.trajectory is not course.trajectory:
+                self.odometer = Odometer(course.trajectory)
+            how_far = progress(course, self.odometer, self.position, self.mode)
         name = self.get_fully_qualified_name()
         self.progress.publish(writing.progress(name, vars(how_far), now))
 
@@ -310,8 +310,10 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_around(self, position: int) -> None:
         """Publish the preview at `position` [ns], from a little before it to its end."""
-        assert self.course is not None
-        self.reference.publish(self.serialized(self.course.preview(position), self.course.start))
+        under_way = self.journey.under_way
+        assert under_way is not None
+        points = under_way.preview(position, self.get_clock().now().nanoseconds)
+        self.reference.publish(self.serialized(points, under_way.start))
 
 
 def main() -> None:

@@ -2,5 +2,5 @@
 
 A `course` is a trajectory that was begun: its points ahead of the climber, by a `path_clock` that
 pauses, goes on, slower or backwards; `progress` tells how far it is. A `given_path` comes from
-outside.
+outside; a stick drives `by_hand`; a `journey` has one of them under way, and what comes next.
 """

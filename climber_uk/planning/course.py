@@ -13,13 +13,15 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from climber_uk.mechanics import SECOND
+from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.planning.path_clock import PathClock
 
 PEAK_RATE = 15 / 8  # of a smooth start's ramp, of its mean
+NEAREST_STEP = 0.05  # [s] in which the nearest place is looked for
+AS_NEAR, AROUND = 0.05, 2.0  # [m] and [s], of places that are about as near
 SAMPLES = 4001  # of a trajectory, to find its highest speed and acceleration
 Row = TypeVar("Row")
 
@@ -54,7 +56,8 @@ class CourseOptions:
 class Course(Generic[Row]):
     """A trajectory that started at `start` [ns], at rest if it `is_paused`.
 
-    `make` makes of a reference, and its time [s] since the start, what is published of it.
+    It begins at its own time `begin` [s], from rest there if that is later than 0. `make` makes of
+    a reference, and its time [s] since the start, what is published of it.
     """
 
     def __init__(
@@ -65,6 +68,7 @@ class Course(Generic[Row]):
         make: Callable[[Reference, float], Row],
         is_paused: bool = False,
         speed: float = 1.0,
+        begin: float = 0.0,
     ) -> None:
         self.trajectory, self.start, self.options = trajectory, start, options
         self.is_paused, self.speed = is_paused, speed  # as a share of the planned one
@@ -73,7 +77,10 @@ class Course(Generic[Row]):
         self._make = make
         self._points: deque[tuple[float, Row]] = deque()  # with their times [s]
         self._next = 0  # number of the next point: each is computed once, but where it changes
-        if is_paused or speed != 1.0:
+        if begin > 0:
+            rest = PathClock(self.ramp_time, begin=begin, rate=0.0)
+            self.clock = rest.changed(0.0, self.asked, 0.0)
+        elif is_paused or speed != 1.0:
             self.clock = PathClock(self.ramp_time, rate=self.asked)
 
     @cached_property
@@ -128,6 +135,20 @@ class Course(Generic[Row]):
         clock = self.clock
         return clock is not None and not self.asked and self.time(position) >= clock.settles()
 
+    def nearest(self, place: Array, left: float) -> float:
+        """Own time [s] at which it is nearest to a place (2,) [m].
+
+        Of places that are about as near, the one counts that is nearest in time to `left` [s].
+        """
+        trajectory = self.trajectory
+        last = min(self.duration, 2 * trajectory.law.horizon(trajectory.course))
+        times = np.linspace(0.0, last, math.ceil(last / NEAREST_STEP) + 1)
+        apart = np.hypot(*(trajectory.at(times).pose[:, :2] - place).T)
+        near = times[apart <= apart.min() + AS_NEAR]
+        about = float(near[np.abs(near - left).argmin()])
+        around = np.abs(times - about) <= AROUND
+        return float(times[around][apart[around].argmin()])
+
     # What is asked of it
 
     def pause(self, position: int) -> None:
@@ -161,7 +182,7 @@ class Course(Generic[Row]):
 
     # What is published of it
 
-    def preview(self, position: int) -> list[Row]:
+    def preview(self, position: int, _now: int = 0) -> list[Row]:
         """Points around `position` [ns], from a little before it to the end of the preview."""
         options, time = self.options, self.time(position)
         oldest = time - options.publish_period - 2 * options.point_period

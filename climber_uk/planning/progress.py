@@ -10,7 +10,7 @@ from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.planning.course import Course, Row
 
 WAITING, APPROACHING, FOLLOWING = "waiting", "approaching", "following"
-PAUSED, DONE = "paused", "done"
+PAUSED, DONE, BY_HAND = "paused", "done", "by hand"
 SAMPLES = 4001
 
 

@@ -1,14 +1,17 @@
 """An operator pauses a climber on its path, goes on, slower, and back: the three nodes."""
 
+import subprocess
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 from test_faults import LIMIT, PLANNER
 from test_waiting import Waiting
+from world import executable
 
 pytestmark = pytest.mark.nodes
 
@@ -23,6 +26,17 @@ class Operated(Waiting):
     def pause(self, paused):
         asked = SetBool.Request(data=paused)
         return self.world.call(SetBool, f"{PLANNER}/pause", asked)
+
+    def command(self, *words):
+        """Status and output of `climber` with some arguments."""
+        done = subprocess.run(
+            [executable("climber"), *words],
+            env=self.world.environment,
+            stdout=subprocess.PIPE,
+            text=True,
+            timeout=100,
+        )
+        return done.returncode, done.stdout
 
     def ask(self, service):
         return self.world.call(Trigger, f"{PLANNER}/{service}", Trigger.Request())
@@ -100,7 +114,7 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.is_told_to_be("paused")["done"] == pytest.approx(paused["done"], abs=1e-6)
 
     world.speak(Float64, f"{PLANNER}/speed").publish(Float64(data=0.5))
-    climb.pause(False)
+    assert climb.command("resume") == (0, "goes on\n")
     climb.drives(0.14, 0.16)
     world.speak(Float64, f"{PLANNER}/speed").publish(Float64(data=1.5))
     world.wait(
@@ -108,7 +122,12 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
         "a refusal in words",
     )
     climb.drives(0.14, 0.16)
-    climb.ask("retreat")
+    status, said = climb.command("speed", "1.5")
+    assert (status, "out of range" in said) == (1, True)
+    status, said = climb.command("status")
+    assert status == 0
+    assert said.startswith("following, ")
+    assert climb.command("retreat") == (0, "goes back along the path\n")
     climb.drives(-0.16, -0.14)
     back = climb.is_told_to_be("done")
     assert back["done"] == pytest.approx(0.0, abs=1e-6)
@@ -116,7 +135,7 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.odometry[-1].pose.pose.position.x == pytest.approx(0.0, abs=0.01)
     assert "done: at the beginning" in world.log(PLANNER)
 
-    world.speak(Float64, f"{PLANNER}/speed").publish(Float64(data=1.0))
+    assert climb.command("speed", "1.0") == (0, "speed 1\n")
     assert climb.ask("start").message == "starts at the next odometry"
     climb.drives(0.28, 0.31)
     assert climb.ask("start").message == "comes to rest, then starts"
@@ -125,3 +144,46 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.odometry[-1].pose.pose.position.x == pytest.approx(4.0, abs=0.01)
     assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
     assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01
+
+
+def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2"]
+    heading = ["initial_heading:=0.0"]
+    climb = Operated(world, {PLANNER: [*line, *by_hand], "plant_simulator": heading})
+    climb.drives(0.28, 0.31)
+    stick = world.speak(TwistStamped, "cmd_vel")
+    asked = TwistStamped()
+    asked.twist.linear.x, asked.twist.angular.z = 1.0, 0.3  # cut to 0.2
+
+    def drives_by_hand():
+        stick.publish(asked)
+        last = [m.twist.twist for m in climb.odometry[-60:]]
+        return all(
+            abs(twist.linear.x - 0.2) < 0.01 and abs(twist.angular.z - 0.3) < 0.02 for twist in last
+        )
+
+    world.wait(drives_by_hand, "a turn by hand")
+    climb.drives(-1e-3, 1e-3)  # the stick is silent
+    climb.is_told_to_be("by hand")
+    left = climb.odometry[-1].pose.pose.position
+    assert left.y > 3.02
+    assert "back to the path" in climb.pause(False).message
+    climb.is_told_to_be("following")
+    climb.is_told_to_be("done")
+    end = climb.odometry[-1].pose.pose.position
+    assert (end.x, end.y) == pytest.approx((4.0, 3.0), abs=0.01)
+
+
+def test_the_command_tells_when_nobody_answers_and_what_it_takes(world):
+    for words, status, said in (
+        (("pause", "--timeout", "0.3"), 3, "nobody answers: service /trajectory_publisher/pause"),
+        (("watch", "--timeout", "0.3", "--namespace", "/climber_2"), 3, "topic /climber_2/"),
+        (("speed",), 2, "speed takes 1 number(s), not 0"),
+        (("fly",), 2, "invalid choice: 'fly'"),
+    ):
+        command = [executable("climber"), *words]
+        done = subprocess.run(command, env=world.environment, capture_output=True, text=True)
+        assert done.returncode == status
+        assert said in done.stderr
+        assert len(done.stderr.splitlines()) == 1

@@ -78,6 +78,7 @@ def test_whatever_is_asked_at_any_time_the_climber_stays_on_its_path_and_no_torq
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("trajectory", [climber_trajectory, lanes])
 def test_two_hundred_times(trajectory):
     asked_at_random(UnderWay(trajectory()), np.random.default_rng(7), 200)

@@ -54,13 +54,14 @@ class Sent(UnderWay):
         assert set(modes) <= {Mode.FOLLOWING, Mode.APPROACHING}
         follows = np.array([mode is Mode.FOLLOWING for mode in modes])
         assert follows.any()
-        driven = self.places[first:][follows][::20]
-        # where it begins near the path it is not on it yet
-        assert distance(driven[len(driven) // 2 :], places).max() <= TOLERANCE + 5e-3
+        # where it begins within `max_distance` of the path it comes there in the first seconds
+        begun = follows & (np.array(self.positions[first:]) >= 3.5)
+        assert distance(self.places[first:][begun][::20], places).max() <= TOLERANCE + 5e-3
         assert np.abs(self.sent[first:]).max() <= LIMIT
         assert np.abs(np.diff(self.sent[max(first - 1, 0) :], axis=0)).max() <= 0.2 + 1e-9
         speeds = np.array([abs(state.forward_speed) for state in self.states[first:]])
-        assert speeds[follows].max() <= 1.05 * RATE
+        # one that begins behind its reference may be a quarter faster: `guidance.catch_up_share`
+        assert speeds[follows].max() <= 1.26 * RATE
 
 
 def drive_at_random(random, number):
@@ -81,7 +82,7 @@ def drive_at_random(random, number):
             climber.send(trajectory)
         first = len(climber.times)
         whole = random.random() < 0.5
-        climber.drive(min(trajectory.duration if whole else random.uniform(2, 12), 60))
+        climber.drive(min(trajectory.duration if whole else random.uniform(5, 12), 60))
         climber.check(first, places)
     assert {name for name, _ in refused} <= {"unfit", "noisy"}
     assert all(" m" in said for _, said in refused)
@@ -93,6 +94,7 @@ def test_random_paths_are_driven_or_refused_in_words():
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(3600)
 def test_a_hundred_random_paths():
     assert drive_at_random(np.random.default_rng(4), 100) > 0
 

@@ -1,0 +1,1 @@
+"""The command `climber`, for people without ros2cli: `command`, by the services of the nodes."""

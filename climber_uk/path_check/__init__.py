@@ -1,0 +1,5 @@
+"""What a path asks of a climber, told before anything drives.
+
+`demands` computes what the reference asks for along the path, and how much of each limit is left;
+`check_path` is the executable, with `figure` the picture of it.
+"""

@@ -1,0 +1,118 @@
+"""Tell whether a climber can drive a path, before it does: where what limits it, and what it takes.
+
+The path is that of trajectory_publisher's parameters in a file, the climber that of
+uk_torque_controller's. The status is 1 if the path asks for more than there is.
+"""
+
+import json
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from climber_uk.control.build import ControllerChoice
+from climber_uk.mechanics.adhesion import ADHESION, Attachment, Grip
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.summary import summary
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
+from climber_uk.messages.topics import CONTROLLER, PLANNER
+from climber_uk.parameters.parameter_file import Values, read_argument, read_file
+from climber_uk.parameters.parameter_paths import located
+from climber_uk.path_check.demands import Demands, demands
+from climber_uk.system.command_line import Parser, between
+
+PATHS = {  # parameters that are files
+    prefix + field.name
+    for kind, prefix in TYPES
+    for field in fields(kind)  # type: ignore[arg-type]
+    if field.metadata.get("is_path")
+}
+
+
+def read(file: Path, changes: dict[str, Any]) -> tuple[Trajectory, Climber, Attachment]:
+    """Path, climber and what holds it, by a parameter file and changes of the path's parameters.
+
+    Raises `ValueError`.
+    """
+    planner = {**read_file(file, f"/{PLANNER}"), **changes}
+    words = ["--ros-args", "--params-file", str(file)]
+    for name in PATHS & planner.keys() - changes.keys():
+        planner[name] = located(planner[name], name, f"/{PLANNER}", words)
+    trajectory = build_trajectory(Values(planner).read)
+    values = Values(read_file(file, f"/{CONTROLLER}"))
+    name = values.read(ControllerChoice).adhesion
+    attachment = Attachment(
+        adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)
+    )
+    return trajectory, values.read(Climber), attachment
+
+
+def told(found: Demands, trajectory: Trajectory, half_track: float) -> dict[str, Any]:
+    """What is found, as numbers by name."""
+    about = summary(trajectory, half_track)
+    limits: dict[str, Any] = {
+        least.name: {"reserve": least.reserve, "at [s]": least.time, "place [m]": least.place}
+        for least in found.least()
+    }
+    return {
+        "feasible": all(limit["reserve"] >= 1 for limit in limits.values()),
+        "length [m]": about.length,
+        "duration [s]": about.duration,
+        "fastest [m/s]": about.fastest_speed,
+        "energy of the wheels [J]": found.energy,
+        "limits": limits,
+    }
+
+
+def lines(numbers: dict[str, Any], is_whole: bool) -> list[str]:
+    """The same in words."""
+    part = "" if is_whole else ", once around"
+    said = [
+        f"{numbers['length [m]']:.4g} m, {numbers['duration [s]']:.4g} s, at most "
+        f"{numbers['fastest [m/s]']:.3g} m/s, {numbers['energy of the wheels [J]']:.4g} J{part}"
+    ]
+    for name, limit in sorted(numbers["limits"].items(), key=lambda of: of[1]["reserve"]):
+        x, y = limit["place [m]"]
+        verdict = "" if limit["reserve"] >= 1 else ": TOO MUCH"
+        said.append(
+            f"{name}: {limit['reserve']:.3g} times what is asked for, at ({x:.3g}, {y:.3g}) m, "
+            f"{limit['at [s]']:.4g} s{verdict}"
+        )
+    return [*said, "feasible" if numbers["feasible"] else "NOT feasible"]
+
+
+def main() -> None:
+    """Check a path."""
+    parser = Parser("check_path", __doc__)
+    parser.add_argument("--params", type=Path, required=True, help="parameter file of the nodes")
+    parser.add_argument(
+        *("-p", "--param"),
+        action="append",
+        default=[],
+        type=read_argument,
+        metavar="NAME:=VALUE",
+        help="of the path, in place of the file's",
+    )
+    parser.add_argument(
+        "--margin",
+        type=between(0.1, 100.0),
+        default=1.5,
+        help="of slipping that is to be kept (default: 1.5, as the alarm's)",
+    )
+    parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
+    options = parser.arguments()
+    try:
+        trajectory, climber, attachment = read(options.params, dict(options.param))
+        found = demands(trajectory, climber, attachment, options.margin)
+        numbers = told(found, trajectory, climber.half_track)
+        print("\n".join(lines(numbers, found.is_whole)))
+        if options.output:
+            from climber_uk.path_check.figure import draw  # matplotlib, which takes a second
+
+            options.output.mkdir(parents=True, exist_ok=True)
+            (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
+            print(draw(found, options.output / "check_path.png"))
+    except (ValueError, OSError) as error:
+        sys.exit(f"check_path: {error}")
+    sys.exit(not numbers["feasible"])

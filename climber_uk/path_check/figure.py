@@ -1,0 +1,28 @@
+"""The picture of a path: where on it how much is left of what limits it most."""
+
+from pathlib import Path
+
+import numpy as np
+
+from climber_uk.path_check.demands import Demands
+from climber_uk.report.plotting import plt, saved
+
+ENOUGH = 5.0  # of a reserve: more is not told apart
+
+
+def draw(found: Demands, path: Path) -> Path:
+    """Write a picture of the path by its least reserve, and of all reserves along it."""
+    figure, (above, below) = plt.subplots(2, 1, figsize=(9, 9), height_ratios=(2, 1))
+    least = np.min([*found.reserves.values()], axis=0).clip(0.0, ENOUGH)
+    drawn = above.scatter(*found.pose[:, :2].T, c=least, s=6, cmap="RdYlGn", vmin=0.0, vmax=ENOUGH)
+    figure.colorbar(drawn, ax=above, label="least reserve: allowed by asked for")
+    for at in found.least():
+        above.annotate(at.name, at.place, fontsize=8)
+    above.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    for name, reserve in found.reserves.items():
+        below.plot(found.distance, reserve.clip(0.0, ENOUGH), label=name)
+    below.axhline(1.0, color="k", linewidth=0.8)
+    below.set(xlabel="along the path [m]", ylabel="reserve", ylim=(0, ENOUGH))
+    below.legend(fontsize=8)
+    figure.tight_layout()
+    return saved(figure, path)

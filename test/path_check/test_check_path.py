@@ -1,0 +1,115 @@
+"""What a path asks for, by hand, and as the executable tells it."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from climber_uk.mechanics.adhesion import Attachment, Grip, Suction
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.shapes import Circle, Line
+from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.path_check import check_path
+from climber_uk.path_check.demands import demands
+
+CONFIG = Path(__file__).parents[2] / "config"
+CLIMBER = Climber(
+    mass=5.0,
+    yaw_inertia=0.33,
+    wheel_radius=0.027,
+    half_track=0.3,
+    seal_friction_coefficient=0.6,
+    wheel_load_share=0.8,
+    suction_pressure=8000.0,
+    suction_area=0.06,
+    max_wheel_torque=4.0,
+)
+HELD = Attachment(adhesion=Suction(), grip=Grip())
+FRICTION = 0.6 * 0.2 * 8000 * 0.06  # [N] of the seal, by hand
+
+
+def least(trajectory, climber=CLIMBER, margin=1.0):
+    found = demands(trajectory, climber, HELD, margin)
+    return {limit.name.split(",")[0]: limit for limit in found.least()}, found
+
+
+def test_straight_up_it_carries_its_weight_and_friction():
+    up = Trajectory(Line(3.0, direction=math.pi / 2), RestToRest(rate=0.2, ramp_time=2.0))
+    limits, found = least(up)
+    # by hand: the ramp's acceleration is 15/8 0.2 / 2, in its middle
+    force = 5 * 9.81 + FRICTION + 5 * 15 / 8 * 0.1
+    assert limits["torque"].reserve == pytest.approx(4.0 / (0.027 * force / 2), rel=1e-4)
+    assert limits["torque"].time == pytest.approx(1.0, abs=0.03)
+    assert limits["torque"].place[1] == pytest.approx(up.at(1.0).pose[1], abs=0.005)
+    friction = Grip().wheel_friction_coefficient
+    assert limits["slip"].reserve == pytest.approx(friction * 0.8 * 480 / force, rel=1e-4)
+    # what it does: weight and friction, all along
+    assert found.energy == pytest.approx(3.0 * (5 * 9.81 + FRICTION), rel=1e-3)
+
+
+def test_straight_down_the_motors_take_back_no_energy():
+    down = Trajectory(Line(3.0, direction=-math.pi / 2), RestToRest(rate=0.2, ramp_time=2.0))
+    _, found = least(down)
+    assert found.energy == pytest.approx(3.0 * (FRICTION - 5 * 9.81), rel=0.02)
+
+
+def test_a_margin_that_is_to_be_kept_takes_its_share():
+    circle = Trajectory(Circle(1.0), ConstantRate(0.2))
+    once, twice = (least(circle, margin=margin)[0]["slip"].reserve for margin in (1.0, 2.0))
+    assert once == pytest.approx(2 * twice)
+
+
+def test_a_motor_near_its_highest_rate_has_less_torque():
+    up = Trajectory(Line(3.0, direction=math.pi / 2), RestToRest(rate=0.2, ramp_time=2.0))
+    rate = 0.2 / 0.027
+    slower = replace(CLIMBER, no_load_wheel_rate=2 * rate)
+    limits, _ = least(up, slower)
+    # at full speed, by hand: half of the torque
+    force = 5 * 9.81 + FRICTION
+    assert limits["torque"].reserve == pytest.approx(2.0 / (0.027 * force / 2), rel=0.02)
+
+
+def run(monkeypatch, capsys, *words):
+    monkeypatch.setattr("sys.argv", ["check_path", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        check_path.main()
+    return ended.value.code, capsys.readouterr().out
+
+
+def test_the_configuration_of_lanes_is_feasible_and_drawn(monkeypatch, capsys, tmp_path):
+    words = "--params", CONFIG / "lanes.yaml", "--output", tmp_path / "out"
+    status, said = run(monkeypatch, capsys, *words)
+    assert (status, said.splitlines()[-2]) == (0, "feasible")
+    numbers = json.loads((tmp_path / "out" / "check_path.json").read_text())
+    assert numbers["feasible"]
+    assert all(limit["reserve"] > 1 for limit in numbers["limits"].values())
+    assert (tmp_path / "out" / "check_path.png").stat().st_size > 10_000
+
+
+def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatch, capsys):
+    fast = "-p", "rest_to_rest.rate:=2.0", "-p", "rest_to_rest.ramp_time:=0.05"
+    words = "--params", CONFIG / "climber.yaml", *fast
+    status, said = run(monkeypatch, capsys, *words)
+    assert status == 1
+    assert said.splitlines()[-1] == "NOT feasible"
+    assert "slip, to a margin of 1.5: " in said
+    assert "TOO MUCH" in said
+
+
+def test_what_is_wrong_is_said_in_one_line(monkeypatch, capsys):
+    words = "--params", CONFIG / "climber.yaml", "-p", "shape:=nothing"
+    status, _ = run(monkeypatch, capsys, *words)
+    assert status.startswith("check_path: shape='nothing' must be one of ")
+    assert len(status.splitlines()) == 1
+
+
+def test_margins_are_those_that_the_nodes_tell():
+    """The paper's: 0.54 to 0.53, as the controller publishes them."""
+    trajectory, climber, attachment = check_path.read(CONFIG / "paper.yaml", {})
+    found = demands(trajectory, climber, attachment, 1.0)
+    slip = next(iter(found.reserves.values()))
+    assert np.min(slip) == pytest.approx(0.53, abs=0.02)

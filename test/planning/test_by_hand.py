@@ -1,0 +1,109 @@
+"""A stick's speeds become a reference that is smooth, and ends at rest whatever is lost."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from under_way import UnderWay
+
+from climber_uk.control.safety import Mode
+from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.shapes import Line
+from climber_uk.mechanics.time_laws import RestToRest
+from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.planning.by_hand import ByHand, HandOptions
+from climber_uk.planning.course import CourseOptions
+
+OPTIONS, HAND = CourseOptions(), HandOptions(input="twist", speed=0.25, yaw_rate=0.6)
+ASKED = st.lists(
+    st.tuples(st.floats(0.05, 2.0), st.floats(-0.4, 0.4), st.floats(-1.0, 1.0)), max_size=8
+)
+
+
+def begun(pose=(0.0, 0.0, 0.0)):
+    return ByHand(np.array(pose), 0, OPTIONS, HAND, lambda reference, time: (time, reference))
+
+
+def driven(by_hand, asked, after=4.0):
+    """Points by their time that were near the climber, of a stick that is moved again and again."""
+    points, time, last = {}, 0.0, None
+    for wait, speed, yaw_rate in [*asked, (after, None, None)]:
+        for now in np.arange(time, time + wait, 0.1):
+            at = round(now * SECOND)
+            if speed is not None:
+                by_hand.command(speed, yaw_rate, at)
+            last = by_hand.preview(at, at)
+            for when, reference in last:
+                key = round(when / OPTIONS.point_period)
+                if when <= now + OPTIONS.reaction:
+                    assert points.setdefault(key, reference) is reference, "taken back"
+            assert not last[-1][1].velocity.any() or abs(last[-1][1].velocity).max() < 1e-12
+        time += wait
+    return [points[key] for key in sorted(points)], last
+
+
+@settings(max_examples=30)
+@given(ASKED)
+def test_it_is_smooth_within_its_limits_and_ends_at_rest(asked):
+    references, last = driven(begun(), asked)
+    speed = np.array([reference.speed for reference in references])
+    assert np.abs(speed).max() <= HAND.speed + 1e-9
+    yaw_rate = np.array([reference.velocity[2] for reference in references])
+    assert np.abs(yaw_rate).max() <= HAND.yaw_rate + 1e-9
+    acceleration = np.array([reference.forward_acceleration for reference in references])
+    assert np.abs(acceleration).max() <= 15 / 8 * HAND.speed / HAND.ramp_time + 1e-9
+    for part, rate in (("pose", "velocity"), ("velocity", "acceleration")):
+        values, rates = (np.array([getattr(r, n) for r in references]) for n in (part, rate))
+        means = (rates[:-1] + rates[1:]) / 2 * OPTIONS.point_period
+        np.testing.assert_allclose(np.diff(values, axis=0), means, atol=2e-3)
+    assert np.abs(last[-1][1].velocity).max() < 1e-12
+    assert np.abs(last[0][1].velocity).max() < 1e-12  # silent for long, it rests
+
+
+def test_straight_on_it_is_as_fast_as_asked_and_a_turn_is_a_circle():
+    by_hand = begun((1.0, 2.0, 0.5))
+    references, _ = driven(by_hand, [(3.0, 0.2, 0.0)], after=0.1)
+    assert references[-1].speed == pytest.approx(0.2)
+    by_hand = begun()
+    references, _ = driven(by_hand, [(8.0, 0.2, 0.4)], after=0.1)
+    poses = np.array([reference.pose for reference in references[-100:]])
+    centre = poses[:, :2] + 0.5 * np.c_[-np.sin(poses[:, 2]), np.cos(poses[:, 2])]
+    np.testing.assert_allclose(centre, np.broadcast_to(centre[0], centre.shape), atol=1e-8)
+
+
+@pytest.mark.parametrize("speeds", [(math.nan, 0.0), (0.1, math.inf)])
+def test_speeds_that_are_none_are_refused(speeds):
+    with pytest.raises(ValueError, match="must be finite"):
+        begun().command(*speeds, 0)
+
+
+@pytest.mark.parametrize("heading", [np.pi / 2, -np.pi / 2, 0.0])
+def test_a_stick_that_is_lost_at_full_speed_stops_the_climber_without_a_jump(heading):
+    line = Trajectory(Line(length=1.0, direction=heading), RestToRest(rate=0.1))
+    climb = UnderWay(line, state=State(line.at(0.0).pose, np.zeros(3)))
+    start = climb.now
+    hand = ByHand(
+        line.at(0.0).pose,
+        start,
+        OPTIONS,
+        HAND,
+        lambda reference, time: (start + round(time * SECOND), reference),
+    )
+    lost = 4.0
+
+    def preview(position):
+        if climb.now <= start + lost * SECOND:
+            hand.command(1.0, 0.0, climb.now)
+        return hand.preview(position, climb.now)
+
+    climb.course.preview = preview
+    climb.run(lost)
+    assert climb.states[-1].forward_speed == pytest.approx(HAND.speed, rel=0.02)
+    within = HAND.timeout + OPTIONS.reaction + 3 * OPTIONS.publish_period + HAND.ramp_time
+    climb.run(within)
+    assert climb.states[-1].forward_speed == pytest.approx(0.0, abs=1e-3)
+    assert set(climb.modes) == {Mode.FOLLOWING}
+    assert climb.largest_jump <= 0.2
