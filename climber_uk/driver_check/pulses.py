@@ -27,6 +27,7 @@ DAMPING_TIME, REST_TIME = 0.1, 1.0  # [s] of the motion that is left, and the lo
 REST_SHARE = 0.05  # of the goals, below which it is at rest
 PUSH_TIME, PUSHED_BY = 0.15, 0.5  # [s], [rad/s²] of yawing, before commands stop
 HOLD_TIME, HOLD_PERIODS = 0.4, 12.0  # [s] of a speed, and at least so many odometry messages
+MOVES, PATIENCE = 0.1, 1.0  # of the way at that speed; [s] that it is waited for
 OBEYED, TOO_FAR = 0.3, 4.0  # of the way at that speed, from which on a board has obeyed; too far
 LOOK_TIME = 0.25  # [s] after the watchdog's time, in which the motion is judged
 
@@ -42,13 +43,16 @@ class SpeedPulse:
         self.held = max(HOLD_TIME, HOLD_PERIODS * period)  # and as long at rest
         self.ends, self.ways = self.held, GOALS * self.held  # [m], [rad] it would move at both
         self.start: State | None = None
-        self.is_obeyed = self.done = False
+        self.moves = self.is_obeyed = self.done = False
 
     def command(self, time: float, state: State) -> Array:
         """Rates (2,) (right, left) [rad/s] at `time` [s] since the pulse's begin."""
         self.start = self.start or state
         way = state.pose - self.start.pose
         places = np.array([np.hypot(*way[:2]), abs(wrapped(float(way[2])))])
+        self.moves = self.moves or bool((places > MOVES * self.ways).any())
+        if not self.moves and time < PATIENCE and self.ends > 0:
+            self.ends = time + self.held  # a servo may have to overcome friction first
         self.is_obeyed = self.is_obeyed or bool((places > OBEYED * self.ways).any())
         if (places > TOO_FAR * self.ways).any():
             self.finish()

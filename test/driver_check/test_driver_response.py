@@ -128,7 +128,10 @@ def by_speeds(wheels=RIGHT, expected=TOLD, **how):
     return tried(wheels, **{"motors": SPEEDS, "expected": expected, **how})
 
 
-@pytest.mark.parametrize("wiring", list(WIRINGS))
+@pytest.mark.parametrize(
+    "wiring",
+    [pytest.param(w, marks=[pytest.mark.soak] if n % 3 else []) for n, w in enumerate(WIRINGS)],
+)
 def test_every_wiring_of_a_board_that_takes_speeds_is_found_by_name(wiring):
     seen = by_speeds(WIRINGS[wiring])
     found, likeness = response_of(seen).wiring
@@ -151,8 +154,13 @@ def test_the_board_is_told_and_whether_the_controller_knows(board, told):
     assert {"torque": "effort", "velocity": "velocity"}[board] in found["motors"].said
 
 
-@pytest.mark.parametrize("time_constant", [0.01, 0.02, 0.05, 0.1])
-@pytest.mark.parametrize("late", [0, 4])
+@pytest.mark.parametrize(
+    ("time_constant", "late"),
+    [
+        *((0.02, 0), (0.1, 4)),
+        *(pytest.param(T, late, marks=pytest.mark.soak) for T in (0.01, 0.05) for late in (0, 4)),
+    ],
+)
 def test_time_constant_and_delay_of_a_servo_are_told_apart(time_constant, late):
     motors = Motors(motors="velocity", servo_time_constant=time_constant, velocity_resolution=1e-3)
     seen = by_speeds(motors=motors, late=late)
@@ -197,7 +205,7 @@ FOUR = Contact(locomotion=FourWheeled(), grip=Grip(wheel_inertia=2e-4))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("board", ["torque", "velocity"])
+@pytest.mark.parametrize("board", ["velocity", pytest.param("torque", marks=pytest.mark.soak)])
 def test_four_wheels_on_a_wall_pass_and_what_they_scrub_is_told(board):
     motors = replace(SPEEDS, motors=board)
     expected = replace(TOLD, motors=board)
