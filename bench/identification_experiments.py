@@ -69,7 +69,7 @@ BUILT = Climber(
     suction_pressure=8000.0,
     max_wheel_torque=4.0,
 )
-SLOW = Guidance(frequency=12.0, cross_track_gain=12.0, fade_speed=0.1)
+SLOW = Guidance(frequency=11.0, cross_track_gain=12.0, fade_speed=0.1)
 SCENARIOS = {
     "climber.yaml": Scenario(
         BUILT,

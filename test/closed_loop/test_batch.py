@@ -61,7 +61,7 @@ CASES = {
         EIGHT,
         ON_EIGHT,
         replace(BUILT, mass=around(5.0), seal_friction_coefficient=around(0.6)),
-        replace(SLOW, frequency=around(12.0)),
+        replace(SLOW, frequency=around(11.0)),
         {},
         2,
         0,

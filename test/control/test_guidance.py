@@ -9,7 +9,7 @@ from climber_uk.control.guidance import Guidance
 from climber_uk.mechanics.climber import State
 from climber_uk.mechanics.reference import Reference
 
-CLIMBER_YAML = Guidance(frequency=12.0, cross_track_gain=12.0, fade_speed=0.1)
+CLIMBER_YAML = Guidance(frequency=11.0, cross_track_gain=12.0, fade_speed=0.1)
 
 
 def steering(gains, v_d):
