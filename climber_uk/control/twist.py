@@ -5,10 +5,15 @@ import math
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
 
+Products = tuple[float, float, float]
+FIELDS = "linear.x", "angular.z"
 KIND_MEMORY = 1.0  # [s]
 SURELY = 0.1  # share of the other's squares of misfits, below which a twist is taken for a mean
 CHECK_MEMORY = 0.5  # [s] in which a difference is forgotten
 SHARE = 0.3  # by which they may differ: slip, scale
+# A twist that tells less than a half of the pose's way, as in another unit, is found over this
+# share of the largest error, where both go alike for some messages: else a pose is noisy or jumps
+TOO_LITTLE, TOO_LITTLE_DISTANCE, ALIKE, AT_LEAST = 0.5, 0.05, 0.9, 4
 OPPOSED_DISTANCE = 0.2  # of the largest error: distance of both, to opposite sides
 OPPOSED_IN_A_ROW = 3  # odometry messages
 OPPOSED_IF_TOO_FAST = 0.02  # of the largest error: enough, once, where it is too fast as well
@@ -53,7 +58,8 @@ class TwistCheck:
         """Compare from now on."""
         # [m] by pose and by twist: forward, and of a rim by yawing
         self._distances = (0.0, 0.0), (0.0, 0.0)
-        self._alike = 0.0, 0.0  # [m²] sums of products of pose's and twist's, of the same two
+        # [m²] sums of products, of the same two: pose's by twist's, pose's and twist's squares
+        self._products = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         self._opposed = 0
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
@@ -70,15 +76,25 @@ class TwistCheck:
             (left * pose + forward, left * twist + way),
             (left * yaw_by_pose + turned, left * yaw_by_twist + rim),
         )
-        alike, yaw_alike = self._alike
-        self._alike = left * alike + forward * way, left * yaw_alike + turned * rim
+        drive, yaw = self._products
+        self._products = _summed(left, drive, forward, way), _summed(left, yaw, turned, rim)
 
     def opposed(self, least: float) -> str:
         """Field of the twist whose sign is not its pose's, over `least` [m] of both; else ''."""
-        fields = zip(("linear.x", "angular.z"), self._distances, self._alike, strict=True)
-        for name, (pose, twist), alike in fields:
+        fields = zip(FIELDS, self._distances, self._products, strict=True)
+        for name, (pose, twist), (alike, _, _) in fields:
             if alike < 0 and pose * twist < 0 and min(abs(pose), abs(twist)) > least:
                 return f"twist.{name}"
+        return ""
+
+    def too_little(self, least: float) -> str:
+        """How little of the pose's way, over `least` [m] of it, a twist tells; '' if enough."""
+        for name, (pose, _), products in zip(FIELDS, self._distances, self._products, strict=True):
+            alike, pose_2, twist_2 = products
+            is_way = abs(pose) > least and pose * pose > AT_LEAST * pose_2
+            are_alike = alike > 0 and alike * alike > ALIKE * pose_2 * twist_2
+            if is_way and are_alike and twist_2 < TOO_LITTLE * alike:
+                return f"{name} is {twist_2 / alike:.2f} of it"
         return ""
 
     def trouble(self, largest: float) -> tuple[str, bool]:
@@ -87,8 +103,15 @@ class TwistCheck:
         self._opposed = self._opposed + 1 if opposed else 0
         if self._opposed >= OPPOSED_IN_A_ROW:
             return opposed, True
+        if slow := self.too_little(TOO_LITTLE_DISTANCE * largest):
+            return slow, False
         differs = max(_difference(*self._distances[0]), _difference(*self._distances[1]))
         return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
+
+
+def _summed(left: float, sums: Products, pose: float, twist: float) -> Products:
+    alike, pose_2, twist_2 = sums
+    return left * alike + pose * twist, left * pose_2 + pose * pose, left * twist_2 + twist * twist
 
 
 def mean_twist(before: Motion, now: Motion, time: float) -> tuple[float, float]:
