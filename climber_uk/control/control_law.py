@@ -191,7 +191,7 @@ class ControlLaw:
         v_1, yaw_acceleration, speed, yaw_rate = self._desired(prepared, motion, course)
         sideways = 0.0 if course is None else motion.yaw_rate * motion.speed * course.slope
         mass, inertia, modelled, weight = self.climber.inertial
-        rubbing = (modelled + friction) * clipped(speed / self.options.friction_speed, -1.0, 1.0)
+        rubbing = (modelled + friction) * tanh(speed / self.options.friction_speed)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
         force = mass * (v_1 - sideways) + rubbing + weight * motion.sine
         return force, inertia * yaw_acceleration + scrubbing, v_1, yaw_rate
@@ -231,7 +231,7 @@ class ControlLaw:
             desired = self._desired(prepared, motion, course)
             speed, yaw_rate = desired.speed, desired.yaw_rate
             A, b = rows(state, desired, ratio, 0.0 if course is None else course.rate)
-        direction = clipped(speed / self.options.friction_speed, -1.0, 1.0)
+        direction = tanh(speed / self.options.friction_speed)
         Q = self.climber.applied_force(heading, direction)
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
@@ -246,7 +246,7 @@ class ControlLaw:
         assert self.other is not None
         force, moment = self.other.wrench(self.climber, target, motion)
         mass, _, rubbing, weight = self.climber.inertial
-        direction = clipped(target.speed / self.options.friction_speed, -1.0, 1.0)
+        direction = tanh(target.speed / self.options.friction_speed)
         v_1 = (force - rubbing * direction - weight * motion.sine) / mass
         return force + friction * direction, moment, v_1, 0.0
 

@@ -78,6 +78,8 @@ class Expected(NamedTuple):
     wanted: Rates  # of the reference
     allowed: Rates  # at most
     waits: bool  # whether the reference does, as torque is missing
+    way: float = 1.0  # sign of the reference's speed
+    against: float = math.inf  # [m/s] at most, against that way
 
 
 class Variance:
@@ -151,7 +153,7 @@ class Guard:
         """What is wrong with what is observed; None if all is well."""
         torques = observed.torques
         self._add_to_wheels(climber, observed, torques)
-        too_fast = self._watch_rates(climber, observed, expected.allowed)
+        too_fast = self._watch_rates(climber, observed, expected)
         return (
             self._watch_wheels(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
             or too_fast
@@ -159,9 +161,13 @@ class Guard:
             or self._watch_disturbance(climber, observed.disturbance)
         )
 
-    def _watch_rates(self, climber: Climber, observed: Observed, allowed: Rates) -> Trouble | None:
-        options, motion = self.options, observed.after
-        fastest = allowed.speed + options.speed_margin + self._let_go(climber, observed)
+    def _watch_rates(
+        self, climber: Climber, observed: Observed, expected: Expected
+    ) -> Trouble | None:
+        options, motion, allowed = self.options, observed.after, expected.allowed
+        is_against = motion.speed * expected.way < 0
+        most = min(allowed.speed, expected.against) if is_against else allowed.speed
+        fastest = most + options.speed_margin + self._let_go(climber, observed)
         fastest_yaw_rate = allowed.yaw_rate + options.yaw_rate_margin
         is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
         is_yawing = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_yaw_rate
