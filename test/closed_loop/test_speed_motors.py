@@ -74,7 +74,7 @@ def drive(servo, path=SMALL, link=INNER, truth=lambda it: it, **parameters):
 def hunting(told):
     """RMS of the change from one command to the next [m/s], on the whole and at rest."""
     changes = np.diff(told, axis=0)
-    return [np.sqrt(np.mean(part**2)) for part in (changes, changes[-len(changes) // 6 :])]
+    return [np.sqrt(np.mean(part**2)) for part in (changes, changes[-len(changes) // 20 :])]
 
 
 def test_climber_yaml_differs_in_its_motors_only():

@@ -15,7 +15,7 @@ def test_several_wheels_a_side_have_their_share_in_all_messages(world):
     world.start_node("uk_torque_controller", "use_sim_time:=true", config=config)
     world.start_node("trajectory_publisher", "use_sim_time:=true", config=config)
     world.start_node("plant_simulator", "simulated_time:=true", config=config)
-    world.wait(lambda: joints and max(joints[-1].velocity) > 0.5, "motion")
+    world.wait(lambda: commands and joints and max(joints[-1].velocity) > 0.5, "motion")
     names = [f"{side}_{row}_wheel_joint" for side in ("left", "right") for row in ("front", "rear")]
     for message in (commands[-1], joints[-1]):
         assert list(message.name) == names
