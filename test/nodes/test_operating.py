@@ -126,7 +126,7 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert (status, "out of range" in said) == (1, True)
     status, said = climb.command("status")
     assert status == 0
-    assert said.startswith("following, ")
+    assert said.startswith(("following, ", "done, "))  # by simulated time, which runs on
     assert climb.command("retreat") == (0, "goes back along the path\n")
     climb.drives(-0.16, -0.14)
     back = climb.is_told_to_be("done")
