@@ -205,7 +205,8 @@ FOUR = Contact(locomotion=FourWheeled(), grip=Grip(wheel_inertia=2e-4))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("board", ["velocity", pytest.param("torque", marks=pytest.mark.soak)])
+@pytest.mark.soak
+@pytest.mark.parametrize("board", ["velocity", "torque"])
 def test_four_wheels_on_a_wall_pass_and_what_they_scrub_is_told(board):
     motors = replace(SPEEDS, motors=board)
     expected = replace(TOLD, motors=board)

@@ -146,6 +146,7 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01
 
 
+@pytest.mark.soak
 def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
     by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2"]
