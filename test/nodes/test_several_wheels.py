@@ -23,11 +23,13 @@ def test_several_wheels_a_side_have_their_share_in_all_messages(world):
             front_left, rear_left, front_right, rear_right = values
             assert (front_left, front_right) == (rear_left, rear_right)
     # what both ends of the line have is the same: the plant adds up what the controller shares out
-    told = {reading.nanoseconds(m.header.stamp): m.effort for m in commands}
     period = 5_000_000
-    acted = [m for m in joints if reading.nanoseconds(m.header.stamp) - period in told][-20:]
-    assert acted
-    for message in acted:
-        assert list(message.effort) == pytest.approx(
-            list(told[reading.nanoseconds(message.header.stamp) - period])
-        )
+
+    def both():
+        """Torques that were commanded and that acted, of the same odometry."""
+        told = {reading.nanoseconds(m.header.stamp): m.effort for m in commands}
+        stamped = ((reading.nanoseconds(m.header.stamp) - period, m.effort) for m in joints)
+        return [(told[stamp], acted) for stamp, acted in stamped if stamp in told]
+
+    for commanded, acted in world.wait(both, "torques on both topics")[-20:]:
+        assert list(acted) == pytest.approx(list(commanded))
