@@ -20,7 +20,7 @@ from climber_uk.mechanics.quantities import Motion, ReferencePoint
 
 TOLERANCE = 0.05  # [m, rad] within which a new preview goes on with the old one
 AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastest motion counts
-GOES = 0.02  # [m/s] of a reference, from which on it has a way
+GOES = 0.02  # [m/s] of a reference, from which on it is clear which way it goes
 KEPT_BEHIND = 2 * SECOND  # [ns] of a reference that is kept behind the climber
 MOST_POINTS = 5000  # of a reference that are kept, however many come
 LONGEST_SKIP = SECOND  # [ns] of a reference that a climber, which went on unanswered, may be ahead
@@ -156,13 +156,12 @@ class ActiveReference:
         hurry = 1 + (self.pacing.catch_up if pace.lag > 0 else 0.0)
         speed, yaw_rate = self._around[2]
         constraints = self.gentle if self.is_gentle else constraints
-        way = target.speed
-        against = constraints.fastest(0.0, 0.0)[0] if abs(way) > GOES else math.inf
+        against = constraints.fastest(0.0, 0.0)[0] if abs(target.speed) > GOES else math.inf
         return Expected(
             wanted=Rates(math.hypot(target.v_x, target.v_y), abs(target.yaw_rate)),
             allowed=Rates(*constraints.fastest(hurry * speed, hurry * yaw_rate)),
             waits=pace.rate < STANDS,
-            way=way,
+            speed=target.speed,
             against=against,
         )
 

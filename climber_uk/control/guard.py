@@ -78,8 +78,8 @@ class Expected(NamedTuple):
     wanted: Rates  # of the reference
     allowed: Rates  # at most
     waits: bool  # whether the reference does, as torque is missing
-    way: float = 1.0  # sign of the reference's speed
-    against: float = math.inf  # [m/s] at most, against that way
+    speed: float = 0.0  # [m/s] of the reference, below 0 in reverse gear
+    against: float = math.inf  # [m/s] at most, the other way than that
 
 
 class Variance:
@@ -165,7 +165,7 @@ class Guard:
         self, climber: Climber, observed: Observed, expected: Expected
     ) -> Trouble | None:
         options, motion, allowed = self.options, observed.after, expected.allowed
-        is_against = motion.speed * expected.way < 0
+        is_against = motion.speed * expected.speed < 0
         most = min(allowed.speed, expected.against) if is_against else allowed.speed
         fastest = most + options.speed_margin + self._let_go(climber, observed)
         fastest_yaw_rate = allowed.yaw_rate + options.yaw_rate_margin

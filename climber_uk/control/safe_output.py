@@ -78,16 +78,18 @@ class SafeOutput:
             one = mode is Mode.DEAD_WHEEL and climber.seal_friction >= climber.weight_along_wall
             return Braking(0.0, yaw, carries=False) if one else Braking(drive, yaw)
         rims = motion.speed, climber.half_track * motion.yaw_rate
-        shaking = (
-            SHAKING * (-1) ** ((doubted + HALF_SHAKE // 2) // HALF_SHAKE)
-            if doubted < SHAKES
-            else 0.0
-        )
-        shaken = [
-            0.0 if sign or abs(rim) < SHAKEN else shaking
+        drive, yaw = (
+            0.0 if sign or abs(rim) < SHAKEN else _shaking(doubted)
             for sign, rim in zip(signs, rims, strict=True)
-        ]
-        return Braking(rate * signs[0], rate * signs[1], shaking=(shaken[0], shaken[1]))
+        )
+        return Braking(rate * signs[0], rate * signs[1], shaking=(drive, yaw))
+
+
+def _shaking(doubted: int) -> float:
+    """Acceleration [m/s²] that shakes what has been in doubt for so long [ns]."""
+    if doubted >= SHAKES:
+        return 0.0
+    return SHAKING if (doubted + HALF_SHAKE // 2) // HALF_SHAKE % 2 == 0 else -SHAKING
 
 
 def _let_go(estimator: Estimator, age: float) -> Torques:

@@ -36,6 +36,12 @@ class HandOptions:
     timeout: float = parameter(0.5, "s", "without a message, after which it brakes", above=0)
 
 
+def check_speeds(speed: float, yaw_rate: float) -> None:
+    """Raise `ValueError` if they are none."""
+    if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
+        raise ValueError(f"speed={speed}, yaw rate={yaw_rate} must be finite")
+
+
 class ByHand(Generic[Row]):
     """A reference that started at `start` [ns] at rest in `pose` (3,), as `Course` is one."""
 
@@ -58,9 +64,8 @@ class ByHand(Generic[Row]):
         self._heard = -math.inf  # [s] when
 
     def command(self, speed: float, yaw_rate: float, now: int) -> None:
-        """Ask for speeds [m/s], [rad/s] at `now` [ns]; raises `ValueError` if they are none."""
-        if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
-            raise ValueError(f"speed={speed}, yaw rate={yaw_rate} must be finite")
+        """Ask for speeds [m/s], [rad/s] at `now` [ns]; raises as `check_speeds` does."""
+        check_speeds(speed, yaw_rate)
         hand = self.hand
         self._asked = (
             min(max(speed, -hand.speed), hand.speed),

@@ -3,14 +3,13 @@
 Whatever is next begins at an odometry, and at rest: what is under way comes to rest first.
 """
 
-import math
 from collections.abc import Callable
 from typing import Generic
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.planning.by_hand import ByHand, HandOptions
+from climber_uk.planning.by_hand import ByHand, HandOptions, check_speeds
 from climber_uk.planning.course import Course, CourseOptions, Row
 
 PATH, HAND, BACK = "path", "by hand", "back on the path"  # what may be next
@@ -125,10 +124,9 @@ class Journey(Generic[Row]):
     def takes_over(self, speed: float, yaw_rate: float, now: int) -> bool:
         """Whether a stick's speeds [m/s], [rad/s] are to take over; if they have, drive by them.
 
-        Raises `ValueError` if they are none.
+        Raises as `check_speeds` does.
         """
-        if not (math.isfinite(speed) and math.isfinite(yaw_rate)):
-            raise ValueError(f"speed={speed}, yaw rate={yaw_rate} must be finite")
+        check_speeds(speed, yaw_rate)
         if self.hand is not None and not self.waits_for_rest:
             self.hand.command(speed, yaw_rate, now)
             return False

@@ -60,4 +60,4 @@ class PathIntake:
         return trajectory, summary
 
     def _refuse(self, why: str) -> None:
-        self._node.get_logger().warning(f"path refused: {why}")
+        self._node.report("path", f"refused: {why}")

@@ -1,5 +1,6 @@
 """The guard by itself: what is just within its bounds, and what just beyond."""
 
+import numpy as np
 import pytest
 
 from climber_uk.control.estimator import Observed
@@ -26,7 +27,8 @@ class Watched:
     def finds(self, speed=0.1, turn=0.0, torques=(0.0, 0.0), disturbance=(0.0, 0.0), **expected):
         """What it finds in the next period."""
         wanted = Rates(*expected.get("wanted", (0.2, 0.0)))
-        expected = Expected(wanted, Rates(0.3, 0.5), expected.get("waits", False))
+        way = [expected[name] for name in ("reference", "against") if name in expected]
+        expected = Expected(wanted, Rates(0.3, 0.5), expected.get("waits", False), *way)
         motion = Motion(0.0, 0.0, 0.0, 1.0, 0.0, speed, turn)
         wrench, acted = Wrench(*disturbance), [(Torques(*torques), PERIOD)]
         observed = Observed(motion, motion, PERIOD, acted, wrench, REACTION)
@@ -41,6 +43,16 @@ class Watched:
             if found:
                 return number
         return None
+
+
+@pytest.mark.parametrize(("reference", "is_against"), [(0.2, -1.0), (-0.2, 1.0)])
+def test_the_other_way_than_the_reference_goes_less_is_too_fast(reference, is_against):
+    most = 0.05 + GuardOptions().speed_margin
+    for speed, found in ((most - 1e-3, None), (most + 1e-3, 2), (-(most + 1e-3), None)):
+        way = {"reference": reference, "against": 0.05, "speed": is_against * speed}
+        assert Watched().periods_until(Mode.TOO_FAST, **way) == found
+    unclear = {"reference": reference, "against": np.inf, "speed": is_against * (most + 1e-3)}
+    assert Watched().periods_until(Mode.TOO_FAST, **unclear) is None
 
 
 @pytest.mark.parametrize(
