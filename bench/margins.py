@@ -153,17 +153,26 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--period", type=float, default=0.005, help="of the odometry [s]")
     parser.add_argument("--bandwidth", type=float, default=Observer().bandwidth, help="[1/s]")
+    for gain, unit in (("frequency", "rad/s"), ("damping", "")):
+        parser.add_argument(f"--{gain}", type=float, help=f"of the guidance [{unit}]")
+    parser.add_argument("--linear", action="store_true", help="no simulations")
     options = parser.parse_args()
     period, observer = options.period, Observer(bandwidth=options.bandwidth)
     print(f"{'delay, lag [ms]':<20}{'linear':>16}{'simulated':>16}{'and learnt':>16}")
-    for name, (scenario, speed) in SCENARIOS.items():
+    asked = {gain: getattr(options, gain) for gain in ("frequency", "damping")}
+    given = {gain: value for gain, value in asked.items() if value is not None}
+    for name, (built, speed) in SCENARIOS.items():
+        scenario = replace(built, guidance=replace(built.guidance, **given))
         law = ControlLaw(scenario.believed, scenario.guidance)
 
         def make(law: ControlLaw = law) -> Controller:
             return Controller(Settings(law, observer), Safety(), ANYWHERE, UNGUARDED)
 
         cells = [linear_margins(scenario.guidance, speed, observer, period)]
-        cells += [simulated_margins(scenario, make, period, learns) for learns in (False, True)]
+        cells += [
+            simulated_margins(scenario, make, period, learns)
+            for learns in (False, True)[: 0 if options.linear else 2]
+        ]
         print(f"{name:<20}" + "".join(f"{f'{d:.1f}, {lag:.1f}':>16}" for d, lag in cells))
 
 
