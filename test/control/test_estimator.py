@@ -81,7 +81,7 @@ def test_prediction_takes_the_error_of_holding_a_torque_away():
         )
         return run.rms(after=1.0)
 
-    assert error() < error(ControlOptions(predict=False)) / 40
+    assert error() < error(ControlOptions(predict=False)) / 48
     assert error(delay=0.005) < error(delay=0.005, known=False) / 50
 
 
