@@ -1,7 +1,8 @@
 """Tell whether a climber can drive a path, before it does: where what limits it, and what it takes.
 
 The path is that of trajectory_publisher's parameters in a file, the climber that of
-uk_torque_controller's. The status is 1 if the path asks for more than there is.
+uk_torque_controller's. The status is 1 if the path asks for more than there is,
+and 2 if that cannot be told.
 """
 
 import json
@@ -17,11 +18,16 @@ from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
 from climber_uk.messages.topics import CONTROLLER, PLANNER
-from climber_uk.parameters.parameter_file import Values, read_argument, read_file
+from climber_uk.parameters.parameter_file import Values, read_argument, read_file, similar
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import Demands, demands
 from climber_uk.system.command_line import Parser, between
 
+NAMES = {
+    prefix + field.name
+    for kind, prefix in TYPES
+    for field in fields(kind)  # type: ignore[arg-type]
+}
 PATHS = {  # parameters that are files
     prefix + field.name
     for kind, prefix in TYPES
@@ -33,9 +39,13 @@ PATHS = {  # parameters that are files
 def read(file: Path, changes: dict[str, Any]) -> tuple[Trajectory, Climber, Attachment]:
     """Path, climber and what holds it, by a parameter file and changes of the path's parameters.
 
-    Raises `ValueError`.
+    Raises `ValueError`, also for a name that no part of the path has: it is misspelt.
     """
     planner = {**read_file(file, f"/{PLANNER}"), **changes}
+    parts = {name.partition(".")[0] for name in NAMES if "." in name}
+    for name in planner:  # a file has more of the planner, but of a part all is known
+        if name not in NAMES and (name in changes or name.partition(".")[0] in parts):
+            raise ValueError(f"{name} is no parameter of a path{similar(name, NAMES)}")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
         planner[name] = located(planner[name], name, f"/{PLANNER}", words)
@@ -114,5 +124,6 @@ def main() -> None:
             (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
             print(draw(found, options.output / "check_path.png"))
     except (ValueError, OSError) as error:
-        sys.exit(f"check_path: {error}")
+        print(f"check_path: {error}", file=sys.stderr)
+        sys.exit(2)
     sys.exit(not numbers["feasible"])

@@ -100,11 +100,29 @@ def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatc
     assert "TOO MUCH" in said
 
 
-def test_what_is_wrong_is_said_in_one_line(monkeypatch, capsys):
-    words = "--params", CONFIG / "climber.yaml", "-p", "shape:=nothing"
-    status, _ = run(monkeypatch, capsys, *words)
-    assert status.startswith("check_path: shape='nothing' must be one of ")
-    assert len(status.splitlines()) == 1
+@pytest.mark.parametrize(
+    ("text", "words", "line"),
+    [
+        (None, ["-p", "shape:=nothing"], "shape='nothing' must be one of "),
+        (None, ["-p", "rest_to_rest.ratee:=5.0"], "(did you mean rest_to_rest.rate?)"),
+        (None, ["-p", "autostart:=false"], "autostart is no parameter of a path"),
+        ("rest_to_rest.ramp_tim: 0.1", [], "(did you mean rest_to_rest.ramp_time?)"),
+        ("shape: circle\n    circle: {radus: 0.1}", [], "(did you mean circle.radius?)"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(monkeypatch, capsys, tmp_path, text, words, line):
+    file = CONFIG / "climber.yaml"
+    if text:
+        file = tmp_path / "wrong.yaml"
+        file.write_text(f"/**/trajectory_publisher:\n  ros__parameters:\n    {text}\n")
+    monkeypatch.setattr("sys.argv", ["check_path", "--params", str(file), *words])
+    with pytest.raises(SystemExit) as ended:
+        check_path.main()
+    said = capsys.readouterr()
+    assert (ended.value.code, said.out) == (2, "")
+    assert said.err.startswith("check_path: ")
+    assert line in said.err
+    assert len(said.err.splitlines()) == 1
 
 
 def test_margins_are_those_that_the_nodes_tell():
