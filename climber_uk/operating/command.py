@@ -13,7 +13,7 @@ The status is 0 if it is done, 1 if it is refused, 3 if nobody answers.
 import math
 import sys
 import time
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -22,9 +22,11 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import SetParameters
+from rclpy.exceptions import InvalidNamespaceException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.validate_namespace import validate_namespace
 from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.messages import writing
@@ -141,7 +143,9 @@ def parse() -> Namespace:
     parser.formatter_class = RawDescriptionHelpFormatter
     parser.add_argument("verb", choices=DO, help="what it is to do")
     parser.add_argument("values", nargs="*", type=between(-1e6, 1e6), help="of speed and push")
-    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
+    parser.add_argument(
+        "--namespace", type=_namespace, default="", help="of the climber (default: none)"
+    )
     parser.add_argument(
         "--timeout",
         type=between(0.1, 3600.0),
@@ -157,6 +161,14 @@ def parse() -> Namespace:
     if len(options.values) != number:
         parser.error(f"{options.verb} takes {number} number(s), not {len(options.values)}")
     return options
+
+
+def _namespace(name: str) -> str:
+    try:
+        validate_namespace("/" + (bare := name.strip("/")))
+    except InvalidNamespaceException:
+        raise ArgumentTypeError(f"{name!r} is no namespace") from None
+    return bare
 
 
 def main() -> None:
