@@ -21,7 +21,7 @@ BELOW = {
     "localization": MATHEMATICS,
     "planning": MATHEMATICS,
     "messages": MATHEMATICS,
-    "closed_loop": MATHEMATICS | {"control", "simulation"},
+    "closed_loop": MATHEMATICS | {"control", "simulation", "messages"},
     "bags": MATHEMATICS | {"control", "messages"},
     "ros": MATHEMATICS | {"planning", "system", "control", "simulation", "messages"},
     "report": DATA | {"system", "bags"},

@@ -12,13 +12,14 @@ import yaml
 from climber_uk.campaign import names
 from climber_uk.campaign.distributions import Distribution, Uniform, distribution, drawn, extremes
 from climber_uk.campaign.limits import Limit
-from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, PARAMETERS, SEED
+from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, SEED
 from climber_uk.campaign.scenario import Node, Scenario
+from climber_uk.closed_loop.node_parameters import PARAMETERS, read_parameters
 from climber_uk.closed_loop.period import BACKENDS
 from climber_uk.mechanics import Array
 from climber_uk.messages.topics import NODES, PLANT
 from climber_uk.parameters.declaration import parameter, parameters
-from climber_uk.parameters.parameter_file import given, load, nothing_for, read_sections, similar
+from climber_uk.parameters.parameter_file import load
 from climber_uk.simulation.options import SimulationOptions
 
 SEEDS = Uniform(0, 2**31)  # of the nodes, rounded down
@@ -131,16 +132,9 @@ def _size(given: dict[str, Any]) -> Size:
 
 def _read_base(path: Path) -> dict[str, Any]:
     """Values of the nodes' parameter file, by full name."""
-    found = {}
-    sections = read_sections(path)
-    for node in NODES:
-        here = given(sections, f"/{node}")
-        if not here:
-            raise ValueError(nothing_for(f"/{node}", path, sections))
-        for name, (value, is_shared) in here.items():
-            if f"{node}.{name}" in PARAMETERS:
-                found[f"{node}.{name}"] = value
-            elif not (is_shared or {name, name.split(".")[0]} & names.NODES_ONLY):
-                meant = similar(f"{node}.{name}", PARAMETERS)
-                raise ValueError(f"{path}: {node}.{name} is not a parameter of it{meant}")
-    return found
+    return {
+        f"{node}.{name}": value
+        for node in NODES
+        for name, value in read_parameters(path, f"/{node}").items()
+        if f"{node}.{name}" in PARAMETERS
+    }

@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from climber_uk.campaign.campaign import Campaign
 from climber_uk.campaign.counting import histograms, rank_correlations
 from climber_uk.campaign.limits import METRICS
-from climber_uk.campaign.names import PARAMETERS
 from climber_uk.campaign.parts import Store
 from climber_uk.campaign.results import broken, wilson
+from climber_uk.closed_loop.node_parameters import PARAMETERS
 from climber_uk.mechanics import Array
 from climber_uk.messages.topics import PLANT
 from climber_uk.report.plotting import plt, saved

@@ -1,63 +1,25 @@
-"""Parameters of the nodes in a campaign: those that can be drawn, are fixed, or have no effect.
+"""Parameters of the nodes in a campaign: those that can be drawn, or are fixed."""
 
-A name is that of a node and of its parameter, as in `plant_simulator.mass`.
-"""
-
-import dataclasses
 from typing import Any
 
-from climber_uk.control.build import KINDS as CONTROLLER_TYPES
+from climber_uk.closed_loop.node_parameters import PARAMETERS, fields_of
 from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
-from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
-from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
-from climber_uk.simulation.field_sensors import FIELD_SENSORS
-from climber_uk.simulation.motors import Motors
-from climber_uk.simulation.options import SimulationOptions
+from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.simulation.sensors import Sensors
-from climber_uk.simulation.simulated_robot import VARIANTS, Physics
 
 SEED, PRESSURE = f"{PLANT}.seed", f"{PLANT}.suction_pressure"
 MEASURED = f"{CONTROLLER}.suction_pressure"
 CONSTRAINT_SET = f"{CONTROLLER}.constraints"
 LOSS_TIME = f"{PLANT}.pressure_loss_time"
-
-
-def _names(node: str, *kinds: tuple[type, str]) -> dict[str, "dataclasses.Field[Any]"]:
-    return {
-        f"{node}.{prefix}{field.name}": field
-        for kind, prefix in kinds
-        for field in dataclasses.fields(kind)  # type: ignore[arg-type]
-    }
-
-
-ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHESION.items())]
-PARAMETERS = {
-    **_names(PLANNER, *TRAJECTORY_TYPES),
-    **_names(CONTROLLER, *CONTROLLER_TYPES, *ON_WALL),
-    **_names(PLANT, *((k, "") for k in (SimulationOptions, Climber, Physics, Motors, Sensors))),
-    **_names(PLANT, *((k, f"{name}.") for group in VARIANTS.values() for name, k in group.items())),
-    **_names(PLANT, *ON_WALL),
-}
-# Parameters of the nodes that have no effect in lock-step: names, topics, rates of publishing, and
-# sensors that no odometry comes from
-NODES_ONLY = {
-    *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
-    *("stop_time", "reaction", "speed", "exclusive"),
-    *(f"by_hand.{name}" for name in ("input", "speed", "yaw_rate", "ramp_time", "timeout")),
-    *("effort_commands", "effort_order", "publish_cmd_vel", "odom_frame", "base_frame"),
-    *("left_wheel_joint", "right_wheel_joint", "prefix_frames", "qos_overrides"),
-    *(at + field.name for at, kind in FIELD_SENSORS.items() for field in dataclasses.fields(kind)),
-}
 # Parameters that may differ from run to run
 VARIED = {
-    *_names(PLANT, (Climber, "")),
+    *fields_of(PLANT, [(Climber, "")]),
     *(f"{PLANT}.{error.name}" for error in Sensors.errors()),
     *(f"{PLANT}.{n}" for n in ("wheel_friction_coefficient", "centre_height", "wheelbase")),
     *(f"{PLANT}.initial_{n}" for n in ("x", "y", "heading", "speed", "yaw_rate")),
     *(LOSS_TIME, f"{PLANT}.pressure_loss_level"),
-    *_names(CONTROLLER, (Climber, ""), *((kind, f"{n}.") for n, kind in CONSTRAINTS.items())),
+    *fields_of(CONTROLLER, [(Climber, ""), *((kind, f"{n}.") for n, kind in CONSTRAINTS.items())]),
     *(f"{CONTROLLER}.{n}" for n in ("friction_speed", "observer.bandwidth")),
 }
 VARIED -= {MEASURED}

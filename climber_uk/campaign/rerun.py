@@ -6,8 +6,9 @@ from typing import Any
 
 from climber_uk.campaign.campaign import Campaign
 from climber_uk.campaign.limits import METRICS
-from climber_uk.campaign.names import MEASURED, PARAMETERS, PRESSURE, WITHOUT
+from climber_uk.campaign.names import MEASURED, PRESSURE, WITHOUT
 from climber_uk.campaign.parts import computed
+from climber_uk.closed_loop.node_parameters import PARAMETERS
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.system.processes import call
 

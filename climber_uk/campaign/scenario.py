@@ -7,8 +7,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from climber_uk.campaign.names import PARAMETERS, REQUIRED, SEED, WITHOUT
+from climber_uk.campaign.names import REQUIRED, SEED, WITHOUT
 from climber_uk.closed_loop.batch import Change, Loops
+from climber_uk.closed_loop.node_parameters import PARAMETERS
 from climber_uk.closed_loop.period import BatchRun
 from climber_uk.control.build import settings
 from climber_uk.mechanics.adhesion import Grip

@@ -7,4 +7,6 @@ Many: arrays (N,) in the place of numbers -> `batch.Loops` (the nodes' `Estimato
 `pressure_gauge` and `simulation.sensors`) -> `period.LoopsState`, from one period to the next ->
 steps of the plants (`unicycle`, or `compiled`, which is the same by numba) -> `outcome.Tally` ->
 `outcome.Outcome`. By JAX (`traced`) all of it but the first periods.
+
+`node_parameters` has the parameters of controller, plant and planner, and reads files of them.
 """

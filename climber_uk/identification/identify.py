@@ -13,6 +13,7 @@ from typing import Any
 
 from climber_uk.bags.run_reader import RunReader
 from climber_uk.bags.topics import Topics
+from climber_uk.closed_loop.node_parameters import read_parameters
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
@@ -24,7 +25,7 @@ from climber_uk.identification.report import changes, label_of, missing, remarks
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
-from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.parameters.parameter_file import Values, given, read_sections
 from climber_uk.report.outputs import check_writable, printable
 from climber_uk.system.command_line import Parser, between
 
@@ -94,15 +95,14 @@ def plan(options: argparse.Namespace) -> None:
 def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
     """Parameters of a node in the parameter file, by name; empty without a file."""
     name = Topics().full(node, options.namespace.strip("/"))
-    return read_file(options.params, name) if options.params else {}
+    return read_parameters(options.params, name) if options.params else {}
 
 
 def plant_of(options: argparse.Namespace) -> dict[str, Any]:
     """Parameters of the simulator in the parameter file, by name; empty if it has none."""
-    try:
-        return parameters_of(PLANT, options)
-    except ValueError:
-        return {}
+    name = Topics().full(PLANT, options.namespace.strip("/"))
+    is_there = options.params and given(read_sections(options.params), name)
+    return parameters_of(PLANT, options) if is_there else {}
 
 
 def main() -> None:

@@ -9,6 +9,8 @@ from typing import Any, dataclass_transform
 
 import numpy as np
 
+QOS = "qos_overrides."  # with which rclpy's own parameters begin
+
 
 def parameter(
     default: Any,

@@ -7,13 +7,15 @@ import dataclasses
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import yaml
+
+from climber_uk.parameters.declaration import QOS
 
 T = TypeVar("T")
 PARAMETERS = "ros__parameters"
@@ -100,16 +102,20 @@ def read_sections(path: Path) -> list[Section]:
     return list(found.values())
 
 
-def read_file(path: Path, node: str) -> dict[str, Any]:
+def read_file(path: Path, node: str, known: Collection[str] = ()) -> dict[str, Any]:
     """Values of a parameter file for a node, by name; of two entries the later one counts.
 
-    `node` is the full name. Raises `ValueError` if the file has none for it. Values that name a
-    file are relative to the working directory, not to the parameter file.
+    `node` is the full name. Raises `ValueError` if the file has none for it, or has one that is
+    not `known`, if anything is: it is misspelt. Values that name a file are relative to the
+    working directory, not to the parameter file.
     """
     sections = read_sections(path)
     found = given(sections, node)
     if not found:
         raise ValueError(nothing_for(node, path, sections))
+    for name, (_, is_shared) in found.items():
+        if known and name not in known and not (is_shared or name.startswith(QOS)):
+            raise ValueError(f"{path}: {name} is no parameter of {node}{similar(name, known)}")
     return {name: value for name, (value, _) in found.items()}
 
 

@@ -11,6 +11,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from climber_uk.closed_loop.node_parameters import read_parameters
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics.adhesion import ADHESION, Attachment, Grip
 from climber_uk.mechanics.climber import Climber
@@ -18,7 +19,7 @@ from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
 from climber_uk.messages.topics import CONTROLLER, PLANNER
-from climber_uk.parameters.parameter_file import Values, read_argument, read_file, similar
+from climber_uk.parameters.parameter_file import Values, read_argument, similar
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import Demands, demands
 from climber_uk.system.command_line import Parser, between
@@ -39,18 +40,17 @@ PATHS = {  # parameters that are files
 def read(file: Path, changes: dict[str, Any]) -> tuple[Trajectory, Climber, Attachment]:
     """Path, climber and what holds it, by a parameter file and changes of the path's parameters.
 
-    Raises `ValueError`, also for a name that no part of the path has: it is misspelt.
+    Raises `ValueError`, also for a name that no part of the path has.
     """
-    planner = {**read_file(file, f"/{PLANNER}"), **changes}
-    parts = {name.partition(".")[0] for name in NAMES if "." in name}
-    for name in planner:  # a file has more of the planner, but of a part all is known
-        if name not in NAMES and (name in changes or name.partition(".")[0] in parts):
+    planner = {**read_parameters(file, f"/{PLANNER}"), **changes}
+    for name in changes:
+        if name not in NAMES:
             raise ValueError(f"{name} is no parameter of a path{similar(name, NAMES)}")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
         planner[name] = located(planner[name], name, f"/{PLANNER}", words)
     trajectory = build_trajectory(Values(planner).read)
-    values = Values(read_file(file, f"/{CONTROLLER}"))
+    values = Values(read_parameters(file, f"/{CONTROLLER}"))
     name = values.read(ControllerChoice).adhesion
     attachment = Attachment(
         adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)

@@ -7,16 +7,18 @@ backwards, by all that the bag has. Writes two trajectories, numbers and a pictu
 import argparse
 import json
 import sys
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from climber_uk.bags.bag import open_bag
 from climber_uk.bags.topics import Topics
+from climber_uk.closed_loop.node_parameters import NODES_ONLY
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.sensor_frames import SensorFrames
 from climber_uk.messages.names import Names
 from climber_uk.messages.topics import LOCALIZATION
-from climber_uk.parameters.parameter_file import Values, read_argument, read_file
+from climber_uk.parameters.parameter_file import Values, read_argument, read_file, similar
 from climber_uk.replay import localization_figure
 from climber_uk.replay.localized import Localized, localized
 from climber_uk.replay.recorded_sensors import RecordedSensors, read_sensors
@@ -30,17 +32,15 @@ MOST_REMARKS = 10  # that are printed
 def parameters_of(options: argparse.Namespace, namespace: str) -> dict[str, Any]:
     """Parameters of the node by name; raises `ValueError` naming one that it does not have."""
     name = Topics().full(LOCALIZATION, namespace)
-    parameters = read_file(options.params, name) if options.params else {}
+    kinds = LocalizationOptions, SensorFrames, Names
+    known = {field.name for kind in kinds for field in fields(kind)}
+    parameters = read_file(options.params, name, known | NODES_ONLY) if options.params else {}
     for argument in options.parameter:
-        known, value = read_argument(argument)
-        if known not in {*_fields(LocalizationOptions), *_fields(SensorFrames), *_fields(Names)}:
-            raise ValueError(f"{known} is no parameter of {LOCALIZATION}")
-        parameters[known] = value
+        name, value = read_argument(argument)
+        if name not in known:
+            raise ValueError(f"{name} is no parameter of {LOCALIZATION}{similar(name, known)}")
+        parameters[name] = value
     return parameters
-
-
-def _fields(kind: type[Any]) -> list[str]:
-    return list(kind.__dataclass_fields__)
 
 
 def localize(bag: Path, namespace: str, values: Values) -> tuple[RecordedSensors, Localized]:

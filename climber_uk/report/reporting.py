@@ -9,9 +9,10 @@ from typing import Any
 
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.topics import Topics
+from climber_uk.closed_loop.node_parameters import read_parameters
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER
-from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.parameters.parameter_file import Values
 from climber_uk.report import figures
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import Case
@@ -126,7 +127,7 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
 
 
 def _parameters(file: Path, namespace: str) -> dict[str, Any]:
-    found = read_file(file, f"/{namespace}/{CONTROLLER}".replace("//", "/"))
+    found = read_parameters(file, f"/{namespace}/{CONTROLLER}".replace("//", "/"))
     Values(found).read(Climber)  # which says what is wrong with them
     return found
 

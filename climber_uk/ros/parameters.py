@@ -15,14 +15,13 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from climber_uk.parameters.declaration import bounds, check_value
+from climber_uk.parameters.declaration import QOS, bounds, check_value
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.parameters.plausibility import doubt
 
 T = TypeVar("T")
 Field = dataclasses.Field[Any]
-QOS = "qos_overrides."
 
 
 class NodeParameters:

@@ -30,9 +30,9 @@ from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.messages.names import Names
 from climber_uk.messages.topics import DIAGNOSTICS
-from climber_uk.parameters.declaration import parameter, parameters
+from climber_uk.parameters.declaration import QOS, parameter, parameters
 from climber_uk.parameters.parameter_files import ParameterFiles
-from climber_uk.ros.parameters import QOS, NodeParameters
+from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.signals import ignore_end, on_end
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from climber_uk.campaign.names import PARAMETERS
+from climber_uk.closed_loop.node_parameters import PARAMETERS
 from climber_uk.parameters.parameter_file import read_sections
 from climber_uk.parameters.plausibility import doubt
 

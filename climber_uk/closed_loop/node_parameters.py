@@ -1,0 +1,60 @@
+"""Parameters of the three nodes by name, for tools that read a file as these nodes would.
+
+A name is that of a node and of its parameter, as in `plant_simulator.mass`.
+"""
+
+import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from climber_uk.control.build import KINDS as CONTROLLER_TYPES
+from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
+from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
+from climber_uk.parameters.parameter_file import read_file
+from climber_uk.simulation.field_sensors import FIELD_SENSORS
+from climber_uk.simulation.motors import Motors
+from climber_uk.simulation.options import SimulationOptions
+from climber_uk.simulation.sensors import Sensors
+from climber_uk.simulation.simulated_robot import VARIANTS, Physics
+
+
+def fields_of(node: str, kinds: Iterable[tuple[type, str]]) -> "dict[str, dataclasses.Field[Any]]":
+    """Fields of types of parameters by name, each type with its prefix."""
+    return {
+        f"{node}.{prefix}{field.name}": field
+        for kind, prefix in kinds
+        for field in dataclasses.fields(kind)  # type: ignore[arg-type]
+    }
+
+
+ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHESION.items())]
+PARAMETERS = {
+    **fields_of(PLANNER, TRAJECTORY_TYPES),
+    **fields_of(CONTROLLER, [*CONTROLLER_TYPES, *ON_WALL]),
+    **fields_of(PLANT, ((k, "") for k in (SimulationOptions, Climber, Physics, Motors, Sensors))),
+    **fields_of(PLANT, ((k, f"{n}.") for group in VARIANTS.values() for n, k in group.items())),
+    **fields_of(PLANT, ON_WALL),
+}
+# Those that have no effect in lock-step, of any node: names, topics, rates of publishing, and
+# sensors that no odometry comes from
+NODES_ONLY = {
+    *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
+    *("stop_time", "reaction", "speed", "exclusive"),
+    *(f"by_hand.{name}" for name in ("input", "speed", "yaw_rate", "ramp_time", "timeout")),
+    *("effort_commands", "effort_order", "publish_cmd_vel", "odom_frame", "base_frame"),
+    *("left_wheel_joint", "right_wheel_joint", "prefix_frames"),
+    *(at + field.name for at, kind in FIELD_SENSORS.items() for field in dataclasses.fields(kind)),
+}
+
+
+def read_parameters(path: Path, node: str) -> dict[str, Any]:
+    """Values of a parameter file for one of the three nodes, by its full name.
+
+    Raises as `read_file` does, also for a name that the node does not have.
+    """
+    own = node.rpartition("/")[2] + "."
+    of_node = {name.removeprefix(own) for name in PARAMETERS if name.startswith(own)}
+    return read_file(path, node, of_node | NODES_ONLY)

@@ -1,0 +1,54 @@
+"""Tools read a parameter file as the nodes do: what no node has is misspelt, and refused."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from made_bag import a_run
+
+from climber_uk.closed_loop.node_parameters import read_parameters
+from climber_uk.identification import identify
+from climber_uk.messages.topics import CONTROLLER, LOCALIZATION, PLANNER, PLANT
+from climber_uk.path_check import check_path
+from climber_uk.replay import localize, replay_controller
+from climber_uk.report import analyze_bag, compare_bags
+
+CONFIG = Path(__file__).parents[2] / "config"
+FILES = [file for file in CONFIG.glob("*.yaml") if f"{PLANT}:" in file.read_text()]
+IDENTIFY, PLAN = [identify, "{bag}"], [identify, "--plan", "{bag}.yaml"]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_every_file_of_ours_is_taken(file):
+    namespace = "/climber_1" if file.stem == "four_climbers" else ""
+    for node in PLANNER, CONTROLLER, PLANT:
+        assert read_parameters(file, f"{namespace}/{node}")
+
+
+@pytest.mark.parametrize(
+    ("command", "node"),
+    [
+        ([analyze_bag, "{bag}", "-o", "{bag}.out"], CONTROLLER),
+        ([compare_bags, "{bag}", "{bag}", "-o", "{bag}.out"], CONTROLLER),
+        (IDENTIFY, CONTROLLER),
+        (IDENTIFY, PLANT),
+        *((PLAN, node) for node in (PLANNER, CONTROLLER, PLANT)),
+        ([replay_controller, "{bag}", "-o", "{bag}.out"], CONTROLLER),
+        ([localize, "{bag}", "-o", "{bag}.out"], LOCALIZATION),
+        *(([check_path], node) for node in (PLANNER, CONTROLLER)),
+    ],
+)
+def test_a_name_that_no_node_has_is_refused_in_words(monkeypatch, capsys, tmp_path, command, node):
+    bag = a_run(20).write(tmp_path / "bag")
+    text = (CONFIG / "field.yaml").read_text()
+    before, _, after = text.partition(f"{node}:\n  ros__parameters:\n")
+    file = tmp_path / "nodes.yaml"
+    file.write_text(f"{before}{node}:\n  ros__parameters:\n    rate_off: 1.0\n{after}")
+    tool, *words = command
+    words = [word.format(bag=bag) for word in words]
+    monkeypatch.setattr(sys, "argv", ["tool", *words, "--params", str(file)])
+    with pytest.raises(SystemExit) as ended:
+        tool.main()
+    said = capsys.readouterr()
+    assert ended.value.code
+    assert f"rate_off is no parameter of /{node}" in said.err + str(ended.value.code)
