@@ -22,11 +22,13 @@ from climber_uk.simulation.simulated_robot import VARIANTS, Physics
 
 
 def fields_of(node: str, kinds: Iterable[tuple[type, str]]) -> "dict[str, dataclasses.Field[Any]]":
-    """Fields of types of parameters by name, each type with its prefix."""
+    """Fields of types of parameters by name, present and former, each type with its prefix."""
     return {
-        f"{node}.{prefix}{field.name}": field
+        f"{node}.{prefix}{name}": field
         for kind, prefix in kinds
         for field in dataclasses.fields(kind)  # type: ignore[arg-type]
+        for name in (field.name, field.metadata.get("formerly"))
+        if name
     }
 
 
@@ -55,6 +57,10 @@ def read_parameters(path: Path, node: str) -> dict[str, Any]:
 
     Raises as `read_file` does, also for a name that the node does not have.
     """
-    own = node.rpartition("/")[2] + "."
-    of_node = {name.removeprefix(own) for name in PARAMETERS if name.startswith(own)}
-    return read_file(path, node, of_node | NODES_ONLY)
+    return read_file(path, node, names_of(node.rpartition("/")[2]))
+
+
+def names_of(node: str) -> set[str]:
+    """Names of all parameters of one of the three nodes."""
+    own = f"{node}."
+    return NODES_ONLY | {name.removeprefix(own) for name in PARAMETERS if name.startswith(own)}

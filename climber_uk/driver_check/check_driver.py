@@ -20,6 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from climber_uk.closed_loop.node_parameters import names_of
 from climber_uk.driver_check import checks, report
 from climber_uk.driver_check.evidence import ExpectedDriver
 from climber_uk.driver_check.graph import is_known, others_commanding
@@ -29,7 +30,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.names import Names
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY
 from climber_uk.parameters.changed_parameters import write_sections
-from climber_uk.parameters.parameter_file import Section, nothing_for, read_sections
+from climber_uk.parameters.parameter_file import Section, nothing_for, read_sections, refuse_unknown
 from climber_uk.parameters.parameter_files import paths
 from climber_uk.ros.running import in_a_line
 from climber_uk.ros.transport import use_udp
@@ -57,6 +58,7 @@ def as_the_controller(arguments: Sequence[str]) -> Iterator[list[str]]:
         for section in sections:
             where, _, node = section.name.rpartition("/")
             if node == CONTROLLER:
+                refuse_unknown(section.values, names_of(CONTROLLER), CONTROLLER)
                 given = {name: value for name, value in section.values.items() if name in known}
                 as_controller.append(Section(f"{where}/{NODE}", given))
             elif node == NODE or section.is_shared:

@@ -113,10 +113,16 @@ def read_file(path: Path, node: str, known: Collection[str] = ()) -> dict[str, A
     found = given(sections, node)
     if not found:
         raise ValueError(nothing_for(node, path, sections))
-    for name, (_, is_shared) in found.items():
-        if known and name not in known and not (is_shared or name.startswith(QOS)):
-            raise ValueError(f"{path}: {name} is no parameter of {node}{similar(name, known)}")
+    own = (name for name, (_, is_shared) in found.items() if not is_shared)
+    refuse_unknown(own if known else (), known, node)
     return {name: value for name, (value, _) in found.items()}
+
+
+def refuse_unknown(names: Iterable[str], known: Collection[str], node: str) -> None:
+    """Raise `ValueError` if one of `names` is not `known`: it is misspelt."""
+    for name in names:
+        if name not in known and not name.startswith(QOS):
+            raise ValueError(f"{name} is no parameter of {node}{similar(name, known)}")
 
 
 def given(sections: Iterable[Section], node: str) -> dict[str, GivenValue]:

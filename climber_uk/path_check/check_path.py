@@ -19,7 +19,7 @@ from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
 from climber_uk.messages.topics import CONTROLLER, PLANNER
-from climber_uk.parameters.parameter_file import Values, read_argument, similar
+from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import Demands, demands
 from climber_uk.system.command_line import Parser, between
@@ -43,9 +43,7 @@ def read(file: Path, changes: dict[str, Any]) -> tuple[Trajectory, Climber, Atta
     Raises `ValueError`, also for a name that no part of the path has.
     """
     planner = {**read_parameters(file, f"/{PLANNER}"), **changes}
-    for name in changes:
-        if name not in NAMES:
-            raise ValueError(f"{name} is no parameter of a path{similar(name, NAMES)}")
+    refuse_unknown(changes, NAMES, "a path")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
         planner[name] = located(planner[name], name, f"/{PLANNER}", words)

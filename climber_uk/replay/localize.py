@@ -18,7 +18,7 @@ from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.sensor_frames import SensorFrames
 from climber_uk.messages.names import Names
 from climber_uk.messages.topics import LOCALIZATION
-from climber_uk.parameters.parameter_file import Values, read_argument, read_file, similar
+from climber_uk.parameters.parameter_file import Values, read_argument, read_file, refuse_unknown
 from climber_uk.replay import localization_figure
 from climber_uk.replay.localized import Localized, localized
 from climber_uk.replay.recorded_sensors import RecordedSensors, read_sensors
@@ -35,12 +35,9 @@ def parameters_of(options: argparse.Namespace, namespace: str) -> dict[str, Any]
     kinds = LocalizationOptions, SensorFrames, Names
     known = {field.name for kind in kinds for field in fields(kind)}
     parameters = read_file(options.params, name, known | NODES_ONLY) if options.params else {}
-    for argument in options.parameter:
-        name, value = read_argument(argument)
-        if name not in known:
-            raise ValueError(f"{name} is no parameter of {LOCALIZATION}{similar(name, known)}")
-        parameters[name] = value
-    return parameters
+    changes = dict(map(read_argument, options.parameter))
+    refuse_unknown(changes, known, LOCALIZATION)
+    return {**parameters, **changes}
 
 
 def localize(bag: Path, namespace: str, values: Values) -> tuple[RecordedSensors, Localized]:

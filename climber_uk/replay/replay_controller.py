@@ -16,7 +16,7 @@ from climber_uk.bags.publishing_order import has_publishing_times
 from climber_uk.bags.topics import Topics
 from climber_uk.closed_loop.node_parameters import read_parameters
 from climber_uk.messages.topics import CLOCK, CONTROLLER, PARAMETERS
-from climber_uk.parameters.parameter_file import read_argument, similar
+from climber_uk.parameters.parameter_file import read_argument, refuse_unknown
 from climber_uk.replay.recorded_controller import TOPICS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
 from climber_uk.replay.torque_comparison import Comparison, compare, summary, table, write_csv
@@ -30,11 +30,7 @@ def replayed(options: argparse.Namespace) -> Comparison:
     namespace = "/" + options.namespace.strip("/") if options.namespace.strip("/") else ""
     file = read_parameters(options.params, f"{namespace}/{CONTROLLER}") if options.params else None
     given = dict(read_argument(argument) for argument in options.parameter)
-    for name in given:
-        if name not in DEFAULTS:
-            raise ValueError(
-                f"{name} is not a parameter of the control law{similar(name, DEFAULTS)}"
-            )
+    refuse_unknown(given, DEFAULTS, "the control law")
 
     def choose(recorded: Mapping[str, Any]) -> dict[str, Any]:
         return {**(recorded if file is None else file), **given}

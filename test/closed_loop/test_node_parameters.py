@@ -7,6 +7,7 @@ import pytest
 from made_bag import a_run
 
 from climber_uk.closed_loop.node_parameters import read_parameters
+from climber_uk.driver_check.check_driver import as_the_controller
 from climber_uk.identification import identify
 from climber_uk.messages.topics import CONTROLLER, LOCALIZATION, PLANNER, PLANT
 from climber_uk.path_check import check_path
@@ -37,6 +38,7 @@ def test_every_file_of_ours_is_taken(file):
         ([localize, "{bag}", "-o", "{bag}.out"], LOCALIZATION),
         *(([check_path], node) for node in (PLANNER, CONTROLLER)),
     ],
+    ids=lambda given: given if isinstance(given, str) else given[0].__name__.split(".")[-1],
 )
 def test_a_name_that_no_node_has_is_refused_in_words(monkeypatch, capsys, tmp_path, command, node):
     bag = a_run(20).write(tmp_path / "bag")
@@ -52,3 +54,14 @@ def test_a_name_that_no_node_has_is_refused_in_words(monkeypatch, capsys, tmp_pa
     said = capsys.readouterr()
     assert ended.value.code
     assert f"rate_off is no parameter of /{node}" in said.err + str(ended.value.code)
+
+
+def test_so_does_a_check_of_a_driver(tmp_path):
+    file = tmp_path / "nodes.yaml"
+    file.write_text(f"{CONTROLLER}:\n  ros__parameters:\n    maas: 6.0\n")
+    said = r"maas is no parameter of uk_torque_controller \(did you mean mass\?\)"
+    with (
+        pytest.raises(ValueError, match=said),
+        as_the_controller(["--ros-args", "--params-file", str(file)]),
+    ):
+        pass
