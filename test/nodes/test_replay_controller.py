@@ -217,7 +217,7 @@ def test_a_topic_that_is_missing_is_named_in_one_line(bag, tmp_path, replay, top
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["-p", "mas:=5.0"], "mas is no parameter of the control law (did you mean mass?)"),
+        (["-p", "mas:=5.0"], r"mas is no parameter of the control law \(did you mean mass\?\)"),
         (["-p", "mass=5.0"], "'mass=5.0' must be name:=value"),
         (["-p", "mass:=-5.0"], r"mass=-5.0 must be > 0 \[kg\]"),
         (["-p", "observer.bandwidth:=[1]"], r"observer.bandwidth=\[1\] must be a finite number"),
