@@ -1,0 +1,143 @@
+"""Every command in the documents is one that can be given: program, options, names and files."""
+
+import importlib
+import re
+import shlex
+import sys
+from importlib.metadata import entry_points
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from climber_uk.closed_loop.node_parameters import names_of
+from climber_uk.messages.topics import CONTROLLER, LOCALIZATION, PLANNER, PLANT
+from climber_uk.system.command_line import Parser
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+OURS = {
+    script.name: script.module
+    for script in entry_points(group="console_scripts")
+    if script.value.startswith("climber_uk.")
+}
+NODES = {PLANNER, CONTROLLER, PLANT, LOCALIZATION, "markers", "check_driver"}
+PROGRAMS = {*OURS, "make", "python", "pytest", "climber.launch.py"}
+PLACEHOLDER = re.compile(r"[A-Z]+|…|dev|[a-z]+…|/.*…|run|my_.*|demo.*|again|[a-z]+\.(yaml|png)")
+PREFIX = re.compile(
+    r"^(\$ |\.venv/bin/|[A-Z_]+=\S+ |ros2 run climber_uk |ros2 launch climber_uk )+|[][]|\|\w+"
+)
+
+
+class Parsed(BaseException):
+    """A command line was understood."""
+
+
+def commands(page):
+    """Each command of a page, as words, once."""
+    text = page.read_text()
+    lines = [
+        line.partition(" #")[0]
+        for kind, block in re.findall(r"^```(\w*)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+        if not kind
+        for line in block.replace("\\\n", " ").splitlines()
+    ]
+    lines += re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+    found = {}
+    for line in lines:
+        bare = PREFIX.sub("", " ".join(line.split()))
+        program, _, rest = bare.partition(" ")
+        if program in PROGRAMS and rest and "──" not in rest:
+            found[bare] = shlex.split(bare)
+    return found.values()
+
+
+GIVEN = [(page, words) for page in PAGES for words in commands(page)]
+
+
+def of(*programs):
+    """The commands of some programs, as parameters of a test."""
+    rows = {(page.name, *words): words for page, words in GIVEN if words[0] in programs}
+    ids = [" ".join(row) for row in rows]
+    return pytest.mark.parametrize("words", rows.values(), ids=ids)
+
+
+def check_files(words):
+    """Assert that files which are named are in the repository, or are somebody's own."""
+    for word in words:
+        path = word.split("=")[-1]
+        if re.search(r"/|\.(yaml|csv|py)$", path) and not PLACEHOLDER.fullmatch(
+            path.strip("/").split("/")[0]
+        ):
+            assert (ROOT / path).exists() or ":" in path, path
+
+
+@of(*(set(OURS) - NODES))
+def test_a_tool_understands_it(words, monkeypatch):
+    def arguments(parser, given=None):
+        parser.parse_args(given)
+        raise Parsed
+
+    name, *given = words
+    given = [word.replace("NUMBER", "1") for word in given if word != "…"]
+    monkeypatch.setattr(Parser, "arguments", arguments)
+    monkeypatch.setattr(sys, "argv", [name, *given])
+    with pytest.raises(Parsed):
+        importlib.import_module(OURS[name]).main()
+    check_files(given)
+
+
+def check_node(words):
+    """Assert that parameters which are given are a node's, and that its files are there."""
+    known = {"device"}.union(*map(names_of, (PLANNER, CONTROLLER, PLANT)))
+    given = [word for before, word in pairwise(words) if before == "-p"]
+    assert {word.partition(":=")[0] for word in given} <= known
+    check_files(words)
+
+
+@of(*NODES)
+def test_a_node_has_these_parameters_and_there_are_these_files(words):
+    check_node(words[1:])
+
+
+@of("make")
+def test_make_has_this_target_and_takes_this_variable(words):
+    makefile = (ROOT / "Makefile").read_text()
+    for word in words[1:]:
+        name, is_variable, value = word.partition("=")
+        pattern = rf"^{name} [?:]=" if is_variable else rf"^{name}:"
+        assert word == "…" or re.search(pattern, makefile, re.MULTILINE), word
+        check_files([value])
+
+
+@of("python")
+def test_a_script_is_there_and_has_these_options(words):
+    script = (ROOT / words[1]).read_text()
+    if "--ros-args" in words:
+        return check_node(words[2:])
+    for word in words[2:]:
+        if word.startswith("--") and word != "--help":
+            assert re.search(rf"[\"']({word}|{word[2:]})[\"']", script), word
+    return check_files(words[2:])
+
+
+@of("pytest")
+def test_tests_are_there_and_k_finds_some(words):
+    files = [ROOT / word for word in words[1:] if word.startswith("test/")]
+    assert all(file.exists() for file in files)
+    sought = words[words.index("-k") + 1] if "-k" in words else ""
+    inside = [f for file in files or [ROOT / "test"] for f in (file, *file.rglob("*.py"))]
+    text = "\n".join(file.read_text() for file in inside if file.is_file())
+    for word in set(sought.split()) - {"and", "or", "not"}:
+        assert re.search(rf"def test_\w*{word}|id=.*{word}|\"[^\"]*{word}", text, re.IGNORECASE)
+
+
+@of("climber.launch.py")
+def test_the_launch_file_has_these_arguments(words):
+    launch = (ROOT / "launch" / words[0]).read_text()
+    for word in words[1:]:
+        assert f'"{word.partition(":=")[0]}"' in launch
+
+
+def test_there_are_commands():
+    assert len(GIVEN) > 150
