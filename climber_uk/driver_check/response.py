@@ -14,7 +14,6 @@ scrub turn the climber by less, as if it were wider.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -122,27 +121,71 @@ def respond(motion: MotionSeen, trial: TrialRecord, climber: Climber) -> Respons
     return Response(gains / expected_gain(climber), offsets, float(best), 0.0, *resisted.tolist())
 
 
+@dataclass(frozen=True)
+class Steps:
+    """Rates that a pair was commanded, step by step, and the n messages of its pulses."""
+
+    times: Array  # of the steps [s]
+    rates: Array  # from then on [rad/s]
+    measured: Array  # times of the messages (n,) [s]
+    speeds: Array  # both speeds in them (n, 2)
+    steady: Array  # (n,) in which a servo has had time to reach its rate
+
+    @classmethod
+    def of(cls, motion: MotionSeen, trial: TrialRecord, pair: int) -> "Steps":
+        """Those of one pair's pulses in a trial."""
+        times = np.array([command.time - motion.stamp[0] for command in trial.commands]) / SECOND
+        rates = np.array([command.rates for command in trial.commands]) @ PAIR[pair] / 2
+        steps = np.append(True, np.diff(rates) != 0)
+        times, rates = times[steps], rates[steps]
+        during = np.zeros(len(motion.stamp), bool)
+        for pulse in trial.pulses:
+            if int(pulse.turns) == pair:
+                during |= (motion.stamp >= pulse.begin) & (motion.stamp <= pulse.end)
+        measured = motion.time[during] - (motion.period / 2 if motion.has_mean_twist else 0.0)
+        now = np.clip(np.searchsorted(times, measured, "right") - 1, 0, None)
+        until = np.append(times[1:], np.inf)[now]
+        steady = (rates[now] != 0) & (measured - times[now] > SETTLED * (until - times[now]))
+        return cls(times, rates, measured, motion.reaction[during], steady)
+
+    def reached(self, delay: float, time_constant: float) -> Array:
+        """Rate (n,) that a servo has reached in each message."""
+        shares = np.exp(-np.diff(self.times) / time_constant)
+        before = np.zeros(len(self.times))  # reached at the begin of each step
+        for number, share in enumerate(shares.tolist()):
+            before[number + 1] = self.rates[number] + (before[number] - self.rates[number]) * share
+        since = self.measured - delay
+        last = np.clip(np.searchsorted(self.times, since, "right") - 1, 0, None)
+        left = np.exp(-np.maximum(0.0, since - self.times[last]) / time_constant)
+        reached: Array = self.rates[last] + (before[last] - self.rates[last]) * left
+        return reached
+
+    def gains(self, reached: Array) -> Array:
+        """Both speeds (2,) by the rate that a servo has reached, where that has settled."""
+        reached, speeds = reached[self.steady], self.speeds[self.steady]
+        gains: Array = reached @ speeds / (reached @ reached)
+        return gains
+
+
 def respond_to_speeds(motion: MotionSeen, trial: TrialRecord, climber: Climber) -> Response:
     """Response to rates; friction that is overcome first makes a pair later: the earlier counts."""
     pairs = sorted({int(pulse.turns) for pulse in trial.pulses})
-    found = [_lateness(partial(_followed, motion, trial, pair)) for pair in pairs]
-    delay, time_constant = min(found, key=sum)
+    steps = [Steps.of(motion, trial, pair) for pair in pairs]
+    delay, time_constant = min(map(_lateness, steps), key=sum)
     gains = np.full((2, 2), np.nan)
-    for pair in pairs:
-        gains[pair] = _gains(*_followed(motion, trial, pair, delay, time_constant))
+    for pair, commanded in zip(pairs, steps, strict=True):
+        gains[pair] = commanded.gains(commanded.reached(delay, time_constant))
     gains /= expected_rim_gain(climber)
     return Response(gains, np.zeros((2, 2)), delay, time_constant)
 
 
-def _lateness(
-    followed: Callable[[float, float], tuple[Array, Array, Array]],
-) -> tuple[float, float]:
+def _lateness(steps: Steps) -> tuple[float, float]:
     """Delay L and time constant T [s] of the least misfit, by ever finer grids of L and ln T."""
     best, reach = np.array([thresholds.LONGEST_DELAY / 2, np.log(0.03)]), np.array([0.1, 3.0])
 
     def misfit(point: Array) -> float:
-        reached, speeds, steady = followed(float(point[0]), math.exp(point[1]))
-        left = speeds - np.outer(reached, _gains(reached, speeds, steady))
+        reached = steps.reached(float(point[0]), math.exp(point[1]))
+        left = steps.speeds - np.outer(reached, steps.gains(reached))
         return float(np.sum(left**2))
 
     for _ in range(REFINEMENTS):
@@ -150,42 +193,6 @@ def _lateness(
         best = min((np.maximum(point, [0.0, -9.0]) for point in grid), key=misfit)
         reach = reach / 2
     return float(best[0]), math.exp(best[1])
-
-
-def _gains(reached: Array, speeds: Array, steady: Array) -> Array:
-    """Both speeds (2,) by the rate that a servo has reached, where that has settled."""
-    reached, speeds = reached[steady], speeds[steady]
-    gains: Array = reached @ speeds / (reached @ reached)
-    return gains
-
-
-def _followed(
-    motion: MotionSeen, trial: TrialRecord, pair: int, delay: float, time_constant: float
-) -> tuple[Array, Array, Array]:
-    """In the n messages of a pair's pulses: the rate (n,) that a servo has reached, both speeds.
-
-    And in which of them (n,) it has had time to.
-    """
-    times = np.array([command.time - motion.stamp[0] for command in trial.commands]) / SECOND
-    rates = np.array([command.rates for command in trial.commands]) @ PAIR[pair] / 2
-    steps = np.append(True, np.diff(rates) != 0)
-    times, rates = times[steps], rates[steps]
-    shares = np.exp(-np.diff(times) / time_constant)
-    before = np.zeros(len(times))  # reached at the begin of each step
-    for number, share in enumerate(shares.tolist()):
-        before[number + 1] = rates[number] + (before[number] - rates[number]) * share
-    during = np.zeros(len(motion.stamp), bool)
-    for pulse in trial.pulses:
-        if int(pulse.turns) == pair:
-            during |= (motion.stamp >= pulse.begin) & (motion.stamp <= pulse.end)
-    measured = motion.time[during] - (motion.period / 2 if motion.has_mean_twist else 0.0)
-    last = np.clip(np.searchsorted(times, measured - delay, "right") - 1, 0, None)
-    left = np.exp(-np.maximum(0.0, measured - delay - times[last]) / time_constant)
-    reached = rates[last] + (before[last] - rates[last]) * left
-    now = np.clip(np.searchsorted(times, measured, "right") - 1, 0, None)
-    until = np.append(times[1:], np.inf)[now]
-    steady = (rates[now] != 0) & (measured - times[now] > SETTLED * (until - times[now]))
-    return reached, motion.reaction[during], steady
 
 
 def _fit_all(
@@ -239,10 +246,14 @@ def _sliding(speed: Array, floor: float) -> slice:
 
 
 def response_of(seen: Evidence) -> Response | None:
-    """Response to the pulses of the trial; None without any."""
+    """Response to the pulses of the trial; None without any. Many checks ask: it is kept."""
     if seen.trial is None or not seen.trial.pulses:
         return None
-    return respond(seen.motion, seen.trial, seen.climber)
+    kept = vars(seen)
+    if "response" not in kept:
+        kept["response"] = respond(seen.motion, seen.trial, seen.climber)
+    found: Response = kept["response"]
+    return found
 
 
 def _cosine(a: Array, b: Array) -> float:

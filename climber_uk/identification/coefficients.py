@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from climber_uk.identification.identified import (
     DRIVE,
@@ -70,7 +70,7 @@ def parameters(
         white += np.einsum("pi,ij,pj->p", own, fit.covariance, own)
         bias += fit.bias(own)
     spread = _interval(np.concatenate(squares), freedom)
-    widths = spread, student.ppf(QUANTILE, freedom) * np.sqrt(white), bias
+    widths = spread, stdtrit(freedom, QUANTILE) * np.sqrt(white), bias
     known = np.isfinite(values)
     return values, Widths(*(np.where(known, width, np.inf) for width in widths)), sought
 
@@ -126,5 +126,5 @@ def _interval(squares: Array, most: Array) -> Array:
     variance = squares.sum(axis=0)
     ratio = variance**2 / np.maximum((squares**2).sum(axis=0), NOTHING)
     freedom = np.clip(3 * ratio - 2, 1, most)
-    half: Array = student.ppf(QUANTILE, freedom) * np.sqrt(variance)
+    half: Array = stdtrit(freedom, QUANTILE) * np.sqrt(variance)
     return half

@@ -10,11 +10,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from climber_uk.identification.estimation import CUT, LEAST_WINDOWS, SITE, predicted
 from climber_uk.identification.identified import DRIVE, NAMES, YAW, Identified
-from climber_uk.identification.integral_equations import Site
+from climber_uk.identification.integral_equations import Site, integral
 from climber_uk.identification.recorded_motion import RecordedMotion
 from climber_uk.mechanics import Array, unpack
 from climber_uk.mechanics.climber import Climber
@@ -137,7 +136,7 @@ def driven(trajectory: Trajectory, climber: Climber) -> tuple[RecordedMotion, Ar
         time=time,
         pose=np.column_stack([reference.pose[:, :2], heading]),
         rates=np.column_stack([speed, reference.yaw_rate]),
-        impulse=cumulative_trapezoid(torques, time, axis=0, initial=0),
+        impulse=integral(torques, time),
         pressure=np.full(len(time), climber.suction_pressure),
         stretch=np.zeros(len(time), int),
     )

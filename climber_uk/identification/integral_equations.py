@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from climber_uk.identification.even_time import gaps
 from climber_uk.identification.recorded_motion import SMOOTHING, Indices, RecordedMotion
@@ -148,9 +147,9 @@ def _driven(
     """
     time, pair = motion.time[window], np.array([1.0, (1.0, -1.0)[column]])
     pushed, late = motion.impulse[window] @ pair, motion.torques[window] @ pair
-    impulses = np.column_stack([pushed - pushed[0], -_integral(resisted, time), late[0] - late])
+    impulses = np.column_stack([pushed - pushed[0], -integral(resisted, time), late[0] - late])
     rate = None if motion.rates is None else motion.rates[window, column]
-    return _twice_integrated(time, rate, gone[window], impulses, _integral(known, time))
+    return _twice_integrated(time, rate, gone[window], impulses, integral(known, time))
 
 
 def _twice_integrated(
@@ -161,9 +160,9 @@ def _twice_integrated(
     `impulses` (m, c) multiply the coefficients, `known` (m,) is what adds to the rate without one.
     """
     one, since = np.ones_like(time), time - time[0]
-    lacking = _integral(_shapes(time), time)
-    start, target = np.column_stack([since, one]), gone - gone[0] - _integral(known, time)
-    design, moved = _integral(impulses, time), _integral(lacking, time)
+    lacking = integral(_shapes(time), time)
+    start, target = np.column_stack([since, one]), gone - gone[0] - integral(known, time)
+    design, moved = integral(impulses, time), integral(lacking, time)
     if rate is None:
         return Equations(start, design, target, moved, 1)
     return Equations(
@@ -177,7 +176,7 @@ def _twice_integrated(
 
 
 def _of_wheels(time: Array, gone: Array, angle: Array) -> Equations:
-    lacking = _integral(_shapes(time), time)
+    lacking = integral(_shapes(time), time)
     one = np.ones((len(time), 1))
     return Equations(one, (angle - angle[0])[:, None], gone - gone[0], lacking, 1)
 
@@ -188,6 +187,8 @@ def _shapes(time: Array) -> Array:
     return np.column_stack([np.ones_like(time), np.sqrt(3) * (time - middle) / half])
 
 
-def _integral(values: Array, time: Array) -> Array:
-    integral: Array = cumulative_trapezoid(values, time, axis=0, initial=0)
-    return integral
+def integral(values: Array, time: Array) -> Array:
+    """Integral from the first time to each one, by the trapezoidal rule."""
+    steps = np.diff(time).reshape(-1, *[1] * (values.ndim - 1))
+    gone = np.cumsum(steps * (values[1:] + values[:-1]) / 2, axis=0)
+    return np.concatenate([np.zeros_like(gone[:1]), gone])

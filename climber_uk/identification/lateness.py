@@ -8,7 +8,6 @@ left of the delay's error counts in the other intervals.
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy.optimize import minimize
 
 from climber_uk.identification.identified import IN_TIME
 from climber_uk.identification.integral_equations import Equations
@@ -29,6 +28,7 @@ def lateness(fits: Mapping[str, WindowFit], equations_at: EquationsAt) -> tuple[
     """
     if not any(is_late(fit) for fit in fits.values()):
         return IN_TIME
+    from scipy.optimize import minimize  # slow to import: for what is late only
 
     def cost(late: Sequence[float]) -> float:
         equations = equations_at(*np.abs(late).tolist())

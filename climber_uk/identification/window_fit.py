@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from climber_uk.identification.integral_equations import Equations
 from climber_uk.identification.recorded_motion import Indices
@@ -50,7 +50,7 @@ class Misfit:
         freedom = max(1, count - coefficients)
         ratio = ((found / noise) ** 2).sum(axis=0)
         beyond = np.mean(found**2, axis=0) * count / freedom - np.mean(noise**2, axis=0)
-        fails = chi2.sf(ratio, freedom) < CHANCE
+        fails = chdtrc(freedom, ratio) < CHANCE
         return cls(found, noise, np.where(fails, np.sqrt(np.maximum(beyond, 0.0)), 0.0))
 
     @property

@@ -36,6 +36,9 @@ from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.signals import ignore_end, on_end
 
+# else the first message type would have the generator of message types loaded, and its parser
+sys.modules.setdefault("rosidl_generator_py.generate_py_impl", None)  # type: ignore[arg-type]
+
 RELIABLE = QoSProfile(depth=10)
 # kept for slow subscribers: a recorder may be held up for half a second
 SENT = QoSProfile(depth=1000)

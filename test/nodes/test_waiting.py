@@ -97,28 +97,28 @@ def test_enabled_late_it_begins_at_the_beginning_and_disabled_in_mid_course_goes
     climb = Waiting(world)
     climb.enable(False)
     climb.is_in("disabled")
-    climb.passes(2.0)
+    climb.passes(0.5)
     waits_at = climb.position
-    climb.passes(1.0)
+    climb.passes(0.5)
     assert climb.position == waits_at
     _, begin = climb.place
     climb.enable(True)
     climb.is_in("following")
     position, since = climb.place  # time runs on while a service is called
     assert waits_at <= position <= waits_at + since - begin + 0.5
-    climb.passes(3.0)
+    climb.passes(2.0)
     later, now = climb.place
     assert later - position == pytest.approx(now - since, abs=0.5)
     climb.enable(False)
     climb.is_in("disabled")
     climb.passes(1.0)
     waits_at = climb.position
-    climb.passes(2.0)
+    climb.passes(0.5)
     assert climb.position == waits_at
     _, again = climb.place
     climb.enable(True)
     climb.is_in("following")
-    climb.passes(2.0)
+    climb.passes(1.0)
     assert climb.fastest() <= 1.3 * FASTEST
     assert climb.off_the_path(begin) < 0.02
     position, now = climb.place
@@ -128,18 +128,18 @@ def test_enabled_late_it_begins_at_the_beginning_and_disabled_in_mid_course_goes
 def test_a_process_that_was_stopped_or_is_a_new_one_goes_on_where_it_was(world):
     climb = Waiting(world)
     climb.is_in("following")
-    climb.passes(3.0)
+    climb.passes(2.0)
     for name in (CONTROLLER, PLANNER):
         world.processes[name].send_signal(signal.SIGSTOP)
-        looks = iter(range(75))  # 1.5 s: the clock of a plant in lock-step stands still
+        looks = iter(range(25))  # half a second: the clock of a plant in lock-step stands still
         world.wait(lambda looks=looks: next(looks, None) is None, "a while")
         world.processes[name].send_signal(signal.SIGCONT)
-        climb.passes(1.5)
+        climb.passes(0.5)
         climb.is_on_path()
     before = climb.position
     climb.kill(CONTROLLER)
     climb.start(CONTROLLER)
-    climb.passes(3.0)
+    climb.passes(1.5)
     climb.is_on_path()
     assert climb.fastest() <= 1.3 * FASTEST
     assert before - 1.0 < climb.position <= climb.now
@@ -168,15 +168,15 @@ def test_a_process_that_was_stopped_for_long_on_the_wall_clock_goes_on_where_it_
 def test_a_start_3_m_off_is_refused_in_words(world):
     climb = Waiting(world, {PLANT: ["initial_y:=0.0"]})
     climb.is_in("too_far")
-    climb.passes(2.0)
+    climb.passes(0.5)
     assert climb.fastest() < 1e-3
     (line,) = (text for text in said(world, CONTROLLER) if text.startswith("too far"))
     assert line.startswith("too far from the reference (3.00 m, from (0.00, 0.00) to (0.00, 3.00)")
 
 
-def test_a_start_3_m_off_that_is_allowed_is_approached_at_its_speed(world):
-    allowed = ["max_start_distance:=5.0", "approach_speed:=0.8"]
-    climb = Waiting(world, {PLANT: ["initial_y:=0.0"], CONTROLLER: allowed})
+def test_a_start_that_is_allowed_to_be_far_off_is_approached_at_its_speed(world):
+    allowed = ["max_start_distance:=2.0", "approach_speed:=0.8"]
+    climb = Waiting(world, {PLANT: ["initial_y:=1.5"], CONTROLLER: allowed})
     climb.is_in("approaching")
     climb.is_in("following")
     assert climb.fastest() < 0.84
@@ -188,7 +188,7 @@ def test_a_start_3_m_off_that_is_allowed_is_approached_at_its_speed(world):
 def test_a_push_is_ridden_out(world):
     climb = Waiting(world, {PLANT: ["push_timeout:=0.3"]})
     climb.is_in("following")
-    climb.passes(2.0)
+    climb.passes(1.5)
     push = world.speak(WrenchStamped, "push")
     wrench = WrenchStamped()
     wrench.header.frame_id = "base_link"
@@ -196,38 +196,37 @@ def test_a_push_is_ridden_out(world):
     push.publish(wrench)
     climb.is_in("too_fast")
     climb.is_in("following")
-    climb.passes(6.0)
+    climb.passes(3.0)
     climb.is_on_path()
-    assert climb.fastest(climb.now - 3.0) <= 1.3 * FASTEST
+    assert climb.fastest(climb.now - 1.0) <= 1.3 * FASTEST
 
 
 def test_a_motor_that_dies_is_noticed_and_the_climber_comes_to_rest(world):
-    """A relay between controller and plant takes the torque of one wheel away, then the other's."""
+    """A relay between controller and plant takes the torque of the left wheel away."""
     tracks = ["slip:=true", "locomotion:=tracked", "tracked.length:=0.44"]
     tracks.append("tracked.scrub_friction_coefficient:=0.8")
     to_plant = world.node.create_publisher(JointState, "applied_torques", 1000)
-    dead, dies_at = 0, math.inf
+    dies_at = math.inf
 
     def relay(message):
         if reading.nanoseconds(message.header.stamp) >= dies_at * SECOND:
-            message.effort[dead] = 0.0
+            message.effort[0] = 0.0
         to_plant.publish(message)
 
     world.node.create_subscription(JointState, "wheel_torques", relay, 1000)
     climb = Waiting(world, {PLANT: [*tracks, "/wheel_torques:=/applied_torques"]})
     climb.is_in("following")
     known = {"following", "approaching", "waiting"}
-    for side in (0, 1):
-        climb.passes(1.5)
-        dead, dies_at = side, climb.now
-        fault = climb.comes_to(lambda mode: mode not in known, "fault")
-        assert reading.nanoseconds(fault.header.stamp) / SECOND < dies_at + 0.35
-        climb.passes(2.0)
-        assert climb.fastest() < 1.5 * FASTEST + 0.1
-        assert climb.fastest(climb.now - 0.5) < 0.01
-        dies_at = math.inf  # it was mended
-        climb.enable(True)
-        climb.is_in("following")
+    climb.passes(1.5)
+    dies_at = climb.now
+    fault = climb.comes_to(lambda mode: mode not in known, "fault")
+    assert reading.nanoseconds(fault.header.stamp) / SECOND < dies_at + 0.35
+    climb.passes(2.0)
+    assert climb.fastest() < 1.5 * FASTEST + 0.1
+    assert climb.fastest(climb.now - 0.5) < 0.01
+    dies_at = math.inf  # it was mended
+    climb.enable(True)
+    climb.is_in("following")
 
 
 def test_what_comes_and_goes_is_said_a_few_times_only(world):
