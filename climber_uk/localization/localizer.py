@@ -74,7 +74,6 @@ class Localizer:
         self._early: list[Fix] = []  # that are ahead of the encoders
         self._disagrees = 0.0  # [s]
         self._output = OutputSpeed()
-        self._force = 0.0  # [m/s²] forwards, as the IMU tells
 
     @property
     def estimate(self) -> Estimate:
@@ -128,7 +127,7 @@ class Localizer:
     def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
         assert self.stamp is not None
         is_gyro = self.imu.is_there(self.stamp)
-        yaw_rate, self._force = self.imu.means() if is_gyro else (rolled.yaw_rate, 0.0)
+        yaw_rate = self.imu.mean_yaw_rate() if is_gyro else rolled.yaw_rate
         travel = Travel(rolled.duration, rolled.distance, rolled.path, yaw_rate, is_gyro)
         weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
         return Sample(travel, weight if self.knows_heading else None, rolled.rests), weight
@@ -233,11 +232,8 @@ class Localizer:
         mean, offset, duration = self.estimate.mean, self.smoothing.offset, travel.duration
         x, y, heading = (mean[:3] + offset).tolist()
         gyro = turn(float(mean[BIAS]), travel) / duration
-        yaw_rate = self._output.yaw_rate(rolled.yaw_rate, gyro, duration)
-        pull = self.options.gravity_along_wall * math.sin(float(mean[HEADING]))
-        acceleration = self._force - pull if travel.is_gyro else None
-        wheels = rolled.speed * (1 - float(mean[SCALE]))
-        speed = self._output.go_on(wheels, acceleration, duration)
+        distance = travel.distance * (1 - float(mean[SCALE]))
+        speed, yaw_rate = self._output.go_on(distance, rolled.yaw_rate, gyro, duration)
         scale, bias = self.estimate.deviation(SCALE), self.estimate.deviation(BIAS)
         return Located(
             self.stamp,
