@@ -137,7 +137,8 @@ class Localizer:
         options, pull = self.options, self.options.gravity_along_wall
         if pull == 0:
             return
-        deviation = options.acceleration_noise / math.sqrt(weight.known) / pull
+        noise = options.acceleration_noise / math.sqrt(weight.known) / pull
+        deviation = math.hypot(noise, options.gyro_noise * math.sqrt(DELAY))  # of its turn since
         mean, covariance = self.estimate.mean, self.estimate.covariance
         forwards, left = (np.array([weight.forwards, weight.left]) - mean[FORCE_BIASES]).tolist()
         heading = math.atan2(forwards, left) + weight.turned

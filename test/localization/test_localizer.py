@@ -163,7 +163,7 @@ def test_fixes_too_old_or_ahead_of_the_encoders_are_refused_and_those_a_little_a
 
 
 def test_the_same_sample_again_gets_the_same_answer_and_changes_nothing():
-    told = Told(speed=0.2, heading=0.5).go_on(0.1)
+    told = Told(speed=0.2, heading=0.5).go_on(0.5)
     last = told.located[-1]
     assert told.localizer.on_encoders(last.stamp, 100.0, 100.0) is last
     assert told.localizer.on_encoders(last.stamp - 1000, 100.0, 100.0) is last
@@ -206,6 +206,17 @@ def test_deviations_are_those_of_the_errors(seed):
     last = told.position - 0.15 * PERIOD * np.array([math.cos(0.7), math.sin(0.7)])
     for part, true in enumerate((*last, 0.7)):
         assert abs(wrapped(float(estimate.mean[part] - true))) < 5 * estimate.deviation(part)
+
+
+def test_the_heading_is_off_by_its_deviation_on_average():
+    """Gravity tells what was DELAY ago: the gyro's noise since then is in the heading alone."""
+    ratios, known = [], {"gyro_bias_deviation": 0.0, "gyro_bias_walk": 0.0}
+    for seed in range(12):
+        told = Told(seed, heading=0.7, speed=0.15, **known).go_on(1.0)
+        for _ in range(40):
+            told.go_on(0.1)
+            ratios.append(told.off / told.localizer.estimate.deviation(HEADING))
+    assert np.mean(np.square(ratios)) == pytest.approx(1, abs=0.15)
 
 
 def test_a_position_that_is_not_known_any_more_is_in_doubt_until_fixes_are_back():
