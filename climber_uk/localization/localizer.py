@@ -9,7 +9,7 @@ from climber_uk.localization.doubts import Doubts
 from climber_uk.localization.encoders import Encoders, Rolled
 from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
 from climber_uk.localization.history import History, Sample
-from climber_uk.localization.imu import DELAY, Imu, Weight
+from climber_uk.localization.imu import DELAY, FILLED, Imu, Weight
 from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
 from climber_uk.localization.models import (
     BIAS,
@@ -137,7 +137,7 @@ class Localizer:
         options, pull = self.options, self.options.gravity_along_wall
         if pull == 0:
             return
-        noise = options.acceleration_noise / math.sqrt(weight.known) / pull
+        noise = options.acceleration_noise / math.sqrt(FILLED) / pull
         deviation = math.hypot(noise, options.gyro_noise * math.sqrt(DELAY))  # of its turn since
         mean, covariance = self.estimate.mean, self.estimate.covariance
         forwards, left = (np.array([weight.forwards, weight.left]) - mean[FORCE_BIASES]).tolist()
