@@ -14,7 +14,7 @@ from climber_uk.localization.encoders import Rolled
 
 TIME = 0.04  # [s] τ
 DELAY = 2 * TIME  # [s] of all that went through
-FILLED = 4 * TIME  # [s] over which that is a mean, and before which it has only begun
+FILLED = 4 * TIME  # [s] over which that is a mean, once it is no more one of all samples
 SPACING = 0.02  # [s] from one weight to the next: in between they tell hardly anything new
 STALE = 0.25  # [s] without a sample, after which there is no IMU
 
@@ -26,6 +26,12 @@ class Weight(NamedTuple):
     left: float
     turned: float  # [rad] by which the heading was less
     time: float  # [s] for which this stands
+    known: float  # [s] over which it is a mean: since the first sample, at most `FILLED`
+
+    @property
+    def has_only_begun(self) -> bool:
+        """Whether it is a mean of no more than the first few samples."""
+        return self.known < FILLED - 1e-9
 
 
 class Mean:
@@ -106,7 +112,7 @@ class Imu:
         self._centripetal.add(speed * yaw_rate, rolled.duration)
         self._yaw_rate.add(yaw_rate, rolled.duration)
         self._square.add(yaw_rate * yaw_rate, rolled.duration)
-        if self._unused + 1e-9 < SPACING or self._known + 1e-9 < FILLED:
+        if self._unused == 0 or self._unused + 1e-9 < min(SPACING, self._known):
             return None
         time, self._unused = self._unused, 0.0
         acceleration = (self._speed.first.value - self._speed.second.value) / TIME
@@ -118,4 +124,5 @@ class Imu:
             self._left.second.value - self._centripetal.second.value + square * y - faster * x,
             TIME * turning,
             time,
+            min(self._known, FILLED),
         )

@@ -9,7 +9,7 @@ from climber_uk.localization.doubts import Doubts
 from climber_uk.localization.encoders import Encoders, Rolled
 from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
 from climber_uk.localization.history import History, Sample
-from climber_uk.localization.imu import DELAY, FILLED, Imu, Weight
+from climber_uk.localization.imu import DELAY, Imu, Weight
 from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
 from climber_uk.localization.models import (
     BIAS,
@@ -73,6 +73,7 @@ class Localizer:
         self.located: Located | None = None
         self._early: list[Fix] = []  # that are ahead of the encoders
         self._disagrees = 0.0  # [s]
+        self._is_first = False  # whether gravity's first samples tell the heading, each anew
         self._output = OutputSpeed()
 
     @property
@@ -130,25 +131,28 @@ class Localizer:
         yaw_rate = self.imu.mean_yaw_rate() if is_gyro else rolled.yaw_rate
         travel = Travel(rolled.duration, rolled.distance, rolled.path, yaw_rate, is_gyro)
         weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
-        return Sample(travel, weight if self.knows_heading else None, rolled.rests), weight
+        counts = weight is not None and self.knows_heading and not weight.has_only_begun
+        return Sample(travel, weight if counts else None, rolled.rests), weight
 
     def _watch_gravity(self, weight: Weight) -> None:
         """Take the heading from gravity where nothing else tells it, or all tells another one."""
         options, pull = self.options, self.options.gravity_along_wall
         if pull == 0:
             return
-        noise = options.acceleration_noise / math.sqrt(FILLED) / pull
+        # twice the mean of the same samples has twice its variance
+        noise = options.acceleration_noise * math.sqrt(2 / weight.known) / pull
         deviation = math.hypot(noise, options.gyro_noise * math.sqrt(DELAY))  # of its turn since
         mean, covariance = self.estimate.mean, self.estimate.covariance
         forwards, left = (np.array([weight.forwards, weight.left]) - mean[FORCE_BIASES]).tolist()
         heading = math.atan2(forwards, left) + weight.turned
         by_biases = heading_by_force_biases(heading, pull)
-        if not self.knows_heading:
+        if not self.knows_heading or self._is_first:
             biases = covariance[np.ix_(FORCE_BIASES, FORCE_BIASES)]
             if math.sqrt(deviation**2 + by_biases @ biases @ by_biases) <= (
                 options.initial_heading_limit
             ):
                 self._believe(heading, deviation)
+                self._is_first = weight.has_only_begun
             return
         off = wrapped(heading - float(mean[HEADING]))
         rows = [HEADING, *FORCE_BIASES]
