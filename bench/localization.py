@@ -67,6 +67,28 @@ class Case:
     duration: float = 57.0  # [s]
     rests: bool = False  # at any heading, without a controller
     believes_truth: bool = False  # whether the controller gets perfect odometry
+    is_drawn: bool = False  # whether place, biases and creep are chance, as the filter believes
+
+    def drawn(self, seed: int) -> "Case":
+        """The same with a start, biases and creep drawn from the filter's own deviations."""
+        if not self.is_drawn:
+            return self
+        options, chance = self.options, np.random.default_rng(seed).normal(size=6).tolist()
+        place = options.initial_position_deviation
+        force = options.acceleration_bias_deviation
+        imu = replace(
+            self.imu,
+            gyro_bias=chance[0] * options.gyro_bias_deviation,
+            forward_bias=chance[1] * force,
+            left_bias=chance[2] * force,
+        )
+        options = replace(
+            options,
+            initial_x=options.initial_x + chance[3] * place,
+            initial_y=options.initial_y + chance[4] * place,
+        )
+        creep = abs(chance[5]) * options.creep_deviation
+        return replace(self, imu=imu, options=options, creep=creep)
 
 
 @dataclass
@@ -89,7 +111,7 @@ class Loop:
     """One closed loop of a case."""
 
     def __init__(self, case: Case, seed: int) -> None:
-        self.case = case
+        self.case = case = case.drawn(seed)
         believed = replace(RUN.believed, inclination=case.inclination)
         options = ControlOptions() if case.believes_truth else ControlOptions(friction_speed=0.01)
         law = ControlLaw(believed, RUN.guidance, options)
@@ -157,6 +179,7 @@ NO_FIXES = FixErrors()
 ROWS = {
     "perfect odometry for the controller": Case(believes_truth=True),
     "all of it": Case(),
+    "all of it, drawn as it is believed": Case(is_drawn=True),
     "heading unknown, 1 s at rest": Case(rests=True, duration=1.0),
     "fixes of 50 mm at 5 Hz, 200 ms late": Case(fixes=FixErrors(0.2, 0.2, 0.05)),
     "fixes of 25 mm at 1 Hz, 100 ms late": Case(fixes=FixErrors(1.0, 0.1, 0.025)),

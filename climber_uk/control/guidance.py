@@ -168,6 +168,7 @@ class Guidance:
         theta_2 = omega_d1 - psi_2 - damping * omega_n * s
         # ahead of a reference that comes it waits, and overcomes no friction to go back; gradually,
         # for the sign of the speed of a reference at rest is but rounding
-        fade = clipped(1.0 - abs(v_d) / COMES, 0.0, 1.0)
-        wanted = select(wanted * v_d < 0.0, fade * clipped(wanted, -COMES, COMES), wanted)
+        comes = clipped(abs(v_d) / COMES, 1e-9, 1.0)
+        most = COMES * (1.0 - comes) / comes
+        wanted = select(wanted * v_d < 0.0, clipped(wanted, -most, most), wanted)
         return DesiredAcceleration(v_1, theta_2, wanted, omega - s)

@@ -40,8 +40,10 @@ class Sample:
         if weight is not None:
             force = np.array([weight.forwards, weight.left])
             variance = options.acceleration_noise**2 / weight.time
-            late = Late(weight.turned, DELAY if travel.is_gyro else 0.0)
-            estimate = with_gravity(estimate, force, late, variance, options.gravity_along_wall)
+            delay = DELAY if travel.is_gyro else 0.0
+            late, since = Late(weight.turned, delay), options.gyro_noise**2 * delay
+            pull = options.gravity_along_wall
+            estimate = with_gravity(estimate, force, late, variance, pull, since)
         if self.rests and travel.is_gyro:
             variance = options.gyro_noise**2 / travel.duration
             estimate = with_yaw_rate_at_rest(estimate, travel.yaw_rate, variance)

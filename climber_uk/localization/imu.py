@@ -14,6 +14,7 @@ from climber_uk.localization.encoders import Rolled
 
 TIME = 0.04  # [s] τ
 DELAY = 2 * TIME  # [s] of all that went through
+FILLED = 4 * TIME  # [s] over which that is a mean, once it is no more one of all samples
 SPACING = 0.02  # [s] from one weight to the next: in between they tell hardly anything new
 STALE = 0.25  # [s] without a sample, after which there is no IMU
 
@@ -25,18 +26,23 @@ class Weight(NamedTuple):
     left: float
     turned: float  # [rad] by which the heading was less
     time: float  # [s] for which this stands
-    known: float  # [s] over which it is a mean: since the first sample, at most 4 τ
+    known: float  # [s] over which it is a mean: since the first sample, at most `FILLED`
+
+    @property
+    def has_only_begun(self) -> bool:
+        """Whether it is a mean of no more than the first few samples."""
+        return self.known < FILLED - 1e-9
 
 
 class Mean:
     """Low-pass of first order, with the plain mean where it has only begun."""
 
-    def __init__(self) -> None:
-        self.value, self._time = 0.0, 0.0
+    def __init__(self, time: float = TIME) -> None:
+        self.value, self._time, self._most = 0.0, 0.0, time
 
     def add(self, value: float, duration: float) -> None:
         """Take a value that holds for `duration` [s]."""
-        self._time = min(self._time + duration, TIME + duration)
+        self._time = min(self._time + duration, self._most + duration)
         self.value += (value - self.value) * duration / self._time
 
 
@@ -60,9 +66,7 @@ class Imu:
         self._place = x, y
         self.stamp: int | None = None  # [ns] of the last sample
         self.period = 0.005  # [s] between two samples
-        self._samples: list[
-            tuple[float, float]
-        ] = []  # yaw rate, force forwards: since the last encoders
+        self._yaw_rates: list[float] = []  # since the last encoders
         self._is_used = False
         self._known = self._unused = 0.0  # [s]
         self._forwards, self._left = LowPass(), LowPass()
@@ -77,9 +81,9 @@ class Imu:
             self.period = min((stamp - self.stamp) * 1e-9, STALE)
         self.stamp = stamp
         if self._is_used:
-            self._samples.clear()
+            self._yaw_rates.clear()
         self._is_used = False
-        self._samples.append((yaw_rate, forwards))
+        self._yaw_rates.append(yaw_rate)
         self._known, self._unused = self._known + self.period, self._unused + self.period
         self._forwards.add(forwards, self.period)
         self._left.add(left, self.period)
@@ -94,15 +98,12 @@ class Imu:
             return False
         return (stamp - self.stamp) * 1e-9 >= 0.9 * self.period
 
-    def means(self) -> tuple[float, float]:
-        """Yaw rate [rad/s] and specific force forwards [m/s²]: means since the last call.
-
-        Without a sample since then, they are the last ones.
-        """
-        rates, forces = zip(*self._samples, strict=True)
-        del self._samples[:-1]
+    def mean_yaw_rate(self) -> float:
+        """Mean yaw rate [rad/s] since the last call; without a sample since then, the last one."""
+        mean = sum(self._yaw_rates) / len(self._yaw_rates)
+        del self._yaw_rates[:-1]
         self._is_used = True
-        return sum(rates) / len(rates), sum(forces) / len(forces)
+        return mean
 
     def weight(self, rolled: Rolled, yaw_rate: float) -> Weight | None:
         """Force of the weight after what was `rolled` at a `yaw_rate` [rad/s]; None: not yet."""
@@ -123,5 +124,5 @@ class Imu:
             self._left.second.value - self._centripetal.second.value + square * y - faster * x,
             TIME * turning,
             time,
-            min(self._known, 4 * TIME),
+            min(self._known, FILLED),
         )

@@ -18,6 +18,8 @@ from climber_uk.mechanics import Array
 IDENTITY = np.eye(SIZE)
 # of an innovation's χ² of two parts, above which specific force counts for less: knocks
 LARGEST_KNOCK = 9.2
+SINCE_SHARE = 0.9  # of a heading's variance, that may have come in the last moment
+LEAST = 1e-18  # variance added to each, so that what is known exactly can be divided by
 
 
 @dataclass(frozen=True)
@@ -109,15 +111,34 @@ def distance(estimate: Estimate, innovation: Array, jacobian: Array, noise: Arra
 
 
 def with_gravity(
-    estimate: Estimate, force: Array, late: Late, variance: float, along_wall: float
+    estimate: Estimate,
+    force: Array,
+    late: Late,
+    variance: float,
+    along_wall: float,
+    since: float = 0.0,
 ) -> Estimate:
     """Estimate after a specific force (2,) of the weight [m/s²]; see `models.gravity`.
 
-    On a floor and on a ceiling it tells nothing, and changes nothing.
+    It shows the heading of a while ago. What the gyro's noise has added `since` [rad²] is in the
+    estimate, and not in what is corrected. On a floor and on a ceiling it tells nothing, and
+    changes nothing.
     """
     innovation = force - models.gravity(estimate.mean, late, along_wall)
     jacobian = models.gravity_jacobian(estimate.mean, late, along_wall)
-    return corrected(estimate, innovation, jacobian, variance * np.eye(2), LARGEST_KNOCK)
+    since = min(since, SINCE_SHARE * alone(estimate, HEADING)) if since else 0.0
+    covariance = estimate.covariance.copy()
+    covariance[HEADING, HEADING] -= since
+    then = Estimate(estimate.mean, covariance)
+    after = corrected(then, innovation, jacobian, variance * np.eye(2), LARGEST_KNOCK)
+    after.covariance[HEADING, HEADING] += since
+    return after
+
+
+def alone(estimate: Estimate, part: int) -> float:
+    """Variance of a part of the state, were all others known."""
+    information = np.linalg.solve(estimate.covariance + LEAST * IDENTITY, IDENTITY[part])
+    return max(1 / float(information[part]) - LEAST, 0.0)
 
 
 def with_yaw_rate_at_rest(estimate: Estimate, yaw_rate: float, variance: float) -> Estimate:

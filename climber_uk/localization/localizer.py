@@ -73,8 +73,8 @@ class Localizer:
         self.located: Located | None = None
         self._early: list[Fix] = []  # that are ahead of the encoders
         self._disagrees = 0.0  # [s]
+        self._is_first = False  # whether gravity's first samples tell the heading, each anew
         self._output = OutputSpeed()
-        self._force = 0.0  # [m/s²] forwards, as the IMU tells
 
     @property
     def estimate(self) -> Estimate:
@@ -128,27 +128,31 @@ class Localizer:
     def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
         assert self.stamp is not None
         is_gyro = self.imu.is_there(self.stamp)
-        yaw_rate, self._force = self.imu.means() if is_gyro else (rolled.yaw_rate, 0.0)
+        yaw_rate = self.imu.mean_yaw_rate() if is_gyro else rolled.yaw_rate
         travel = Travel(rolled.duration, rolled.distance, rolled.path, yaw_rate, is_gyro)
         weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
-        return Sample(travel, weight if self.knows_heading else None, rolled.rests), weight
+        counts = weight is not None and self.knows_heading and not weight.has_only_begun
+        return Sample(travel, weight if counts else None, rolled.rests), weight
 
     def _watch_gravity(self, weight: Weight) -> None:
         """Take the heading from gravity where nothing else tells it, or all tells another one."""
         options, pull = self.options, self.options.gravity_along_wall
         if pull == 0:
             return
-        deviation = options.acceleration_noise / math.sqrt(weight.known) / pull
+        # twice the mean of the same samples has twice its variance
+        noise = options.acceleration_noise * math.sqrt(2 / weight.known) / pull
+        deviation = math.hypot(noise, options.gyro_noise * math.sqrt(DELAY))  # of its turn since
         mean, covariance = self.estimate.mean, self.estimate.covariance
         forwards, left = (np.array([weight.forwards, weight.left]) - mean[FORCE_BIASES]).tolist()
         heading = math.atan2(forwards, left) + weight.turned
         by_biases = heading_by_force_biases(heading, pull)
-        if not self.knows_heading:
+        if not self.knows_heading or self._is_first:
             biases = covariance[np.ix_(FORCE_BIASES, FORCE_BIASES)]
             if math.sqrt(deviation**2 + by_biases @ biases @ by_biases) <= (
                 options.initial_heading_limit
             ):
                 self._believe(heading, deviation)
+                self._is_first = weight.has_only_begun
             return
         off = wrapped(heading - float(mean[HEADING]))
         rows = [HEADING, *FORCE_BIASES]
@@ -233,11 +237,8 @@ class Localizer:
         mean, offset, duration = self.estimate.mean, self.smoothing.offset, travel.duration
         x, y, heading = (mean[:3] + offset).tolist()
         gyro = turn(float(mean[BIAS]), travel) / duration
-        yaw_rate = self._output.yaw_rate(rolled.yaw_rate, gyro, duration)
-        pull = self.options.gravity_along_wall * math.sin(float(mean[HEADING]))
-        acceleration = self._force - pull if travel.is_gyro else None
-        wheels = rolled.speed * (1 - float(mean[SCALE]))
-        speed = self._output.go_on(wheels, acceleration, duration)
+        distance = travel.distance * (1 - float(mean[SCALE]))
+        speed, yaw_rate = self._output.go_on(distance, rolled.yaw_rate, gyro, duration)
         scale, bias = self.estimate.deviation(SCALE), self.estimate.deviation(BIAS)
         return Located(
             self.stamp,

@@ -1,39 +1,51 @@
-"""Speed and yaw rate for the output: what encoders and IMU tell, each where it is good.
+"""Speed and yaw rate for the output: what wheels' angles tell, without the steps of their counts.
 
-    v̂̇ = a + c + 2 Ω (v - v̂)    ċ = Ω² (v - v̂)    a = f_x - g_t sinθ
+    e = p - p̂    p̂̇ = v̂ + 3 W e    v̂̇ = â + 3 W² e    â̇ = W³ e
 
-Counts of encoders make v rough, and a low-pass would make it late. The specific force has what is
-quick, and c takes its bias. The yaw rate is the gyro's below 10 rad/s, and the wheels' above: there
-it is the gyro that is rough. As counts are, too, it goes through a short low-pass.
+A count is an error of the angle, not of its rate: a filter that takes ways p makes far less noise
+of it than a low-pass of their differences would, and is not late: v̂ is wrong by the change of the
+acceleration only. The yaw rate is the wheels' too, as a gyro is rough; but below 1 / `GYRO_TIME` it
+is the gyro's, which no wheel that scrubs misleads.
 """
+
+import math
 
 from climber_uk.localization.imu import Mean
 
-FREQUENCY = 10.0  # [rad/s] Ω, above which the IMU tells of the speed
-LATE = 0.01  # [s] by which the yaw rate is late
+FREQUENCY = 50.0  # [rad/s] W
+GYRO_TIME = 0.2  # [s]
+
+
+class Rate:
+    """Rate of what has gone a way since the last time."""
+
+    def __init__(self) -> None:
+        self.value = 0.0
+        self._ahead = self._change = 0.0  # p - p̂, â
+
+    def go_on(self, way: float, duration: float) -> float:
+        """Rate after a way that took `duration` [s]: three poles at exp(-W `duration`)."""
+        kept = math.exp(-FREQUENCY * duration)
+        new = 1 - kept
+        expected = self.value * duration + self._change * duration**2 / 2
+        error = self._ahead + way - expected
+        self._ahead = kept**3 * error
+        self.value += self._change * duration + 1.5 * new * new * (1 + kept) * error / duration
+        self._change += new**3 * error / duration**2
+        return self.value
 
 
 class OutputSpeed:
     """Goes on from one sample of the encoders to the next."""
 
     def __init__(self) -> None:
-        self.speed = self._bias = self._yaw_rate = 0.0
-        self._lag = Mean()  # [rad/s] by which the wheels' yaw rate is below the gyro's
+        self._speed, self._yaw_rate = Rate(), Rate()
+        self._lag = Mean(GYRO_TIME)  # [rad/s] by which the wheels' yaw rate is below the gyro's
 
-    def go_on(self, speed: float, acceleration: float | None, duration: float) -> float:
-        """Speed [m/s], from that of the encoders; without an acceleration [m/s²] it is theirs."""
-        if acceleration is None:
-            self.speed, self._bias = speed, 0.0
-            return speed
-        expected = self.speed + (acceleration + self._bias) * duration
-        share = min(FREQUENCY * duration, 0.5)
-        self.speed = expected + 2 * share * (speed - expected)
-        self._bias += FREQUENCY * share * (speed - expected)
-        return self.speed
-
-    def yaw_rate(self, wheels: float, gyro: float, duration: float) -> float:
-        """Yaw rate [rad/s] of both."""
+    def go_on(
+        self, distance: float, wheels: float, gyro: float, duration: float
+    ) -> tuple[float, float]:
+        """Speed [m/s] and yaw rate [rad/s] after a `distance` [m], and yaw rates of both."""
         self._lag.add(gyro - wheels, duration)
-        rate = wheels + self._lag.value
-        self._yaw_rate += (rate - self._yaw_rate) * duration / (LATE + duration)
-        return self._yaw_rate
+        angle = (wheels + self._lag.value) * duration
+        return self._speed.go_on(distance, duration), self._yaw_rate.go_on(angle, duration)

@@ -10,10 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from climber_uk.localization.history import Entry
-from climber_uk.localization.kalman import Estimate, predicted_with_jacobian
+from climber_uk.localization.kalman import LEAST, Estimate, predicted_with_jacobian
 from climber_uk.localization.options import LocalizationOptions
-
-LEAST = 1e-18  # variance added to each, so that what is known exactly can be divided by
 
 
 def smoothed(entries: Sequence[Entry], options: LocalizationOptions) -> list[Estimate]:

@@ -85,6 +85,16 @@ def test_on_a_wall_the_first_samples_are_enough_to_begin_with(heading):
     assert abs(told.off) < math.radians(2)
 
 
+def test_a_gyros_bias_is_not_learnt_of_the_first_few_samples_more_than_they_tell():
+    """The means of the first moment are all of the same samples."""
+    ratios = []
+    for seed in range(40):
+        told = Told(seed, heading=0.7, speed=0.15).go_on(0.3)
+        estimate = told.localizer.estimate
+        ratios.append((estimate.mean[BIAS]) / estimate.deviation(BIAS))
+    assert np.mean(np.square(ratios)) < 1.3
+
+
 @pytest.mark.parametrize("inclination", [0.0, 180.0])
 def test_on_floor_and_ceiling_a_heading_that_is_not_given_is_waited_for(inclination):
     told = Told(heading=0.0, inclination=inclination).go_on(1.0)
@@ -95,7 +105,7 @@ def test_on_floor_and_ceiling_a_heading_that_is_not_given_is_waited_for(inclinat
 
 
 def test_without_a_known_position_a_fix_is_waited_for():
-    told = Told(initial_position_deviation=10.0).go_on(0.1)
+    told = Told(initial_position_deviation=10.0).go_on(0.2)
     assert told.located[-1] is None
     assert told.localizer.knows_heading
     told.fix(off=(3.0, -4.0), deviation=0.02)
@@ -163,7 +173,7 @@ def test_fixes_too_old_or_ahead_of_the_encoders_are_refused_and_those_a_little_a
 
 
 def test_the_same_sample_again_gets_the_same_answer_and_changes_nothing():
-    told = Told(speed=0.2, heading=0.5).go_on(0.1)
+    told = Told(speed=0.2, heading=0.5).go_on(0.5)
     last = told.located[-1]
     assert told.localizer.on_encoders(last.stamp, 100.0, 100.0) is last
     assert told.localizer.on_encoders(last.stamp - 1000, 100.0, 100.0) is last
@@ -173,7 +183,7 @@ def test_the_same_sample_again_gets_the_same_answer_and_changes_nothing():
 def test_stamps_that_go_back_begin_everything_anew():
     told = Told(speed=0.2, heading=0.5).go_on(3.0)
     told.stamp -= 2 * SECOND
-    located = told.go_on(0.05).located[-1]
+    located = told.go_on(0.2).located[-1]
     assert "stamps went back: started anew" in told.localizer.remarks
     assert (located.motion.x, located.motion.y) == pytest.approx((0, 0), abs=0.05)
 
@@ -208,8 +218,19 @@ def test_deviations_are_those_of_the_errors(seed):
         assert abs(wrapped(float(estimate.mean[part] - true))) < 5 * estimate.deviation(part)
 
 
+def test_the_heading_is_off_by_its_deviation_on_average():
+    """Gravity tells what was DELAY ago: the gyro's noise since then is in the heading alone."""
+    ratios, known = [], {"gyro_bias_deviation": 0.0, "gyro_bias_walk": 0.0}
+    for seed in range(12):
+        told = Told(seed, heading=0.7, speed=0.15, **known).go_on(1.0)
+        for _ in range(40):
+            told.go_on(0.1)
+            ratios.append(told.off / told.localizer.estimate.deviation(HEADING))
+    assert np.mean(np.square(ratios)) == pytest.approx(1, abs=0.15)
+
+
 def test_a_position_that_is_not_known_any_more_is_in_doubt_until_fixes_are_back():
-    told = Told(speed=1.0, creep_deviation=0.2).go_on(0.5)
+    told = Told(speed=1.0, creep_deviation=0.2, initial_heading_deviation=0.01).go_on(0.5)
     assert not told.localizer.doubts.unknown
     told.go_on(2.0)
     doubts = told.localizer.doubts

@@ -47,31 +47,41 @@ def test_the_estimate_is_the_output_as_seen_in_the_map(x, y, heading):
     assert between(estimate, estimate) == pytest.approx((0, 0, 0))
 
 
-def test_the_speed_is_smoother_than_counts_and_as_early_as_the_truth_with_a_biased_imu():
-    output, random = OutputSpeed(), np.random.default_rng(0)
+COUNT = 2 * np.pi / 4096 * 0.027  # [m] of a wheel
+
+
+def told(rate, time, of=lambda wheels: wheels):
+    """Speeds and yaw rates of the output, of wheels with counts, of a climber with one `rate`."""
+    output, ways = OutputSpeed(), COUNT * np.floor(np.cumsum(rate) * STEP / COUNT)
+    steps = np.diff(ways, prepend=0.0)
+    both = [output.go_on(way, way / STEP, of(way / STEP), STEP) for way in steps]
+    return np.array(both)[time > 2].T
+
+
+def test_speed_and_yaw_rate_are_smoother_than_counts_and_as_early_as_the_truth():
     time = np.arange(0, 8, STEP)
-    true = 0.2 * np.sin(2 * time)
-    found = np.array(
-        [
-            output.go_on(speed, force + 0.3, STEP)
-            for speed, force in zip(
-                true + random.normal(0, 0.005, len(time)), 0.4 * np.cos(2 * time), strict=True
-            )
-        ]
-    )
-    off = (found - true)[time > 2]
-    assert np.sqrt(np.mean(off**2)) < 0.0025
-    assert abs(off.mean()) < 2e-4
-    assert np.sqrt(np.mean(np.diff(off) ** 2)) < 0.001  # of the counts': 0.007
+    # the mean of a step is that of its middle
+    true = 0.2 * np.sin(2 * (time - STEP / 2))
+    at_the_end = 0.2 * np.sin(2 * time)[time > 2]
+    for found in told(true, time):
+        off = found - at_the_end
+        assert np.sqrt(np.mean(off**2)) < 0.0015
+        assert np.sqrt(np.mean(np.diff(off) ** 2)) < 0.0005  # of the counts': 0.008
+        assert abs(np.mean(off * np.cos(2 * time[time > 2]))) < 1e-4  # late by 0.5 ms
 
 
-def test_without_an_imu_the_speed_is_the_encoders():
-    output = OutputSpeed()
-    output.go_on(0.1, 5.0, STEP)
-    assert output.go_on(0.2, None, STEP) == 0.2
+def test_at_rest_both_are_zero_soon_and_at_any_period_they_follow():
+    time = np.arange(0, 8, STEP)
+    speeds, _ = told(np.where(time < 3, 0.1, 0.0), time)
+    assert np.abs(speeds[time[time > 2] > 3.3]).max() < 1e-4
+    for period in (0.001, 0.02, 0.1, 1.0):
+        output = OutputSpeed()
+        for _ in range(round(2 / period) + 3):
+            speed, yaw_rate = output.go_on(0.3 * period, 0.5, 0.5, period)
+        assert (speed, yaw_rate) == pytest.approx((0.3, 0.5), rel=1e-3)
 
 
 def test_the_yaw_rate_is_the_gyros_in_the_long_run():
-    output = OutputSpeed()
-    rates = [output.yaw_rate(0.5, 0.4, STEP) for _ in range(400)]
-    assert rates[-1] == pytest.approx(0.4, abs=1e-3)
+    time = np.arange(0, 8, STEP)
+    _, rates = told(np.full(len(time), 0.5), time, of=lambda _: 0.4)
+    assert rates.mean() == pytest.approx(0.4, abs=1e-3)
