@@ -8,6 +8,7 @@ from typing import Any
 
 from climber_uk.control.build import KINDS as CONTROLLER_TYPES
 from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
+from climber_uk.control.stops import StopOptions
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
@@ -65,6 +66,7 @@ VARIED -= {MEASURED}
 REQUIRED = {
     f"{CONTROLLER}.pacing.catch_up": 0.0,
     f"{CONTROLLER}.least_pressure": 0.0,
+    **{f"{CONTROLLER}.stops.{f.name}": f.default for f in dataclasses.fields(StopOptions)},
     f"{CONTROLLER}.adhesion": "suction",
     f"{CONTROLLER}.controller": UDWADIA_KALABA,
     f"{CONTROLLER}.motors": "torque",

@@ -13,6 +13,7 @@ STICK = "cmd_vel"  # speeds: from a stick to the planner, or from the controller
 PROGRESS = f"{PLANNER}/progress"  # how far along its path a climber is
 TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PUSH = "joint_states", "suction_pressure", "push"
+EMERGENCY_STOP, BATTERY = "emergency_stop", "battery_state"
 IMU, POSE = "imu", "pose"  # of robots without an odometry of their own
 LOCALIZATION = "wall_odometry"  # the node that makes one of them
 PARAMETERS, FORCE = f"{CONTROLLER}/parameters", f"{CONTROLLER}/constraint_force"
