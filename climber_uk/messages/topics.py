@@ -11,6 +11,7 @@ REFERENCE_PATH = "reference_path"  # all of it, for display
 GIVEN_PATH = "path"  # from a planner, or a person's clicks
 STICK = "cmd_vel"  # speeds: from a stick to the planner, or from the controller to a board
 PROGRESS = f"{PLANNER}/progress"  # how far along its path a climber is
+EVENTS = f"{PLANNER}/events"  # tags of its path that it reaches
 TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PUSH = "joint_states", "suction_pressure", "push"
 EMERGENCY_STOP, BATTERY = "emergency_stop", "battery_state"
