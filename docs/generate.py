@@ -89,6 +89,10 @@ CONTENTS = {
         topics.PROGRESS
     ): "one status; `message`: waiting, approaching, following, paused "
     "or done; values: done, left [m], time_left [s], lap, segment; 10 Hz, if anybody listens",
+    topics.private(
+        topics.EVENTS
+    ): "one status for each tag of the path, when the climber reaches it: "
+    "`message`: the tag; values: x, y [m] of its place; the stamp is that of when it did",
     "~/enable": "become active or inactive",
     "~/change_state": "managed node: configure, activate, deactivate, clean up, shut down",
     "~/get_state": "managed node",

@@ -1,9 +1,11 @@
 """Parameters of the nodes in a campaign: those that can be drawn, or are fixed."""
 
+import dataclasses
 from typing import Any
 
 from climber_uk.closed_loop.node_parameters import PARAMETERS, fields_of
 from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
+from climber_uk.control.stops import StopOptions
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.simulation.sensors import Sensors
@@ -27,6 +29,7 @@ VARIED -= {MEASURED}
 REQUIRED = {
     f"{CONTROLLER}.pacing.catch_up": 0.0,
     f"{CONTROLLER}.least_pressure": 0.0,
+    **{f"{CONTROLLER}.stops.{f.name}": f.default for f in dataclasses.fields(StopOptions)},
     f"{CONTROLLER}.adhesion": "suction",
     f"{CONTROLLER}.controller": UDWADIA_KALABA,
     f"{CONTROLLER}.motors": "torque",

@@ -12,6 +12,7 @@ from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
 from climber_uk.control.speed_command import MotorBoard
+from climber_uk.control.stops import StopOptions, Stops
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import Timing
 from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
@@ -49,6 +50,7 @@ KINDS: list[tuple[type, str]] = [
     (Observer, "observer."),
     (Pacing, "pacing."),
     (GuardOptions, "guard."),
+    (StopOptions, "stops."),
 ]
 """All that is read, with the prefix of its parameters."""
 
@@ -84,4 +86,5 @@ def build_controller(parameters: ParameterSource, pressure: float | None) -> Con
         read(GuardOptions, "guard."),
         read(ADHESION[name], f"{name}."),
         read(Guidance, "guidance."),
+        Stops(read(StopOptions, "stops.")),
     )

@@ -25,6 +25,7 @@ from climber_uk.control.model import DisturbanceEstimate, Observer
 from climber_uk.control.safe_output import SafeOutput
 from climber_uk.control.safety import Calm, Mode, Safety, Trouble
 from climber_uk.control.speed_command import STANDING, MotorBoard
+from climber_uk.control.stops import Stops
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import LONGEST_STEP, Ages, Timing
 from climber_uk.control.twist import OPPOSED_IF_TOO_FAST, TwistCheck
@@ -80,6 +81,7 @@ class Controller:
         guard: GuardOptions | None = None,
         adhesion: Adhesion | None = None,
         gentle: Guidance | None = None,
+        stops: Stops | None = None,
     ) -> None:
         """`adhesion` is for the guard; `gentle` are the constraints of what begins at rest."""
         self.safety = safety or Safety()
@@ -87,6 +89,7 @@ class Controller:
         self.estimator = Estimator(self._law.climber, observer, timing, self.safety)
         self.active = ActiveReference(pacing, approach or Approach(), gentle or Guidance())
         self.guard = Guard(guard or GuardOptions(), adhesion or Suction())
+        self.stops = stops or Stops()
         self.mode, self.detail = Mode.WAITING, ""
         self.answer: Answer | None = None  # the last one
         self.ages = Ages()
@@ -135,6 +138,7 @@ class Controller:
         self._moved_without_twist = 0.0
         if enabled:
             self.guard.fault = None
+            self.stops.enable()
             self._forget_when()
 
     def retune(self, settings: Settings) -> None:
@@ -219,6 +223,7 @@ class Controller:
         is_first = self.estimator.motion is None
         observed = self.estimator.see(stamp, motion)
         self._safe_output.watch(self._law.climber, observed)
+        self.stops.move(self.estimator.motion if observed or is_first else None)
         if observed is None and not is_first:
             self._watch_anew()
             self._unsettled = self.safety.settling_messages
@@ -323,7 +328,9 @@ class Controller:
             return Mode.WAITING, ""
         if now - self._heard > self.safety.odometry_timeout * SECOND:
             return Mode.NO_ODOMETRY, ""
-        return self._trouble or self.guard.trouble or self._unfit() or self._missing(now)
+        # first what doubts the odometry, as that is what a stop brakes by
+        wrong = self._trouble or self.guard.trouble
+        return wrong or self.stops.trouble(now) or self._unfit() or self._missing(now)
 
     def _unfit(self) -> Trouble | None:
         """What forbids to follow, though nothing is wrong."""

@@ -143,7 +143,7 @@ def read_area(file: str, clearance: float) -> Area:
         rings = []
         for number, block in enumerate(blocks, start=1):
             try:
-                ring = read_waypoint_text(block)
+                ring, _ = read_waypoint_text(block)
             except ValueError as error:
                 raise ValueError(f"ring {number}: {error}") from None
             ring = ring[np.hypot(*(ring - np.roll(ring, 1, axis=0)).T) > 0]

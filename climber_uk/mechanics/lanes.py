@@ -5,12 +5,14 @@ each it goes on to the nearest end of all that are left, straight or around corn
 """
 
 import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.area import SLACK, Area, read_area, turned
+from climber_uk.mechanics.waypoint_file import Marks
 from climber_uk.mechanics.waypoints import ThroughPoints
 from climber_uk.parameters.declaration import parameter, parameters
 
@@ -23,6 +25,7 @@ MOST_LANES = 500
 class Lanes(ThroughPoints):
     """Lanes over an area of a text file, of which further rings are holes.
 
+    Tags tell where each begins and ends: `lane 1 begins`.
     Raises `ValueError` naming the file.
     """
 
@@ -36,6 +39,7 @@ class Lanes(ThroughPoints):
     )
     direction: float = parameter(0.0, "rad", "of the lanes, anticlockwise from x")
     edges: bool = parameter(True, "", "a lane along each edge, too, for what lanes' ends leave")
+    dwell: float = parameter(0.0, "s", "rest where each lane but the first begins", at_least=0)
     start_x: float = parameter(0.0, "m", "begin at the end of a lane that is nearest to this x")
     start_y: float = parameter(0.0, "m", "begin at the end of a lane that is nearest to this y")
 
@@ -51,12 +55,26 @@ class Lanes(ThroughPoints):
 
     def given(self) -> Array:
         """See `ThroughPoints`: it keeps clear with its corners rounded as well."""
+        return self._way[0]
+
+    def marks(self) -> Marks:
+        """See `ThroughPoints`."""
+        places, begins = self._way
+        dwell, tags = np.zeros(len(places)), [""] * len(places)
+        for number, begin in enumerate(begins, start=1):
+            dwell[begin] = self.dwell
+            tags[begin], tags[begin + 1] = f"lane {number} begins", f"lane {number} ends"
+        return Marks(np.full(len(places), np.inf), dwell, tuple(tags))
+
+    @cached_property
+    def _way(self) -> tuple[Array, list[int]]:
         clearance = self.clearance + CUT * self.tolerance
         area = read_area(self.area, clearance).turned(-self.direction)
         start = turned(np.array([self.start_x, self.start_y]), -self.direction)
         try:
             lanes = lanes_of(area, self.width - self.overlap, self.edges)
-            return turned(joined(area, lanes, start), self.direction)
+            places, begins = joined(area, lanes, start)
+            return turned(places, self.direction), begins
         except ValueError as error:
             raise ValueError(f"{self.source}: {error}") from None
 
@@ -89,8 +107,11 @@ def lanes_of(area: Area, spacing: float, edges: bool) -> Array:
     return found
 
 
-def joined(area: Area, lanes: Array, start: Array) -> Array:
-    """Places (n, 2) [m] of a way along all lanes, which begins at the end nearest to `start`."""
+def joined(area: Area, lanes: Array, start: Array) -> tuple[Array, list[int]]:
+    """Places (n, 2) [m] of a way along all lanes, which begins at the end nearest to `start`.
+
+    And the numbers of the places at which lanes begin, from 0.
+    """
     from scipy.sparse.csgraph import dijkstra  # slow to import: where it is needed only
 
     ends = lanes.reshape(-1, 2)
@@ -98,13 +119,15 @@ def joined(area: Area, lanes: Array, start: Array) -> Array:
     apart = _apart(area, places)
     left = np.ones(len(ends), bool)
     at = int(np.hypot(*(ends - start).T).argmin())
-    way = []
+    way: list[int] = []
+    begins = []
     while True:
+        begins.append(len(way))
         way += [at, at ^ 1]
         left[[at, at ^ 1]] = False
         at ^= 1
         if not left.any():
-            return places[way]
+            return places[way], begins
         lengths, before = dijkstra(apart, indices=at, return_predecessors=True)
         goal = int(np.where(left, lengths[: len(ends)], np.inf).argmin())
         if not math.isfinite(lengths[goal]) or not left[goal]:

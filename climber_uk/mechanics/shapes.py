@@ -41,6 +41,16 @@ class Shape(Protocol):
         """Places s (k,), in order, where the climber must rest and then go back the way it came."""
         return np.empty(0)
 
+    @property
+    def rests(self) -> tuple[Array, Array]:
+        """Places s (n,), in order, where it rests on its way, and for how long (n,) [s]."""
+        return self.reversals, np.zeros(len(self.reversals))
+
+    @property
+    def tags(self) -> tuple[tuple[float, str], ...]:
+        """Places s, in order, and what is told when the climber reaches them."""
+        return ()
+
     def gear(self, s: Array) -> Any:
         """1, or -1 between an odd number of reversals and the next, where the tail goes first."""
         return 1.0

@@ -31,6 +31,15 @@ class SpeedLimits:
     rate: float  # [m/s] of u
     yaw_rate: float  # [rad/s]
     acceleration: float  # [m/s²]
+    # s (m + 1,) where legs begin and the last ends, and the speed (m,) [m/s] of each
+    legs: tuple[Array, Array] | None = None
+
+    def speed(self, s: Array) -> Array:
+        """Most speed (...) [m/s] at s (...); infinite if legs have none."""
+        if self.legs is None:
+            return np.full(s.shape, np.inf)
+        ends, speeds = self.legs
+        return speeds[np.clip(np.searchsorted(ends, s, "right") - 1, 0, len(speeds) - 1)]
 
 
 @dataclass(frozen=True)
@@ -161,6 +170,7 @@ def _look(curve: Any, start: Array, size: Array, limits: SpeedLimits) -> tuple[A
         curvature * (MARGIN * limits.rate / limits.yaw_rate),
         np.sqrt(bend * (2**0.5 * limits.rate**2 / limits.acceleration)),
     )
+    needed = np.maximum(needed, (limits.rate / limits.speed(s)).max(axis=1))
     # beside a reversal |p'| is a little above 1, and more so between the places looked at
     excess = np.maximum(np.sqrt(square.max(axis=1)) - 1.0, 0.0)
     return curvature, np.maximum(needed, 1.0 + 1.25 * excess)

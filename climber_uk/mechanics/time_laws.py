@@ -82,43 +82,49 @@ class RestToRest(TimeLaw):
 
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
-        run_time = float(self._legs(shape)[1][-1])
+        run_time = float(self._legs(shape)[2][-1])
         return self.runs * (run_time + self.pause) - self.pause if self.runs else math.inf
 
     def horizon(self, shape: Shape) -> float:
         """See `TimeLaw`."""
         few = replace(self, laps=min(self.laps, 2))
-        return float(few._legs(shape)[1][-1])
+        return float(few._legs(shape)[2][-1])
 
     def progress(self, time: Array, shape: Shape) -> Derivatives:
         """See `TimeLaw`."""
-        places, times = self._legs(shape)
+        places, times, _ = legs = self._legs(shape)
         run_time = times[-1]
         last_run = self.runs - 1 if self.runs else math.inf
         run = np.clip(np.floor(time / (run_time + self.pause)), 0, last_run)
         since = np.clip(time - run * (run_time + self.pause), 0, run_time)
         if shape.closed:
-            s, *rates = self._along(since, places, times)
+            s, *rates = self._along(since, *legs)
             return s + run * places[-1], *rates
         back = np.mod(run, 2)  # odd runs go back along the path
         sign = 1 - 2 * back
-        s, s_1, s_2, s_3 = self._along(back * run_time + sign * since, places, times)
+        s, s_1, s_2, s_3 = self._along(back * run_time + sign * since, *legs)
         return s, sign * s_1, s_2, sign * s_3
 
-    def _legs(self, shape: Shape) -> tuple[Array, Array]:
-        """Path parameters (n,) where a run rests, both ends included, and when it does (n,) [s]."""
+    def _legs(self, shape: Shape) -> tuple[Array, Array, Array]:
+        """Path parameters (n,) where a run rests, both ends included, until when, and since.
+
+        Times (n,) are in [s].
+        """
         laps = self.laps if shape.closed else 1
         span = shape.length * laps
-        places = np.array([0.0, span])
-        if len(shape.reversals):
-            rests = (shape.reversals + shape.length * np.arange(laps)[:, None]).ravel()
+        places, dwell = np.array([0.0, span]), np.zeros(2)
+        on_the_way, dwells = shape.rests
+        if len(on_the_way):
+            rests = (on_the_way + shape.length * np.arange(laps)[:, None]).ravel()
             is_within = (rests > 1e-9 * shape.length) & (rests < span - 1e-9 * shape.length)
             places = np.insert(places, 1, rests[is_within])
+            dwell = np.insert(dwell, 1, np.tile(dwells, laps)[is_within])
         distances = np.diff(places)
         times = distances / np.minimum(self.rate, distances / self.ramp_time) + self.ramp_time
-        return places, np.concatenate([[0.0], np.cumsum(times)])
+        until = np.concatenate([[0.0], np.cumsum(times + dwell[1:])])
+        return places, until, until - dwell
 
-    def _along(self, since: Array, places: Array, times: Array) -> Derivatives:
+    def _along(self, since: Array, places: Array, times: Array, _: Array) -> Derivatives:
         """s and its derivatives at `since` (...) of a run, from rest to rest on each leg."""
         leg = np.clip(np.searchsorted(times, since, "right") - 1, 0, len(times) - 2)
         distance, since = places[leg + 1] - places[leg], since - times[leg]

@@ -32,10 +32,10 @@ class Trajectory:
             return
         if not self.shape.closed:
             raise ValueError(f"time_law {self.law} runs off an open shape: use 'rest_to_rest'")
-        if len(self.course.reversals):
-            x, y = self.course.derivatives(self.course.reversals[0])[0] + self.origin
+        if len(rests := self.course.rests[0]):
+            x, y = self.course.derivatives(rests[0])[0] + self.origin
             raise ValueError(
-                f"time_law {self.law} does not stop where the path turns back, "
+                f"time_law {self.law} does not stop where the path turns back or rests, "
                 f"at ({x:.4g}, {y:.4g}) m: use 'rest_to_rest'"
             )
 

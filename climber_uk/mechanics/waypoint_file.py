@@ -3,7 +3,7 @@
 import codecs
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,33 @@ from climber_uk.mechanics import Array
 
 COMMENT = re.compile(r"#.*|^\s*(//|%).*")
 UNIT = re.compile(r"[\[(](.*)[\])]")
+METRES = "m", "metre", "meter", "metres", "meters"
+NUMBERS = {  # columns that are, and their units
+    **{"x": METRES, "y": METRES},
+    "speed": ("m/s",),
+    "dwell": ("s", "second", "seconds"),
+}
 Line = tuple[int, list[str]]  # number of a line, and its cells
 
 
-def read_waypoints(file: str) -> Array:
+@dataclass(frozen=True)
+class Marks:
+    """What a file says of its n points beside their places."""
+
+    speed: Array  # (n,) [m/s] at most, from each to the next; infinite: as fast as planned
+    dwell: Array  # (n,) [s] of rest at each
+    tags: tuple[str, ...]  # (n,) that are told when each is reached; empty: nothing is told
+
+    @classmethod
+    def none(cls, number: int) -> "Marks":
+        """Of so many points nothing is said."""
+        return cls(np.full(number, np.inf), np.zeros(number), ("",) * number)
+
+
+def read_waypoints(file: str) -> tuple[Array, Marks]:
     """Points (n, 2) [m]: one a line, x and y, or more columns of which a header names x and y.
 
+    It may name speed, dwell and tag as well, of which cells may be empty.
     Columns are separated by semicolons, commas, tabs or blanks; with semicolons, numbers may have
     decimal commas. Empty lines and comments (# … anywhere, // … and % … as lines) are left out.
     Raises `ValueError` naming the file, the line and what was wanted.
@@ -50,15 +71,14 @@ def read_text(file: str) -> str:
 
 @dataclass(frozen=True)
 class _Columns:
-    """Number of cells in a line, and the indices of x and y among them."""
+    """Number of cells in a line, and the index of each column that has a name."""
 
     number: int
-    x: int = 0
-    y: int = 1
+    at: dict[str, int] = field(default_factory=lambda: {"x": 0, "y": 1})
 
 
-def read_waypoint_text(text: str) -> Array:
-    """Points (n, 2) [m] of the text of a file; `ValueError` naming the line."""
+def read_waypoint_text(text: str) -> tuple[Array, Marks]:
+    """Points (n, 2) [m] of the text of a file, and marks; `ValueError` naming the line."""
     lines = list(enumerate(re.split(r"\r\n|\r|\n", text), start=1))
     rows = [(n, bare) for n, line in lines if (bare := COMMENT.sub("", line).strip(" \t"))]
     if not rows:
@@ -68,13 +88,28 @@ def read_waypoint_text(text: str) -> Array:
     columns, cells = _columns(cells, [line for n, line in lines if n < rows[0][0]], separator)
     if len(cells) < 2:
         raise ValueError(f"{len(cells)} point(s), want >= 2")
-    pairs = [(n, _pick(n, line, columns)) for n, line in cells]
-    is_comma = separator == ";" and any("," in cell for _, pair in pairs for cell in pair)
-    points = [[_number(n, cell, is_comma) for cell in pair] for n, pair in pairs]
-    for number, ((n, _), point) in enumerate(zip(pairs, points, strict=True), start=1):
+    rows_of = [(n, _pick(n, line, columns)) for n, line in cells]
+    is_comma = separator == ";" and any(
+        "," in row.get(name, "") for _, row in rows_of for name in NUMBERS
+    )
+    points = [[_number(n, row[name], is_comma) for name in "xy"] for n, row in rows_of]
+    for number, ((n, _), point) in enumerate(zip(rows_of, points, strict=True), start=1):
         if not all(map(math.isfinite, point)):
             raise ValueError(f"line {n}: point {number} is not finite")
-    return np.array(points)
+    speed = [_size(n, row, "speed", is_comma, math.inf) for n, row in rows_of]
+    dwell = [_size(n, row, "dwell", is_comma, 0.0) for n, row in rows_of]
+    tags = tuple(row.get("tag", "") for _, row in rows_of)
+    return np.array(points), Marks(np.array(speed), np.array(dwell), tags)
+
+
+def _size(line: int, row: dict[str, str], name: str, is_comma: bool, default: float) -> float:
+    """Number of a column that may not be there, or be empty."""
+    if not (cell := row.get(name, "")):
+        return default
+    value, least = _number(line, cell, is_comma), "> 0" if name == "speed" else ">= 0"
+    if not (value > 0 or (value == 0 and name != "speed")) or math.isinf(value):
+        raise ValueError(f"line {line}: {name} {cell} must be {least}, and finite")
+    return value
 
 
 def _separator(row: str) -> str | None:
@@ -82,9 +117,13 @@ def _separator(row: str) -> str | None:
 
 
 def _split(row: str, separator: str | None) -> list[str]:
-    cells = [cell.strip().strip("\"'").strip() for cell in row.split(separator)]
-    while len(cells) > 2 and not cells[-1]:
-        cells.pop()
+    return [cell.strip().strip("\"'").strip() for cell in row.split(separator)]
+
+
+def _shortened(cells: list[str], number: int) -> list[str]:
+    """Cells without empty ones at their end, but at least so many if there are."""
+    while len(cells) > number and not cells[-1]:
+        cells = cells[:-1]
     return cells
 
 
@@ -92,11 +131,11 @@ def _columns(
     lines: list[Line], above: list[str], separator: str | None
 ) -> tuple[_Columns, list[Line]]:
     """Columns, by a header (which may be a comment) if there is one, and the lines below it."""
-    number, first = lines[0]
+    number, first = lines[0][0], _shortened(lines[0][1], 2)
     if not any(_is_number(cell) for cell in first):
         return _named(f"line {number}", first), lines[1:]
     for line in reversed(above):
-        names = _split(line.strip().lstrip("#/%").strip(), separator)
+        names = _shortened(_split(line.strip().lstrip("#/%").strip(), separator), 2)
         if len(names) == len(first) and {"x", "y"} <= {_name(name) for name in names}:
             return _named("comment", names), lines
     if len(first) == 2 or len(first) < 2:
@@ -112,22 +151,29 @@ def _named(where: str, names: list[str]) -> _Columns:
     plain = [_name(name) for name in names]
     if plain.count("x") != 1 or plain.count("y") != 1:
         raise ValueError(f"{where}: want one column x and one y, found {', '.join(names)}")
-    x, y = plain.index("x"), plain.index("y")
-    for name in names[x], names[y]:
+    at = {}
+    for column in (*NUMBERS, "tag"):
+        if plain.count(column) > 1:
+            raise ValueError(f"{where}: two columns {column}")
+        if column in plain:
+            at[column] = plain.index(column)
+    for column, units in NUMBERS.items():
+        name = names[at[column]] if column in at else ""
         unit = UNIT.search(name)
-        if unit and unit[1].strip().lower() not in ("m", "metre", "meter", "metres", "meters"):
-            raise ValueError(f"{where}: column {name!r} must be in m")
-    return _Columns(len(names), x, y)
+        if unit and unit[1].strip().lower() not in units:
+            raise ValueError(f"{where}: column {name!r} must be in {units[0]}")
+    return _Columns(len(names), at)
 
 
 def _name(cell: str) -> str:
     return UNIT.sub("", cell).strip().lower()
 
 
-def _pick(number: int, cells: list[str], columns: _Columns) -> tuple[str, str]:
+def _pick(number: int, cells: list[str], columns: _Columns) -> dict[str, str]:
+    cells = _shortened(cells, columns.number)
     if len(cells) != columns.number:
         raise ValueError(f"line {number}: {len(cells)} column(s), want {columns.number}")
-    return cells[columns.x], cells[columns.y]
+    return {name: cells[column] for name, column in columns.at.items()}
 
 
 def _is_number(cell: str) -> bool:

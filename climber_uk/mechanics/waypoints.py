@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.rounding import Rounded, rounded
 from climber_uk.mechanics.slowing import Slowed, SpeedLimits, slowed
-from climber_uk.mechanics.waypoint_file import read_waypoints
+from climber_uk.mechanics.waypoint_file import Marks, read_waypoints
 from climber_uk.parameters.declaration import parameter, parameters
 
 STATIONS = 2001
@@ -47,6 +48,10 @@ class ThroughPoints(Rounding):
         """Points (n, 2) [m]; raises `ValueError`."""
         raise NotImplementedError
 
+    def marks(self) -> Marks:
+        """What is said of the points beside their places."""
+        return Marks.none(len(self.given()))
+
     @property
     def source(self) -> str:
         """What an error calls the points."""
@@ -67,13 +72,14 @@ class ThroughPoints(Rounding):
     def at_rate(self, rate: float) -> "SlowedPath":
         """See `Shape`."""
         if rate not in self._by_rate:
-            limits = SpeedLimits(rate, self.max_yaw_rate, self.max_acceleration)
             path = self._rounded
             try:
+                marks = placed(path, self.marks())
+                limits = SpeedLimits(rate, self.max_yaw_rate, self.max_acceleration, marks.legs)
                 pace = slowed(path.curve, path.length, path.closed, self.tolerance, limits)
             except ValueError as error:
                 raise ValueError(f"{self.source}: {error}") from None
-            self._by_rate[rate] = SlowedPath(path, pace)
+            self._by_rate[rate] = SlowedPath(path, pace, marks)
         return self._by_rate[rate]
 
     # Without a rate there is no need to be slow:
@@ -92,6 +98,16 @@ class ThroughPoints(Rounding):
     def reversals(self) -> Array:
         """See `Shape`."""
         return self.at_rate(0.0).reversals
+
+    @property
+    def rests(self) -> tuple[Array, Array]:
+        """See `Shape`."""
+        return self.at_rate(0.0).rests
+
+    @property
+    def tags(self) -> tuple[tuple[float, str], ...]:
+        """See `Shape`."""
+        return self.at_rate(0.0).tags
 
     @property
     def stations(self) -> Array:
@@ -121,11 +137,19 @@ class Waypoints(ThroughPoints):
     file: str = parameter("", "", "text file with x and y [m], one point a line", is_path=True)
 
     def __post_init__(self) -> None:
-        _ = self._rounded  # a bad file is found now, not when the climber starts
+        _ = self.rests  # a bad file is found now, not when the climber starts
+
+    @cached_property
+    def _read(self) -> tuple[Array, Marks]:
+        return read_waypoints(self.file)
 
     def given(self) -> Array:
         """See `ThroughPoints`."""
-        return read_waypoints(self.file)
+        return self._read[0]
+
+    def marks(self) -> Marks:
+        """See `ThroughPoints`."""
+        return self._read[1]
 
     @property
     def source(self) -> str:
@@ -150,12 +174,38 @@ class Polyline(ThroughPoints):
         return self.places
 
 
+class Placed(NamedTuple):
+    """Marks of points, by places s on their rounded polyline."""
+
+    legs: tuple[Array, Array] | None  # as `SpeedLimits` has them
+    rests: tuple[Array, Array]  # s (k,), and for how long (k,) [s]
+    tags: tuple[Array, list[str], Array]  # s (k,), texts, and whether (k,) at the end of a round
+
+
+def placed(path: Rounded, marks: Marks) -> Placed:
+    """Marks where their points are; of those that are left out, at the one before."""
+    numbers, first = np.unique(path.numbers, return_index=True)
+    count = len(marks.dwell)
+    corner = first[np.searchsorted(numbers, np.arange(count) + 1, "right") - 1]
+    where, dwell = path.legs[corner], marks.dwell
+    is_end = (np.arange(count) == count - 1) & path.closed
+    if path.closed:  # its last point is its first
+        dwell = np.append(max(dwell[0], dwell[-1]), dwell[1:]) * ~is_end
+    fastest = np.full(len(path.legs), np.inf)
+    np.minimum.at(fastest, corner, marks.speed)
+    legs = (path.legs, fastest[:-1]) if np.isfinite(fastest[:-1]).any() else None
+    rests, tagged = dwell > 0, np.array([bool(tag) for tag in marks.tags])
+    texts = [tag for tag in marks.tags if tag]
+    return Placed(legs, (where[rests], dwell[rests]), (where[tagged], texts, is_end[tagged]))
+
+
 @dataclass(frozen=True)
 class SlowedPath:
     """A rounded polyline whose parameter is stretched in bends, for one rate."""
 
     path: Rounded
     slowed: Slowed
+    placed: Placed
 
     @property
     def closed(self) -> bool:
@@ -182,8 +232,29 @@ class SlowedPath:
         return self._from_start(self.slowed.parameter(self.path.reversals))
 
     def _from_start(self, parameter: Array) -> Array:
+        return np.sort(self._shifted(parameter))
+
+    def _shifted(self, parameter: Array) -> Array:
         s = parameter - self._start
-        return np.sort(np.where(s < -1e-9 * self.length, s + self.length, np.maximum(s, 0.0)))
+        return np.where(s < -1e-9 * self.length, s + self.length, np.maximum(s, 0.0))
+
+    @cached_property
+    def rests(self) -> tuple[Array, Array]:
+        """See `Shape`."""
+        where, dwell = self.placed.rests
+        places = np.concatenate([self._shifted(self.slowed.parameter(where)), self.reversals])
+        dwell = np.concatenate([dwell, np.zeros(len(self.reversals))])
+        order = np.lexsort([-dwell, places])  # a dwell before the reversal at its place
+        places, dwell = places[order], dwell[order]
+        is_new = np.diff(places, prepend=-np.inf) > 1e-9 * self.length
+        return places[is_new], dwell[is_new]
+
+    @cached_property
+    def tags(self) -> tuple[tuple[float, str], ...]:
+        """See `Shape`."""
+        where, texts, is_end = self.placed.tags
+        places = np.where(is_end, self.length, self._shifted(self.slowed.parameter(where)))
+        return tuple(sorted(zip(places.tolist(), texts, strict=True), key=itemgetter(0)))
 
     @cached_property
     def stations(self) -> Array:

@@ -11,7 +11,7 @@ from climber_uk.messages.reading import check_size, heading_of, nanoseconds
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import PoseWithCovarianceStamped
-    from sensor_msgs.msg import Imu, JointState
+    from sensor_msgs.msg import BatteryState, Imu, JointState
 
 PLANAR = 0, 1, 5  # x, y and about z, in the six rows of a covariance
 # variances of x and y [m²], and of the heading [rad²], from which on they are not measured
@@ -35,6 +35,14 @@ class PoseFields(NamedTuple):
     parts: tuple[int, ...]  # of (x, y, heading)
     values: Array  # (n,) [m], [rad]
     noise: Array  # (n, n)
+
+
+def battery(message: "BatteryState") -> tuple[float, float]:
+    """Charge, 0 to 1, and voltage [V] of a battery; nan if that is not measured."""
+    charge, voltage = float(message.percentage), float(message.voltage)
+    if charge < 0 or charge > 1:
+        raise ValueError(f"percentage={charge:g} must be from 0 to 1")
+    return charge, voltage
 
 
 def stamp_of(message: "Imu | JointState | PoseWithCovarianceStamped") -> int:

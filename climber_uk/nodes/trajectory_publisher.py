@@ -23,6 +23,7 @@ from climber_uk.mechanics.waypoints import Rounding
 from climber_uk.messages import reading, writing
 from climber_uk.messages.references import ReferenceWriter, Row
 from climber_uk.messages.topics import (
+    EVENTS,
     GIVEN_PATH,
     ODOMETRY,
     PLANNER,
@@ -35,6 +36,7 @@ from climber_uk.messages.topics import (
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.planning.by_hand import HandOptions
 from climber_uk.planning.course import CourseOptions
+from climber_uk.planning.events import Events
 from climber_uk.planning.given_path import Manner
 from climber_uk.planning.journey import BACK, HAND, PATH, Journey, Said
 from climber_uk.planning.progress import BY_HAND, FOLLOWING, WAITING, Odometer, Progress, progress
@@ -92,12 +94,14 @@ class TrajectoryPublisher(ClimberNode):
         self.mode = ""  # what it does; empty: none tells
         self.last_look = self.stood_at = 0  # [ns] of the clock
         self.odometer: Odometer | None = None  # once progress is asked for
+        self.tags: Events | None = None  # of the course
         self.is_progress_due = Throttle(PROGRESS_PERIOD)
 
         self.reference = self.publisher(MultiDOFJointTrajectory, REFERENCE)
         self.serialized = ReferenceWriter(self.names.odom_frame, self.names.base_frame)
         self.path = self.publisher(Path, REFERENCE_PATH, LATCHED)
         self.progress = self.publisher(DiagnosticArray, private(PROGRESS), RELIABLE)
+        self.events = self.publisher(DiagnosticArray, private(EVENTS))
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.subscription(Float64, "~/speed", self.on_speed)
         self.given = PathIntake(self, GIVEN_PATH, self.manner)
@@ -223,7 +227,9 @@ class TrajectoryPublisher(ClimberNode):
         self.odometry = None
         start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
         what = self.shape if self.journey.next == PATH else self.journey.next
+        goes_on = self.journey.next == BACK
         self.journey.start(start, state.pose, self.position)
+        self.begin_events(goes_on)
         self.followed, self.mode, self.has_told_done = None, "", False
         self.last_look = now or stamp  # the odometry may have come before the first clock
         self.publish_around(start)
@@ -238,6 +244,7 @@ class TrajectoryPublisher(ClimberNode):
         under_way = self.journey.under_way
         if under_way and is_of_now and under_way.start <= followed <= stamp + SECOND:
             self.followed, self.mode = followed, message.source
+            self.tell_events(stamp)
 
     @property
     def position(self) -> int:
@@ -274,6 +281,8 @@ class TrajectoryPublisher(ClimberNode):
             position = self.position
             self.publish_around(position)
             self.tell_done(position)
+            if not self.mode and not self.count_publishers(REFERENCE_TIME):
+                self.tell_events(now)
             if self.journey.waits_for_rest:
                 self.begin(self.journey.next)
         if self.is_progress_due(now) and self.progress.get_subscription_count():
@@ -289,6 +298,26 @@ class TrajectoryPublisher(ClimberNode):
             where = "end" if course.direction > 0 else "beginning"
             self.get_logger().info(f"done: at the {where} after {course.time(position):.1f} s")
         self.has_told_done = is_done
+
+    def begin_events(self, goes_on: bool) -> None:
+        """Expect all tags of a course that begins, or of one that goes on those ahead."""
+        course = self.journey.course
+        if course is None or self.journey.hand is not None:
+            return
+        if self.tags is None or not goes_on:
+            self.tags = Events(course.trajectory)
+        self.tags.skip(course.begin)
+
+    def tell_events(self, stamp: int) -> None:
+        """Publish the tags that the climber has reached by a stamp [ns]."""
+        course = self.journey.course
+        if course is None or self.tags is None or not self.is_driven or self.journey.hand:
+            return
+        own_time, rate = course.own_time(self.position)
+        for tag, at, (x, y) in self.tags.reached(own_time, rate, stamp):
+            name = self.get_fully_qualified_name()
+            values = {"state": tag, "x": x, "y": y}
+            self.events.publish(writing.progress(name, values, at))
 
     def publish_progress(self, now: int) -> None:
         """Publish how far the course is."""

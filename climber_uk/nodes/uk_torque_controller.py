@@ -8,8 +8,8 @@ from geometry_msgs.msg import TwistStamped, Vector3Stamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import FluidPressure, JointState, TimeReference
-from std_msgs.msg import Float64MultiArray
+from sensor_msgs.msg import BatteryState, FluidPressure, JointState, TimeReference
+from std_msgs.msg import Bool, Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.control.build import KINDS, ControllerChoice, build_controller, settings
@@ -22,11 +22,13 @@ from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.reference import tracking_error
-from climber_uk.messages import reading, writing
+from climber_uk.messages import reading, reading_sensors, writing
 from climber_uk.messages.in_place import NumberReader
 from climber_uk.messages.references import PreviewReader
 from climber_uk.messages.topics import (
+    BATTERY,
     CONTROLLER,
+    EMERGENCY_STOP,
     FORCE,
     ODOMETRY,
     PARAMETERS,
@@ -135,7 +137,15 @@ class UkTorqueController(ManagedNode):
         """Reset the controller to its safe output, and subscribe all inputs."""
         self.controller = build_controller(self.parameters, self.pressure)
         self.controller.enable(False)
+        stops = self.controller.stops.options
+        inputs = []
+        if stops.emergency_stop:
+            inputs.append(self.subscription(Bool, EMERGENCY_STOP, self.on_emergency_stop))
+        if stops.reads_battery:
+            battery = self.subscription(BatteryState, BATTERY, self.on_battery, BEST_EFFORT)
+            inputs.append(battery)
         return [
+            *inputs,
             self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT, raw=True),
             self.subscription(
                 MultiDOFJointTrajectory, REFERENCE, self.on_reference, RELIABLE, raw=True
@@ -211,6 +221,22 @@ class UkTorqueController(ManagedNode):
         if pressure != self.pressure:
             self.pressure = pressure
             self.retune()
+
+    def on_emergency_stop(self, message: Bool) -> None:
+        """Stop at once, or let `~/enable` end the stop."""
+        now = self.now()
+        self.controller.stops.press(message.data, now)
+        if message.data:
+            self.publish(self.controller.look(now))
+
+    def on_battery(self, message: BatteryState) -> None:
+        """Stop at a low charge or voltage."""
+        try:
+            self.controller.stops.see_battery(*reading_sensors.battery(message))
+        except ValueError as error:
+            self.report(BATTERY, "refused", str(error))
+            return
+        self.report(BATTERY, "")
 
     def look(self) -> None:
         """Publish the safe output if odometry or reference have stopped."""
@@ -342,6 +368,7 @@ class UkTorqueController(ManagedNode):
             "odometry period [s]": estimator.period,
             "clock offset [s]": controller.clock_offset,
             "reference waits [s]": controller.active.waited,
+            "way on the tether [m]": controller.stops.way,
             "delay learnt [s]": estimator.latency.delay,
             "disturbance of the drive [N]": force,
             "disturbance of the turn [N m]": moment,

@@ -72,6 +72,7 @@ class Course(Generic[Row]):
     ) -> None:
         self.trajectory, self.start, self.options = trajectory, start, options
         self.is_paused, self.speed = is_paused, speed  # as a share of the planned one
+        self.begin = begin
         self.direction = 1  # -1: back along the path
         self.clock: PathClock | None = None  # None: as planned
         self._make = make

@@ -17,6 +17,7 @@ from climber_uk.bags.joints import commanded_torques
 from climber_uk.bags.run_reader import RunReader
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.safety import Mode
+from climber_uk.control.stops import STOPS
 from climber_uk.mechanics import Array, Stamps
 from climber_uk.messages import topics
 from climber_uk.messages.topics import CLOCK, CONTROLLER, TORQUES
@@ -24,6 +25,8 @@ from climber_uk.messages.topics import CLOCK, CONTROLLER, TORQUES
 # inputs and outputs of the controller
 INPUTS = topics.ODOMETRY, topics.REFERENCE, topics.PRESSURE
 TOPICS = *INPUTS, TORQUES, topics.PARAMETERS, topics.DIAGNOSTICS
+# as which a replay, which has neither buttons nor batteries, gives the safe output
+NOT_ENABLED = {mode.value for mode in (Mode.DISABLED, *STOPS)}
 Modes = list[tuple[int, str]]  # with the time of the node's clock at which each began
 
 
@@ -84,7 +87,7 @@ def _settings(
     `torques` (n,) are the times [ns] at which torques were published.
     """
     news: list[tuple[int, dict[str, Any]]] = [(at, {"parameters": new}) for at, new in parameters]
-    news += [(mode.arrival, {"enabled": mode.text != Mode.DISABLED.value}) for mode in modes]
+    news += [(mode.arrival, {"enabled": mode.text not in NOT_ENABLED}) for mode in modes]
     setting, found = Setting(), dict[int, Setting]()
     for at, change in sorted(news, key=itemgetter(0)):
         setting = replace(setting, **change)

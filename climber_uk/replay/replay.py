@@ -14,6 +14,7 @@ from climber_uk.bags.publishing_order import read_published
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
+from climber_uk.control.stops import Stops
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import Torques
 from climber_uk.messages import reading, references
@@ -44,6 +45,7 @@ class Replay:
         self.names = self.parameters.read(Names).within(namespace)
         self.pressure: float | None = None  # [Pa] as last measured
         self.controller = build_controller(self.parameters, None)
+        self.controller.stops = Stops()  # the bag's modes tell when it was stopped
         self.settings = deque(recorded.settings)  # that are to come
         self.torques: dict[int, Array] = {}  # by stamp, right, left [N m]
         self.modes: Modes = []

@@ -116,7 +116,7 @@ def test_it_begins_at_the_corner_that_is_nearest(tmp_path):
 def test_every_lane_is_driven_whole_from_end_to_end():
     area = Area((np.array([[0, 0], [3, 0], [3, 2], [0, 2.0]]),), 0.2)
     lanes = lanes_of(area, 0.2, edges=True)
-    way = joined(area, lanes, np.zeros(2))
+    way, _ = joined(area, lanes, np.zeros(2))
     steps = {tuple(map(tuple, pair)) for pair in np.stack([way[:-1], way[1:]], axis=1).round(9)}
     for first, last in lanes.round(9).tolist():
         assert {(tuple(first), tuple(last)), (tuple(last), tuple(first))} & steps

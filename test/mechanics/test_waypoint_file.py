@@ -34,13 +34,13 @@ GOOD = {
 def test_points_are_read_however_they_are_written(tmp_path, text):
     file = tmp_path / "points.csv"
     file.write_bytes(text.encode())
-    np.testing.assert_array_equal(read_waypoints(str(file)), POINTS)
+    np.testing.assert_array_equal(read_waypoints(str(file))[0], POINTS)
 
 
 def test_a_file_in_utf_16_is_read(tmp_path):
     file = tmp_path / "points.txt"
     file.write_text(GOOD["header"], encoding="utf-16")
-    np.testing.assert_array_equal(read_waypoints(str(file)), POINTS)
+    np.testing.assert_array_equal(read_waypoints(str(file))[0], POINTS)
 
 
 BAD = {
@@ -66,6 +66,15 @@ BAD = {
     "decimal commas and points": ("1,5;2\n3.5;4\n", "line 2: '3.5' has a decimal point"),
     "thousands": ("1,000.5;2\n3;4\n", "line 1: '1,000.5' has a decimal point"),
     "two commas": ("1,000,5;2\n3;4\n", "line 1: '1,000,5' must be a number"),
+    "no speed": ("x,y,speed\n1,2,0\n3,4,\n", "line 2: speed 0 must be > 0"),
+    "back in time": ("x,y,dwell\n1,2,\n3,4,-1\n", "line 3: dwell -1 must be >= 0"),
+    "for ever": ("x,y,dwell\n1,2,\n3,4,inf\n", "line 3: dwell inf must be >= 0, and finite"),
+    "a speed in words": ("x,y,speed\n1,2,slow\n3,4,\n", "line 2: 'slow' must be a number"),
+    "kilometres an hour": (
+        "x,y,speed [km/h]\n1,2,1\n3,4,\n",
+        "column 'speed [km/h]' must be in m/s",
+    ),
+    "twice a tag": ("x,y,tag,tag\n1,2,a,b\n3,4,,\n", "line 1: two columns tag"),
     "binary": ("\0\1\2", "is not a text file"),
 }
 
@@ -92,3 +101,12 @@ def test_what_is_no_file_is_said_to_be_none(tmp_path):
     file.write_bytes(b"\xe9\xe8 1\n")
     with pytest.raises(ValueError, match="is not a text file"):
         read_waypoints(str(file))
+
+
+def test_speed_dwell_and_tag_of_points_are_read_and_may_be_empty(tmp_path):
+    file = tmp_path / "points.csv"
+    file.write_text("tag;x [m];y;speed [m/s];dwell [s]\nphoto 1;0;0;0,5;\n;1;0;;2\n")
+    _, marks = read_waypoints(str(file))
+    assert marks.tags == ("photo 1", "")
+    np.testing.assert_array_equal(marks.speed, [0.5, np.inf])
+    np.testing.assert_array_equal(marks.dwell, [0.0, 2.0])

@@ -208,7 +208,7 @@ def test_sizes_in_millimetres_are_remarked(folder):
 def test_a_law_that_never_stops_is_refused_where_the_path_turns_back(folder):
     for name in ("there and back", "a closed path with two reversals"):
         shape = made(folder, CASES[name])
-        with pytest.raises(ValueError, match=r"turns back, at \(.* m: use 'rest_to_rest'"):
+        with pytest.raises(ValueError, match=r"turns back or rests, at \(.* m: use 'rest_to_rest'"):
             Trajectory(shape, ConstantRate(0.2))
     Trajectory(made(folder, CASES["a square, nearly closed"]), ConstantRate(0.2))
 

@@ -13,6 +13,8 @@ from test_faults import LIMIT, PLANNER
 from test_waiting import Waiting
 from world import executable
 
+from climber_uk.messages import reading
+
 pytestmark = pytest.mark.nodes
 
 
@@ -144,6 +146,24 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.odometry[-1].pose.pose.position.x == pytest.approx(4.0, abs=0.01)
     assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
     assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01
+
+
+def test_tags_of_a_path_are_told_as_the_climber_reaches_them(world):
+    file = world.directory / "points.csv"
+    file.write_text("x,y,speed,dwell,tag\n0,0,,,begin\n0.4,0,0.1,1,photo\n0.8,0,,,end\n")
+    path = ["shape:=waypoints", f"waypoints.file:={file}", "rest_to_rest.rate:=0.3"]
+    climb = Operated(world, {PLANNER: path, "plant_simulator": ["initial_heading:=0.0"]})
+    events = world.listen(DiagnosticArray, f"{PLANNER}/events")
+    assert climb.ask("start").success  # the first may have been told before we listened
+    events.clear()
+    world.wait(lambda: [e for e in events if e.status[0].message == "end"], "the last tag")
+    assert [e.status[0].message for e in events][-3:] == ["begin", "photo", "end"]
+    where = {pair.key: float(pair.value) for pair in events[-2].status[0].values}
+    assert (where["x"], where["y"]) == pytest.approx((0.4, 3.0), abs=1e-6)
+    at = reading.nanoseconds(events[-2].header.stamp)
+    stamps = [reading.nanoseconds(m.header.stamp) for m in climb.odometry]
+    then = climb.odometry[int(np.searchsorted(stamps, at))]
+    assert then.pose.pose.position.x == pytest.approx(0.4, abs=0.01)
 
 
 @pytest.mark.soak

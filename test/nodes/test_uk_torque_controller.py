@@ -11,8 +11,8 @@ from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from reference_points import reference_point
-from sensor_msgs.msg import FluidPressure, JointState
-from std_msgs.msg import Float64MultiArray
+from sensor_msgs.msg import BatteryState, FluidPressure, JointState
+from std_msgs.msg import Bool, Float64MultiArray
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -339,3 +339,26 @@ def test_suction_that_is_lost_stops_the_climber_and_its_margins_tell(world):
     )
     pressure.publish(FluidPressure(fluid_pressure=2500.0))
     loop.follows()
+
+
+def test_an_emergency_stop_lasts_until_it_is_enabled_and_a_low_battery_stops_it(world):
+    stops = ["stops.emergency_stop:=true", "stops.least_charge:=0.2"]
+    loop = Loop(world, "odometry_timeout:=1.0", *stops)
+    button = world.speak(Bool, "emergency_stop")
+    battery = world.speak(BatteryState, "battery_state")
+    enable = SetBool.Request(data=True)
+    loop.plan()
+    loop.follows()
+    button.publish(Bool(data=True))
+    loop.is_safe()
+    world.wait(lambda: "safe output: emergency stop (pressed)" in world.log(NAME), "word of it")
+    button.publish(Bool(data=False))
+    battery.publish(BatteryState(percentage=87.0, voltage=24.0))
+    world.wait(lambda: "battery_state: refused (percentage=87" in world.log(NAME), "a refusal")
+    loop.is_safe()
+    assert world.call(SetBool, f"{NAME}/enable", enable).success
+    loop.follows()
+    battery.publish(BatteryState(percentage=0.19, voltage=24.0))
+    loop.is_safe()
+    world.wait(lambda: "battery low (19% < 20%)" in world.log(NAME), "word of it")
+    assert world.log(NAME).count("safe output: emergency stop") == 1
