@@ -1,6 +1,7 @@
 """Write what is said in one place only: `python docs/generate.py [DIRECTORY]`.
 
-parameters.md and interfaces.md come from the nodes, metrics.md from the metrics of bags.
+parameters.md, interfaces.md and security_policy.xml come from the nodes, metrics.md from the
+metrics of bags.
 """
 
 import dataclasses
@@ -31,6 +32,19 @@ NODES: list[Callable[[], ClimberNode]] = [
     Markers,
     DriverNode,
 ]
+ALL_ON = [  # what a node publishes and subscribes only if it is asked to
+    "trajectory_publisher:by_hand.input:=twist_stamped",
+    "uk_torque_controller:stops.emergency_stop:=true",
+    "uk_torque_controller:stops.least_charge:=0.2",
+    "plant_simulator:simulated_time:=true",
+    "plant_simulator:imu.enabled:=true",
+    "plant_simulator:fixes.period:=0.1",
+]
+UNSEEN = {  # that the node does not list, or publishes only where a package is installed
+    "uk_torque_controller": [("~/transition_event", "lifecycle_msgs/TransitionEvent")],
+    "plant_simulator": [("/tf", "tf2_msgs/TFMessage")],
+    "wall_odometry": [("/tf", "tf2_msgs/TFMessage")],
+}
 EVERY_NODE = (
     topics.LOG,
     "/parameter_events",
@@ -60,6 +74,10 @@ CONTENTS = {
     "late; parts with a variance of 1e4 m², π² rad² or more are not measured; the plant tells it "
     "if `fixes.period` > 0",
     topics.TRUTH: "the simulated climber without its sensors' errors",
+    "emergency_stop": "true stops the climber, until false and `~/enable`; with "
+    "`stops.emergency_stop`",
+    "battery_state": "charge and voltage, too low of which stop it; with `stops.least_charge` or "
+    "`stops.least_voltage`",
     topics.PUSH: "force [N] and moment [N m] on the simulated climber, in `odom` or `base_link`",
     "markers": "climber, reference, way, torques and force for RViz and Foxglove, in `odom`; 20 Hz",
     topics.FORCE: "what the controller publishes",
@@ -176,6 +194,10 @@ def interfaces(nodes: list[ClimberNode]) -> str:
             for end in ends:
                 kind = type_name(end.msg_type)
                 lines += entry(node, word, end.topic_name, kind, qos(end.qos_profile))
+        for name, kind in UNSEEN.get(node.get_name(), ()):
+            lines.append(
+                f"| publishes | `{name}` | {kind} | reliable, last 10 | {CONTENTS[name]} |"
+            )
         for service in node.services:
             lines += entry(node, "serves", service.service_name, type_name(service.srv_type), "")
     return "\n".join(lines) + "\n"
@@ -188,6 +210,36 @@ def entry(node: ClimberNode, word: str, name: str, kind: str, quality: str) -> l
     short = name.replace(node.get_fully_qualified_name(), "~") if name.count("/") > 1 else name
     short = short if short in CONTENTS else short.lstrip("/")
     return [f"| {word} | `{short}` | {kind} | {quality} | {CONTENTS[short]} |"]
+
+
+def security_policy(nodes: list[ClimberNode]) -> str:
+    """What each of `nodes` has to be allowed, as `ros2 security` takes it: an enclave for each."""
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        "<!-- made by docs/generate.py; in a namespace, change ns and paths -->",
+        '<policy version="0.2.0">',
+        "  <enclaves>",
+    ]
+    for node in nodes:
+        own = node.get_fully_qualified_name()
+        unseen = [name.replace("~", own) for name, _ in UNSEEN.get(node.get_name(), ())]
+        named = {
+            ("topic", "publish"): [
+                "/rosout",
+                *(end.topic_name for end in node.publishers),
+                *unseen,
+            ],
+            ("topic", "subscribe"): ["/clock", *(end.topic_name for end in node.subscriptions)],
+            ("service", "reply"): [service.service_name for service in node.services],
+        }
+        lines.append(f'    <enclave path="{own}">\n      <profiles>')
+        lines.append(f'        <profile ns="/" node="{node.get_name()}">')
+        for (kind, may), names in named.items():
+            lines.append(f'          <{kind}s {may}="ALLOW">')
+            lines += [f"            <{kind}>{name}</{kind}>" for name in sorted(set(names))]
+            lines.append(f"          </{kind}s>")
+        lines.append("        </profile>\n      </profiles>\n    </enclave>")
+    return "\n".join([*lines, "  </enclaves>", "</policy>"]) + "\n"
 
 
 def type_name(kind: type) -> str:
@@ -220,12 +272,13 @@ def metrics() -> str:
 
 def documents() -> dict[str, str]:
     """Texts by file name, of nodes as they are."""
-    rclpy.init()
+    rclpy.init(args=["--ros-args", *(word for given in ALL_ON for word in ("-p", given))])
     nodes = [make() for make in NODES]
     try:
         return {
             "parameters.md": parameters(nodes),
             "interfaces.md": interfaces(nodes),
+            "security_policy.xml": security_policy(nodes[:-1]),
             "metrics.md": metrics(),
         }
     finally:
