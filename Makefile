@@ -11,13 +11,14 @@ PAPER_OUTPUT ?= demo_output/paper
 CAMPAIGN ?= config/campaign.yaml
 CAMPAIGN_OUTPUT ?= demo_output/$(basename $(notdir $(CAMPAIGN)))
 VENV := .venv
+KILTED := .venv-kilted
 BIN := $(VENV)/bin
 # What has been installed: for nodes, recorder and analysis; for tests, campaigns and benches too
 SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean
+.PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean test-kilted
 
 ## run the nodes, and tell how well; CONFIG=config/climber.yaml, CLOCK=wall, CLIMBERS=4
 demo: $(SET_UP)
@@ -26,8 +27,8 @@ demo: $(SET_UP)
 	@$(BIN)/analyze_bag $(OUTPUT)/bag --params $(CONFIG) --output $(OUTPUT)
 
 help:
-	@awk '/^##/ {line = substr($$0, 4)} /^[a-z]+:/ && line {split($$1, name, ":"); \
-		printf "make %-10s %s\n", name[1], line; line = ""}' $(MAKEFILE_LIST)
+	@awk '/^##/ {line = substr($$0, 4)} /^[a-z-]+:/ && line {split($$1, name, ":"); \
+		printf "make %-11s %s\n", name[1], line; line = ""}' $(MAKEFILE_LIST)
 
 ## the paper's figures and numbers
 paper: $(SET_UP)
@@ -73,7 +74,7 @@ TESTS := -m pytest --numprocesses 5 --dist worksteal
 # Of many hundred processes each would compile the package again
 KEEPING_BYTECODE := env -u PYTHONDONTWRITEBYTECODE
 
-## the tests, in four processes
+## the tests, in five processes
 unit: $(TOOLS)
 	$(KEEPING_BYTECODE) $(BIN)/python $(TESTS)
 
@@ -83,6 +84,18 @@ coverage: $(TOOLS)
 	$(KEEPING_BYTECODE) $(BIN)/coverage run $(TESTS)
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --sort cover --fail-under 95
+
+## the tests by ROS 2 Kilted in place of Jazzy, in an environment of its own
+test-kilted: $(KILTED)/set-up
+	ROS_DISTRO=kilted $(KEEPING_BYTECODE) $(KILTED)/bin/python $(TESTS)
+
+$(KILTED)/set-up: requirements.txt setup.py
+	$(PYTHON) -m venv $(KILTED)
+	grep -v '^ros-' requirements.txt > $(KILTED)/requirements.txt
+	$(KILTED)/bin/pip install --quiet --requirement $(KILTED)/requirements.txt \
+		'ros-kilted-rclpy[fastrtps]' ros-kilted-common-interfaces
+	$(KILTED)/bin/pip install --quiet --no-deps --no-build-isolation evo==1.38.1 --editable .
+	touch $@
 
 ## longer tests than CI has time for
 soak: $(TOOLS)
@@ -118,4 +131,4 @@ $(TOOLS): requirements.txt setup.py
 
 ## remove what the others made
 clean:
-	rm -rf $(VENV) build install log demo_output
+	rm -rf $(VENV) $(KILTED) build install log demo_output

@@ -8,7 +8,10 @@ from collections.abc import MutableMapping
 from pathlib import Path
 
 LOCALHOST = Path(__file__).with_name("localhost.xml")
-TRANSPORTS, PROFILES = "FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE"
+TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
+# up to Jazzy, which is what the wheels are, and from Kilted on; distributions go by the alphabet
+BOTH_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"
+PROFILES = BOTH_PROFILES[os.environ.get("ROS_DISTRO", "jazzy") > "jazzy"]
 RANGE, ONLY_LOCAL = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
 
 
@@ -19,7 +22,7 @@ def use_udp(environment: MutableMapping[str, str] = os.environ) -> None:
     case, so there a profile takes the place of that range.
     """
     middleware = environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
-    if environment.keys() & {TRANSPORTS, PROFILES} or "fastrtps" not in middleware:
+    if environment.keys() & {TRANSPORTS, *BOTH_PROFILES} or "fastrtps" not in middleware:
         return
     environment[TRANSPORTS] = "UDPv4"
     # the older variable goes before the range
