@@ -129,8 +129,9 @@ def test_the_plant_passes_all_checks(world, clock, parameters, skipped):
 
 def test_with_a_controller_in_lock_step_it_listens_and_refuses_to_move(world):
     world.start_node("plant_simulator", *PACED, config="climber.yaml")
-    for node in ("uk_torque_controller", "trajectory_publisher"):
-        world.start_node(node, "use_sim_time:=true", config="climber.yaml")
+    world.start_node("uk_torque_controller", "use_sim_time:=true", config="climber.yaml")
+    quick = "use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"
+    world.start_node("trajectory_publisher", *quick, config="climber.yaml")
     odometry = world.listen(Odometry, "odom")
     world.wait(lambda: odometry and odometry[-1].twist.twist.linear.x > 0.1, "motion")
     sim_time = (*PARAMETERS, "-p", "use_sim_time:=true")
@@ -165,9 +166,10 @@ def test_odometry_that_waited_for_it_is_no_older(world):
 
 
 def test_when_it_is_interrupted_its_last_word_is_no_torque(world):
-    world.start_node("plant_simulator", "command_timeout:=60.0", config="climber.yaml")
+    slow = "control_period:=0.02"
+    world.start_node("plant_simulator", "command_timeout:=60.0", slow, config="climber.yaml")
     joints = world.listen(JointState, "joint_states")
-    world.start("check_driver", "--move", "--duration", "0.5", *PATIENT)
+    world.start("check_driver", "--move", "--duration", "0.5", *PATIENT, "-p", slow)
     world.wait(lambda: joints and any(joints[-1].effort), "torque")
     assert world.end("check_driver", signal.SIGINT) == 2
     assert world.log("check_driver").endswith("check_driver: interrupted\n")
@@ -197,7 +199,7 @@ BOARDS = {"torques": PARAMETERS, "speeds": BY_SPEEDS}
     ("board", "fault", "check_name", "said"),
     [
         pytest.param(board, *row.values, marks=row.marks, id=f"{board}, {row.id}")
-        for board, brief in (("torques", IN_BRIEF), ("speeds", IN_BRIEF[:1]))
+        for board, brief in (("torques", IN_BRIEF[1:]), ("speeds", IN_BRIEF[:1]))
         for row in some(FAULTS, brief)
     ],
 )

@@ -12,7 +12,7 @@ from climber_uk.bags.recorded_run import read_run
 pytestmark = pytest.mark.nodes
 
 OWN = "ros__parameters"
-PATH = {"origin_y": 3.0, "parabola.length": 0.6, "one_go.rate": 0.2}
+PATH = {"origin_y": 3.0, "parabola.length": 0.6, "one_go.rate": 0.3}
 START = {"initial_x": 0.0, "initial_y": 3.0, "initial_heading": 0.0}
 ELECTRIC = {"adhesion": "electroadhesion", "electroadhesion.film_pressure": 6000.0}
 SECTIONS = {  # the first climber is that of the document
@@ -45,7 +45,7 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
     world.environment["PYTHONPATH"] = str(tmp_path / "packages")
     output = tmp_path / "run"
     options = ["--config", parameter_file, "--output", output, "--climbers", "2"]
-    demo = world.run("run_demo", executable("run_demo"), *options, "--duration", "6")
+    demo = world.run("run_demo", executable("run_demo"), *options, "--duration", "4.4")
     assert demo.wait(300) == 0, world.log("run_demo")
 
     def log(node):

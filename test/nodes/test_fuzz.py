@@ -29,7 +29,7 @@ from climber_uk.messages import reading, writing
 pytestmark = pytest.mark.nodes
 
 SIZE = 24
-SOME, MANY = 16, 84  # batches: 384 messages, 2016 messages
+SOME, MANY = 8, 84  # batches: 192 messages, 2016 messages
 HOW_MANY = pytest.mark.parametrize(
     "batches", [SOME, pytest.param(MANY, marks=pytest.mark.soak)], ids=["some", "many"]
 )

@@ -117,7 +117,9 @@ def test_an_unknown_reading_is_refused():
         PrintedSystem(gain="imaginary")
 
 
-@pytest.mark.parametrize("derivative", [PRINTED.uncorrected, PRINTED.corrected])
+@pytest.mark.parametrize(
+    "derivative", [PRINTED.uncorrected, pytest.param(PRINTED.corrected, marks=pytest.mark.soak)]
+)
 def test_at_1e_8_the_path_is_met_to_1e_8_while_the_wheels_slip_sideways(derivative):
     y, x_error, y_error = integrate(derivative, 1e-8, 1e-11)
     assert np.abs(x_error).max() < 1e-8

@@ -2,14 +2,13 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from made_bag import ODOMETRY, SECOND, message, turn, write
 
 from climber_uk.mechanics.climber import GRAVITY
+from climber_uk.replay import localize
 
 IMU, JOINTS = "sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
@@ -54,17 +53,29 @@ def a_bag(path, seconds=20.0, late=0.3, has_imu=True):
     return write(path, messages)
 
 
-def run(*arguments):
-    code = "from climber_uk.replay.localize import main; main()"
-    command = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command; return what it said on standard output, and as it ended."""
+
+    def run(*arguments):
+        monkeypatch.setattr("sys.argv", ["localize", *map(str, arguments)])
+        status = None
+        try:
+            localize.main()
+        except SystemExit as ended:
+            status = ended.code
+        said = capsys.readouterr()
+        assert not said.err
+        return said.out, status
+
+    return run
 
 
-def test_a_bag_is_localized_forwards_and_backwards(tmp_path):
+def test_a_bag_is_localized_forwards_and_backwards(tmp_path, run):
     bag = a_bag(tmp_path / "bag")
     given = ["-p", "acceleration_bias_deviation:=0.0", "-p", "creep_deviation:=0.1"]
-    done = run(bag, *given, "-o", tmp_path / "out")
-    assert done.returncode == 0, done.stderr
+    said, status = run(bag, *given, "-o", tmp_path / "out")
+    assert not status
     files = ["forward.tum", "localization.json", "localization.png", "smoothed.tum"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
     numbers = json.loads((tmp_path / "out" / "localization.json").read_text())["numbers"]
@@ -76,7 +87,7 @@ def test_a_bag_is_localized_forwards_and_backwards(tmp_path):
     )
     assert backward < 0.01
     assert backward < 0.8 * forward
-    assert f"{numbers['creep']:.4g}" in done.stdout
+    assert f"{numbers['creep']:.4g}" in said
     lines = (tmp_path / "out" / "smoothed.tum").read_text().splitlines()
     assert len(lines) == numbers["samples of the encoders"]
     assert lines[-1].startswith("29.98")
@@ -92,9 +103,8 @@ def test_a_bag_is_localized_forwards_and_backwards(tmp_path):
         (["--namespace", "robot"], "has no message on /robot/joint_states"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(tmp_path, arguments, said):
-    done = run(a_bag(tmp_path / "bag", seconds=0.5), *arguments)
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert said in done.stderr
+def test_what_is_wrong_is_said_in_one_line(tmp_path, run, arguments, said):
+    _, message = run(a_bag(tmp_path / "bag", seconds=0.5), *arguments)
+    assert said in message
+    assert "\n" not in message
     assert not (tmp_path / "bag" / "localization").exists()
