@@ -22,8 +22,14 @@ MOVES = 0.02  # [m/s] from which a climber does not rest
 SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
+SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: a limit cycle
+SWING_MEMORY = 0.4  # [s] of them
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
+LACKS = 0.3, 1.3  # of a wheel's torque that is missing all at once, if nothing of the other one's
+LACKS_ELSE = 0.25  # of the same, is missing or too much there
+LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
+LACKS_IN_A_ROW = 3  # odometry messages
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
@@ -99,6 +105,21 @@ class Variance:
         self.variance = (1 - weight) * (self.variance + weight * off * off)
 
 
+class Swings:
+    """How often a torque of late went from a strong one to the opposite."""
+
+    def __init__(self) -> None:
+        self.number, self._side = 0.0, 0.0
+
+    def add(self, load: float, time: float) -> None:
+        """Take a share (-1 to 1) of the largest torque, that acted for `time` [s]."""
+        self.number *= math.exp(-time / SWING_MEMORY)
+        if abs(load) < STRONG:
+            return
+        self.number += load * self._side < 0
+        self._side = load
+
+
 class Wheel:
     """A wheel that answers its torque: the force that acted follows the one that was asked for.
 
@@ -108,12 +129,25 @@ class Wheel:
 
     def __init__(self) -> None:
         self.asked, self.acted, self.unexplained = Variance(), Variance(), Variance()
+        self.force = self.missing = 0.0  # [N] that was asked for last, and what of it did not act
+        self.lacking = 0  # odometry messages in a row, for which it was
 
-    def add(self, asked: float, acted: float, weight: float) -> None:
-        """Add the force [N] that a torque should cause, and the one that acted."""
+    def add(self, asked: float, acted: float, known: float, weight: float) -> None:
+        """Add the force [N] that a torque should cause, the one that acted, and a known one."""
         self.asked.add(asked, weight)
         self.acted.add(acted, weight)
         self.unexplained.add(acted - asked, weight)
+        self.force, self.missing = asked, asked + known - acted
+
+    def lacks(self, other: "Wheel", largest: float) -> bool:
+        """Whether its force is missing all at once, of `largest` [N], and only its force."""
+        force = abs(self.force)
+        missing = math.copysign(1.0, self.force) * self.missing
+        least, most = LACKS
+        is_missing = force > LACKS_FROM * largest and least * force < missing < most * force
+        alone = abs(other.missing) < LACKS_ELSE * force
+        self.lacking = self.lacking + 1 if is_missing and alone else 0
+        return self.lacking >= LACKS_IN_A_ROW
 
     def answers(self, other: "Wheel", largest: float, proof: float) -> bool:
         """Whether it does, or too little was asked of it to know; of `largest` [N] at most."""
@@ -129,6 +163,7 @@ class Guard:
         self.options, self.adhesion = options, adhesion
         self.fault: Trouble | None = None  # that was found, until the climber has rested
         self._rested = 0.0  # [s] since it is at rest
+        self._followed = math.inf  # [s] since the last fault
         self.faults: deque[int] = deque()  # [ns] stamps
         self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
         self.restart()
@@ -136,11 +171,13 @@ class Guard:
     def forgive(self) -> None:
         """Forget the faults there were."""
         self.faults.clear()
+        self._followed = math.inf
 
     def restart(self) -> None:
         """Watch from now on."""
         self._too_fast = 0
         self._stalled = 0.0  # [s]
+        self._swings = Swings(), Swings()
         self._since_rest = math.inf  # [s]
         self._forget_wheels()
 
@@ -152,12 +189,14 @@ class Guard:
     def watch(self, climber: Climber, observed: Observed, expected: Expected) -> Trouble | None:
         """What is wrong with what is observed; None if all is well."""
         torques = observed.torques
+        self._followed += observed.time
         self._add_to_wheels(climber, observed, torques)
         too_fast = self._watch_rates(climber, observed, expected)
         return (
             self._watch_wheels(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
             or too_fast
             or self._watch_limit(climber, observed, expected, torques)
+            or self._watch_swings(climber, observed, torques)
             or self._watch_disturbance(climber, observed.disturbance)
         )
 
@@ -180,12 +219,15 @@ class Guard:
         return Mode.TOO_FAST, f"{measured:.2f} {unit}, at most {most:.2f} are asked for"
 
     def _let_go(self, climber: Climber, observed: Observed) -> float:
-        """Speed [m/s] at which friction may let go of it before a torque can answer."""
+        """Speed [m/s] at which friction may let go of it before a torque can answer.
+
+        None soon after a fault: what was wrong may be so still.
+        """
         before, after = observed.before.speed, observed.after.speed
         rests = abs(after) < MOVES or before * after < 0
         self._since_rest = 0.0 if rests else self._since_rest + observed.time
         answered = observed.reaction + UNKNOWN_DELAY
-        if self._since_rest > LETS_GO + answered:
+        if self._since_rest > LETS_GO + answered or self._followed < self.options.memory:
             return 0.0
         return climber.seal_friction / climber.mass * answered
 
@@ -209,6 +251,15 @@ class Guard:
         if not 0 < self.options.stall_time < self._stalled:
             return None
         return Mode.STALLED, f"{largest:.2f} N m"
+
+    def _watch_swings(
+        self, climber: Climber, observed: Observed, torques: Torques
+    ) -> Trouble | None:
+        for swings, torque in zip(self._swings, torques, strict=True):
+            swings.add(torque / climber.max_wheel_torque, observed.time)
+        if self.options.stall_time == 0 or max(it.number for it in self._swings) < SWINGS:
+            return None
+        return Mode.STALLED, f"to and fro, {max(map(abs, torques)):.2f} N m"
 
     def _watch_disturbance(
         self, climber: Climber, disturbance: Wrench | DisturbanceEstimate
@@ -240,15 +291,24 @@ class Guard:
         drive += math.copysign(friction, after.speed)
         yaw_force = inertia * (after.yaw_rate - before.yaw_rate) / time / climber.half_track
         new = 1 - math.exp(-time / response_time)
+        push, turn = observed.disturbance
+        turn /= climber.half_track
         acted = (drive + yaw_force) / 2, (drive - yaw_force) / 2
-        for wheel, torque, force in zip(self._wheels, torques, acted, strict=True):
-            wheel.add(torque / climber.wheel_radius, force, new)
+        known = (push + turn) / 2, (push - turn) / 2
+        for wheel, torque, *forces in zip(self._wheels, torques, acted, known, strict=True):
+            wheel.add(torque / climber.wheel_radius, *forces, new)
 
     def _watch_wheels(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
-        if not 0 < self.options.response_time < self._moved:
-            return None
         right, left = self._wheels
         largest = climber.max_wheel_torque / climber.wheel_radius
+        for name, wheel, other, torque in (
+            ("right", right, left, torques.right),
+            ("left", left, right, torques.left),
+        ):
+            if self._moved and wheel.lacks(other, largest):
+                return Mode.DEAD_WHEEL, f"the {name} one, at {torque:.2f} N m"
+        if not 0 < self.options.response_time < self._moved:
+            return None
         if not right.answers(left, largest, proof):
             return Mode.DEAD_WHEEL, f"the right one, at {torques.right:.2f} N m"
         if not left.answers(right, largest, proof):
@@ -259,7 +319,7 @@ class Guard:
 
     def count(self, stamp: int, fault: Trouble) -> None:
         """Remember a fault, at `stamp` [ns]."""
-        self.fault, self._rested = fault, 0.0
+        self.fault, self._rested, self._followed = fault, 0.0, 0.0
         self.faults.append(stamp)
         while stamp - self.faults[0] > self.options.memory * SECOND:
             self.faults.popleft()

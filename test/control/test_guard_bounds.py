@@ -67,8 +67,8 @@ def test_the_other_way_than_the_reference_goes_less_is_too_fast(reference, is_ag
         ({"speed": 0.0, "wanted": (0.0, 0.5), "torques": (4.0, -4.0)}, 4),
         ({"speed": 0.0, "wanted": (0.0, 0.5), "turn": 0.06, "torques": (4.0, -4.0)}, None),
         ({"speed": 0.0, "wanted": (0.0, 0.0), "torques": (4.0, 4.0)}, None),  # it is to rest
-        ({"waits": True, "torques": (3.95, 0.0)}, 6),
-        ({"waits": True, "torques": (3.9, 0.0)}, None),
+        ({"waits": True, "torques": (3.95, 3.95)}, 6),
+        ({"waits": True, "torques": (3.9, 3.9)}, None),
         ({"waits": False, "torques": (4.0, 4.0)}, None),
     ],
     ids=str,
@@ -83,6 +83,20 @@ def test_a_stall_that_was_interrupted_counts_from_the_beginning():
         assert climb.finds(speed=0.0, torques=(2.41, 2.41)) is None
     assert climb.finds(speed=0.0) is None
     assert climb.periods_until(Mode.STALLED, speed=0.0, torques=(2.41, 2.41)) == 6
+
+
+@pytest.mark.parametrize(
+    ("torque", "every", "found"),
+    [(4.0, 1, 7), (-2.41, 1, 7), (2.39, 1, None), (4.0, 4, 49), (4.0, 5, None)],
+)
+def test_a_torque_that_swings_from_limit_to_limit_is_a_stall(torque, every, found):
+    """Of these the last two swing 12 and 10 times a second."""
+    climb = Watched()
+    for number in range(100):
+        sign = 1 if number // every % 2 else -1
+        if climb.finds(torques=(sign * torque, -sign * torque)):
+            break
+    assert (number + 1 if number < 99 else None) == found
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -211,12 +225,52 @@ def test_a_wheel_that_leaves_friction_to_the_other_is_found():
     assert found[1].startswith("the right one")
 
 
-STRONG, DEAD = [(60.0, 0.0), (-60.0, 0.0)], beside((0.0, 0.0), (0.0, 0.0))
+STRONG, DEAD = [(40.0, 0.0), (-40.0, 0.0)], beside((0.0, 0.0), (0.0, 0.0))
 
 
 @pytest.mark.parametrize(("periods", "is_known"), [(7, False), (8, True)])
 def test_a_wheel_has_its_time_to_answer(periods, is_known):
     assert (found_of_wheels(STRONG, DEAD, periods=periods) is not None) == is_known
+
+
+@pytest.mark.parametrize("side", [0, 1], ids=["right", "left"])
+@pytest.mark.parametrize(
+    ("asked", "of_it", "of_other", "periods", "is_known"),
+    [
+        (0.5, 0.0, 0.0, 3, True),
+        (0.5, 0.0, 0.0, 2, False),
+        (-0.5, 0.0, 0.0, 3, True),
+        (0.31, 0.0, 0.0, 3, True),
+        (0.29, 0.0, 0.0, 9, False),  # too little to tell
+        (0.5, 0.69, 0.0, 3, True),
+        (0.5, 0.71, 0.0, 9, False),  # friction, weight
+        (0.5, -0.29, 0.0, 3, True),
+        (0.5, -0.31, 0.0, 9, False),  # something pushes it
+        (0.5, 0.0, 0.24, 3, True),
+        (0.5, 0.0, 0.26, 9, False),
+        (0.5, 0.0, -0.26, 9, False),
+    ],
+)
+def test_a_force_that_is_missing_at_one_wheel_alone_is_found_at_once(
+    side, asked, of_it, of_other, periods, is_known
+):
+    force = asked * LARGEST
+    forces, acted = [0.0, 0.0], [of_other * force] * 2
+    forces[side], acted[side] = force, of_it * force
+    torques = Torques(*(CLIMBER.wheel_radius * each for each in forces))
+    guard = Guard(GuardOptions(**UNCHECKED), Suction())
+    found, speed, turn, expected = None, 3.0, 0.0, Expected(Rates(0, 0), Rates(99, 99), False)
+    for _ in range(periods):
+        before = Motion(0.0, 0.0, 0.0, 1.0, 0.0, speed, turn)
+        speed += PERIOD / 5 * (sum(acted) - CLIMBER.seal_friction)
+        turn += PERIOD * LEVER / CLIMBER.yaw_inertia * (acted[0] - acted[1])
+        after = Motion(0.0, 0.0, 0.0, 1.0, 0.0, speed, turn)
+        known = Wrench(0.0, 0.0)
+        observed = Observed(before, after, PERIOD, [(torques, PERIOD)], known, REACTION)
+        found = found or guard.watch(CLIMBER, observed, expected)
+    assert (found and found[0]) == (Mode.DEAD_WHEEL if is_known else None)
+    if found:
+        assert found[1].startswith(f"the {('right', 'left')[side]} one")
 
 
 def test_what_a_wheel_did_before_a_rest_is_forgotten():
