@@ -164,7 +164,8 @@ class Loop:
             if not case.gap[0] <= measured_at < case.gap[1]:
                 off = np.array([case.moved[1] * (measured_at >= case.moved[0]), 0.0])
                 noise = case.fixes.position_noise**2 * np.eye(2)
-                self.localizer.on_fix(Fix(fix.stamp, (0, 1), fix.pose[:2] + off, noise))
+                lever = case.fixes.x, case.fixes.y
+                self.localizer.on_fix(Fix(fix.stamp, (0, 1), fix.pose[:2] + off, noise, lever))
         if measured.imu is not None:
             force = measured.imu.force[:2].tolist()
             self.localizer.on_imu(stamp, measured.imu.yaw_rate, *force)
@@ -190,6 +191,7 @@ ROWS = {
         creep=0.01,
         options=replace(FILTER, initial_creep=0.01, creep_deviation=0.002),
     ),
+    "a tag 0.3 m from the centre": Case(fixes=replace(FIXES, x=0.25, y=-0.17)),
     "5 % of fixes off by 3 m": Case(fixes=replace(FIXES, outlier_share=0.05)),
     "fixes off by 0.5 m from 25 s on": Case(moved=(25.0, 0.5)),
     "IMU off by 0.02 g forwards": Case(imu=replace(IMU, forward_bias=0.2)),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from climber_uk.driver_check import listening, moving, reacting, timing
+from climber_uk.driver_check import listening, moving, reacting, sensing, timing
 from climber_uk.driver_check.evidence import Evidence
 from climber_uk.driver_check.report import Finding, Report, Verdict, skipped
 
@@ -36,6 +36,10 @@ CHECKS: Mapping[str, Check] = {
     "heading": Check(moving.heading, GOOD),
     "twist": Check(moving.twist, (*GOOD, "heading")),
     "slip": Check(moving.slip, (*GOOD, "heading", "twist")),
+    "imu": Check(sensing.imu),
+    "gravity": Check(sensing.gravity, (*GOOD, "imu")),
+    "gyro": Check(sensing.gyro, (*GOOD, "heading", "imu", "gravity")),
+    "fixes": Check(sensing.fixes, GOOD),
     "trial": Check(reacting.trial, (*SAFE, "heading", "twist")),
     "wheels": Check(reacting.wheels, MOVED),
     "motors": Check(reacting.motors, (*MOVED, "wheels")),

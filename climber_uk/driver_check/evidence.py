@@ -132,6 +132,28 @@ class WheelRates(NamedTuple):
     left: float
 
 
+class SensorStamps(NamedTuple):
+    """Messages of a sensor: n of them."""
+
+    stamp: Times  # (n,)
+    came: Times  # (n,) by the node's clock
+    frames: Sequence[str]
+    # (n, 6) of an IMU: rates [rad/s] and forces [m/s²] about and along x, y, z;
+    # (n, 5) of fixes: x, y [m], and the variances of x, y, yaw
+    values: Array
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[int, int, str, Sequence[float]]], size: int) -> "SensorStamps":
+        """Of rows of stamp, arrival, frame and `size` values."""
+        stamp, came = ([row[i] for row in rows] for i in (0, 1))
+        values = np.array([row[3] for row in rows], float).reshape(-1, size)
+        frames = [row[2] for row in rows]
+        return cls(np.array(stamp, np.int64), np.array(came, np.int64), frames, values)
+
+
+NO_IMU, NO_FIXES = SensorStamps.of([], 6), SensorStamps.of([], 5)
+
+
 class PulseTimes(NamedTuple):
     """Begin and end [ns] of a pulse of torques, or of speeds."""
 
@@ -164,6 +186,8 @@ class Evidence:
     arrivals: Sequence[Arrival]
     turning: Sequence[WheelRates] = ()  # as joint_states tell
     trial: TrialRecord | None = None
+    imu: SensorStamps = NO_IMU
+    fixes: SensorStamps = NO_FIXES
 
     @cached_property
     def stamps(self) -> Times:

@@ -6,18 +6,21 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 
 from climber_uk.driver_check.evidence import (
     NOTHING,
+    PLANAR,
     Arrival,
     Evidence,
     ExpectedDriver,
+    SensorStamps,
     WheelCommand,
     WheelRates,
 )
@@ -26,7 +29,7 @@ from climber_uk.driver_check.trial import Bounds, Trial
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages import reading, writing
-from climber_uk.messages.topics import CLOCK, JOINTS, ODOMETRY, TORQUES
+from climber_uk.messages.topics import CLOCK, IMU, JOINTS, ODOMETRY, POSE, TORQUES
 from climber_uk.ros.running import ClimberNode
 
 MANY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -52,6 +55,31 @@ class DriverNode(ClimberNode):
         self.subscription(JointState, JOINTS, self.on_joints, MANY)
         self.odometry = self.subscription(Odometry, ODOMETRY, self.on_odometry, MANY)
         self.subscription(Clock, CLOCK, self.on_clock, MANY)
+        self.imu: list[tuple[int, int, str, list[float]]] = []
+        self.fixes: list[tuple[int, int, str, list[float]]] = []
+        self.subscription(Imu, IMU, self.on_imu, MANY)
+        self.subscription(PoseWithCovarianceStamped, POSE, self.on_fix, MANY)
+
+    def on_imu(self, message: Imu) -> None:
+        """Keep a sample; nobody has to publish any."""
+        rates, forces = message.angular_velocity, message.linear_acceleration
+        values = [rates.x, rates.y, rates.z, forces.x, forces.y, forces.z]
+        self.imu.append((*self.times(message), values))
+
+    def on_fix(self, message: PoseWithCovarianceStamped) -> None:
+        """Keep a fix; nobody has to publish any."""
+        place, covariance = message.pose.pose.position, message.pose.covariance
+        values = [place.x, place.y, *(float(covariance[i]) for i in PLANAR)]
+        self.fixes.append((*self.times(message), values))
+
+    def times(self, message: Imu | PoseWithCovarianceStamped) -> tuple[int, int, str]:
+        """Stamp [ns], arrival by this node's clock, and frame of a message."""
+        header = message.header
+        return (
+            reading.nanoseconds(header.stamp),
+            self.get_clock().now().nanoseconds,
+            header.frame_id,
+        )
 
     def on_clock(self, message: Clock, info: dict[str, int]) -> None:
         """Keep a simulated time, and when it was received."""
@@ -197,6 +225,8 @@ class DriverNode(ClimberNode):
             arrivals=self.clocked_arrivals(),
             turning=self.turning,
             trial=self.trial.record() if self.trial else None,
+            imu=SensorStamps.of(self.imu, 6),
+            fixes=SensorStamps.of(self.fixes, 5),
         )
 
     @property

@@ -39,3 +39,11 @@ SERVO_OFF, SERVO_NEAR = 2.0, 0.01
 TRACK_OFF = 1.5  # times the half track: four wheels as long as wide scrub about as much
 STILL_PUSHED = 0.5  # of the acceleration that a torque gave while it was commanded
 LONGEST_DELAY = 0.2  # [s] that is looked for
+
+# IMU and fixes
+NO_GRAVITY = 5.0  # [m/s²]: less is motion, or g
+TILTED = 5.0, 15.0  # [°]: biases of cheap accelerometers and a rough heading; another axis
+TURNED_ENOUGH = 0.05  # [rad] by which the scale of a gyro shows
+FIXED_WAY = 0.1  # [m] by which the axes of fixes show; more where they are rough
+MIRRORED = 0.5  # of the misfit that is left if the way is mirrored
+SENSOR_LATE, SENSOR_AHEAD = 1.0, 0.1  # [s]: `longest_delay`; two clocks that are set

@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from climber_uk.localization.kalman import IDENTITY, Estimate, corrected, distance
+from climber_uk.localization.kalman import Estimate, corrected, distance
+from climber_uk.localization.models import HEADING, fixed, fixed_jacobian
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.elementary import wrapped
 
 
 class Fix(NamedTuple):
@@ -23,6 +25,7 @@ class Fix(NamedTuple):
     parts: tuple[int, ...]  # which: of (x, y, θ)
     values: Array  # (n,) [m], [rad]
     noise: Array  # (n, n) covariance
+    lever: tuple[float, float] = (0.0, 0.0)  # [m] of what is measured: forwards, left of the centre
 
     def moved(self, x: float, y: float, yaw: float) -> "Fix":
         """The same where the frame of its values has its origin at (x, y) [m], turned by a yaw.
@@ -38,6 +41,16 @@ class Fix(NamedTuple):
             turn[np.ix_(both, both)] = [[cosine, -sine], [sine, cosine]]
         values, noise = turn @ self.values + offset, turn @ self.noise @ turn.T
         return self._replace(values=values, noise=noise)
+
+    def innovation(self, estimate: Estimate) -> Array:
+        """What it is off an estimate (n,) [m], [rad]."""
+        parts = list(self.parts)
+        off = self.values - fixed(estimate.mean, self.lever)[parts]
+        return np.where(np.array(parts) == HEADING, wrapped(off), off)
+
+    def jacobian(self, estimate: Estimate) -> Array:
+        """Derivative (n, 8) of what it measures by the state."""
+        return fixed_jacobian(estimate.mean, self.lever)[list(self.parts)]
 
 
 class Verdict(NamedTuple):
@@ -56,9 +69,10 @@ class Gate:
         self.refused: deque[tuple[Fix, Array]] = deque(maxlen=options.agreeing_fixes)
         self.ratio = 0.0  # χ² of the last innovation by its limit
 
-    def judge(self, estimate: Estimate, fix: Fix, innovation: Array) -> Verdict:
-        """Verdict on a fix with an innovation (n,), of the estimate at its stamp."""
-        jacobian, limit = IDENTITY[list(fix.parts)], self.limits[len(fix.parts) - 1]
+    def judge(self, estimate: Estimate, fix: Fix) -> Verdict:
+        """Verdict on a fix, of the estimate at its stamp."""
+        innovation, jacobian = fix.innovation(estimate), fix.jacobian(estimate)
+        limit = self.limits[len(fix.parts) - 1]
         self.ratio = distance(estimate, innovation, jacobian, fix.noise) / limit
         if self.ratio <= 1:
             self.refused.clear()
@@ -83,19 +97,25 @@ class Gate:
         )
 
 
-def corrected_by(estimate: Estimate, fix: Fix, innovation: Array) -> Estimate:
-    """Estimate after a fix with an innovation (n,)."""
-    return corrected(estimate, innovation, IDENTITY[list(fix.parts)], fix.noise)
+def corrected_by(estimate: Estimate, fix: Fix) -> Estimate:
+    """Estimate after a fix."""
+    return corrected(estimate, fix.innovation(estimate), fix.jacobian(estimate), fix.noise)
 
 
-def told_anew(estimate: Estimate, fix: Fix, innovation: Array) -> Estimate:
+def told_anew(estimate: Estimate, fix: Fix) -> Estimate:
     """Estimate that believes a fix only, of the parts that it measures."""
     parts = list(fix.parts)
     mean, covariance = estimate.mean.copy(), estimate.covariance.copy()
-    mean[parts] += innovation
+    told = estimate.mean[: HEADING + 1].copy()
+    told[parts] = fix.values
+    centre = 2 * told - fixed(told, fix.lever)  # less the lever, at the heading of then
+    centre[HEADING] = mean[HEADING] + wrapped(told[HEADING] - mean[HEADING])
+    mean[parts] = centre[parts]
+    by_heading = fix.jacobian(estimate)[:, HEADING] * (HEADING not in parts)
+    noise = fix.noise + np.outer(by_heading, by_heading) * covariance[HEADING, HEADING]
     covariance[parts, :] = 0.0
     covariance[:, parts] = 0.0
-    covariance[np.ix_(parts, parts)] = fix.noise
+    covariance[np.ix_(parts, parts)] = noise
     return Estimate(mean, covariance)
 
 

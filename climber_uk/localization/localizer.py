@@ -192,27 +192,16 @@ class Localizer:
             why = f"longest_delay={longest:g}" if age > longest else "the first of the encoders"
             self._refuse(f"{age:.3g} s old, older than {why}")
             return
-        entry, parts = self.history.entries[number], list(fix.parts)
-        values = fix.values - (entry.pose(fix.stamp) - entry.estimate.mean[:3])[parts]
-
-        def innovation(estimate: Estimate) -> Array:
-            off = values - estimate.mean[parts]
-            return np.array(
-                [
-                    wrapped(float(part)) if which == HEADING else part
-                    for which, part in zip(parts, off, strict=True)
-                ]
-            )
-
-        verdict = self.gate.judge(entry.estimate, fix, innovation(entry.estimate))
+        entry = self.history.entries[number]
+        since = entry.pose(fix.stamp) - entry.estimate.mean[:3]
+        fix = fix._replace(values=fix.values - since[list(fix.parts)])
+        verdict = self.gate.judge(entry.estimate, fix)
         if not verdict.taken:
             self._refuse(verdict.said)
             return
         after = told_anew if verdict.believed else corrected_by
         before = self.estimate.mean[:3]
-        self.history.correct(
-            number, lambda estimate: after(estimate, fix, innovation(estimate)), verdict.believed
-        )
+        self.history.correct(number, lambda estimate: after(estimate, fix), verdict.believed)
         self._smooth(before)
         self.fixed, self.last_was_taken = fix.stamp, True
         self.doubts.on_fix(fix.stamp)

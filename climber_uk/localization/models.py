@@ -113,6 +113,23 @@ def gravity_jacobian(state: Array, late: Late, along_wall: float) -> Array:
     return jacobian
 
 
+def fixed(state: Array, lever: tuple[float, float]) -> Array:
+    """Pose (3,) of a place of the climber, `lever` [m] forwards and to the left of its centre."""
+    forwards, left = lever
+    x, y, heading = state[: HEADING + 1].tolist()
+    cosine, sine = math.cos(heading), math.sin(heading)
+    return np.array(
+        [x + cosine * forwards - sine * left, y + sine * forwards + cosine * left, heading]
+    )
+
+
+def fixed_jacobian(state: Array, lever: tuple[float, float]) -> Array:
+    """Derivative (3, 8) of `fixed` by the state."""
+    jacobian, away = np.eye(HEADING + 1, SIZE), fixed(state, lever) - state[: HEADING + 1]
+    jacobian[X, HEADING], jacobian[Y, HEADING] = -away[Y], away[X]
+    return jacobian
+
+
 def heading_by_force_biases(heading: float, along_wall: float) -> Array:
     """Derivative (2,) of the heading that gravity tells by the accelerometer's biases, negative."""
     return np.array([-math.cos(heading), math.sin(heading)]) / along_wall

@@ -20,6 +20,12 @@ class SensorFrames:
     pose_frame_yaw: float = parameter(
         0.0, "rad", "from the x of odom_frame to its own, anticlockwise; both have z off the wall"
     )
+    pose_x: float = parameter(
+        0.0, "m", "where what it measures (a tag, a prism) is in base_frame: forwards of the centre"
+    )
+    pose_y: float = parameter(
+        0.0, "m", "where what it measures is in base_frame: to the left of the centre"
+    )
     map_frame: str = parameter(
         "map", "", "frame in which the estimate is right at once; see docs/localization.md"
     )
@@ -31,4 +37,5 @@ class SensorFrames:
 
     def fix(self, fix: Fix) -> Fix:
         """A fix in the wall's frame; raises as `Fix.moved` does."""
-        return fix.moved(self.pose_frame_x, self.pose_frame_y, self.pose_frame_yaw)
+        moved = fix.moved(self.pose_frame_x, self.pose_frame_y, self.pose_frame_yaw)
+        return moved._replace(lever=(self.pose_x, self.pose_y))

@@ -64,6 +64,8 @@ class FixErrors:
     )
     outlier_share: float = parameter(0.0, "", "share that is off", at_least=0, at_most=1)
     outlier_size: float = parameter(3.0, "m", "standard deviation of those", at_least=0)
+    x: float = parameter(0.0, "m", "where what they measure is: forwards of the centre")
+    y: float = parameter(0.0, "m", "where what they measure is: to the left of the centre")
     seed: int = parameter(0, "", "of the noise", at_least=0)
 
 
@@ -179,7 +181,10 @@ class Fixes:
         errors, noise = self.errors, self._random.normal(size=5)
         is_off = self._random.random() < errors.outlier_share
         off = errors.position_noise * noise[:2] + is_off * errors.outlier_size * noise[3:]
-        return np.array([*(pose[:2] + off), float(pose[2]) + errors.heading_noise * noise[2]])
+        heading = float(pose[2])
+        cosine, sine = math.cos(heading), math.sin(heading)
+        lever = np.array([cosine * errors.x - sine * errors.y, sine * errors.x + cosine * errors.y])
+        return np.array([*(pose[:2] + lever + off), heading + errors.heading_noise * noise[2]])
 
 
 class Measured(NamedTuple):

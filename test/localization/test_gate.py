@@ -10,6 +10,7 @@ from climber_uk.localization.gate import Fix, Gate, chi_square, quantile, told_a
 from climber_uk.localization.kalman import Estimate
 from climber_uk.localization.options import LocalizationOptions
 
+BOOLS = st.booleans()
 OPTIONS = LocalizationOptions()
 ESTIMATE = Estimate.start(OPTIONS)
 NOISE = 0.025**2 * np.eye(2)
@@ -20,7 +21,7 @@ def fix(x=0.0, y=0.0):
 
 
 def judged(gate, x, y=0.0):
-    return gate.judge(ESTIMATE, fix(x, y), np.array([x, y]))
+    return gate.judge(ESTIMATE, fix(x, y))
 
 
 @given(probability=st.floats(0.01, 0.999999), parts=st.sampled_from([1, 2, 3]))
@@ -63,7 +64,7 @@ def test_a_good_fix_between_makes_the_count_begin_anew():
 
 
 def test_an_estimate_that_is_told_anew_has_the_fix_and_its_noise():
-    after = told_anew(ESTIMATE, fix(1.0, 2.0), np.array([1.0, 2.0]))
+    after = told_anew(ESTIMATE, fix(1.0, 2.0))
     np.testing.assert_allclose(after.mean[:2] - ESTIMATE.mean[:2], [1.0, 2.0])
     np.testing.assert_allclose(after.covariance[:2, :2], NOISE)
     np.testing.assert_allclose(after.covariance[2:, 2:], ESTIMATE.covariance[2:, 2:])
@@ -78,3 +79,26 @@ def test_a_fix_in_another_frame_is_turned_and_moved_with_its_noise():
     assert only_y.moved(10.0, 20.0, 0.0).values.tolist() == [21.0]
     with pytest.raises(ValueError, match="x and y have to be measured both"):
         only_y.moved(10.0, 20.0, 0.1)
+
+
+@given(heading=st.floats(-3, 3), lever=st.tuples(*[st.floats(-0.5, 0.5)] * 2), has_heading=BOOLS)
+def test_what_a_tag_away_from_the_centre_tells_is_the_centre(heading, lever, has_heading):
+    """Believed for what it is, or against the estimate, by 3 m and by half a turn."""
+    parts = (0, 1, 2) if has_heading else (0, 1)
+    true = np.array([3.0, -1.0, heading])
+    turn = np.exp(1j * heading) * complex(*lever)
+    told = Fix(
+        0,
+        parts,
+        np.array([true[0] + turn.real, true[1] + turn.imag, heading])[list(parts)],
+        np.eye(len(parts)),
+        lever,
+    )
+    mean = np.array([*true, *np.zeros(5)])
+    np.testing.assert_allclose(told.innovation(Estimate(mean, ESTIMATE.covariance)), 0, atol=1e-12)
+    mean[:2] -= 3.0
+    mean[2] += 2.0 * has_heading
+    after = told_anew(Estimate(mean, ESTIMATE.covariance), told)
+    np.testing.assert_allclose(after.mean[:2], true[:2], atol=1e-12)
+    assert np.exp(1j * after.mean[2]) == pytest.approx(np.exp(1j * heading))
+    assert np.linalg.eigvalsh(after.covariance).min() >= 0

@@ -20,7 +20,7 @@ def started():
 
 
 def sample(random):
-    weight = Weight(*random.normal(5, 1, 2), 0.01, 0.02) if random.random() < 0.5 else None
+    weight = Weight(*random.normal(5, 1, 2), 0.01, 0.02, 0.16) if random.random() < 0.5 else None
     return Sample(Travel(0.005, 0.001, 0.001, random.normal(), True), weight, random.random() < 0.2)
 
 

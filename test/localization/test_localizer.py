@@ -55,13 +55,15 @@ class Told:
             self.stamp += round(PERIOD * SECOND)
         return self
 
-    def fix(self, off=(0.0, 0.0), age=0.0, deviation=0.02):
+    def fix(self, off=(0.0, 0.0), age=0.0, deviation=0.02, lever=(0.0, 0.0)):
         """A fix of the position some time ago."""
         direction = np.array([math.cos(self.heading), math.sin(self.heading)])
         then = self.position - self.speed * (age + PERIOD) * direction
-        values = then + np.array(off) + self.random.normal(0, deviation, 2)
+        turned = np.exp(1j * self.heading) * complex(*lever)
+        off = np.array([off[0] + turned.real, off[1] + turned.imag])
+        values = then + off + self.random.normal(0, deviation, 2)
         stamp = self.stamp - round((age + PERIOD) * SECOND)
-        self.localizer.on_fix(Fix(stamp, (0, 1), values, deviation**2 * np.eye(2)))
+        self.localizer.on_fix(Fix(stamp, (0, 1), values, deviation**2 * np.eye(2), lever))
 
     @property
     def off(self):
@@ -129,6 +131,18 @@ def test_creep_is_learnt_from_fixes_and_carries_through_a_time_without():
     off = told.localizer.estimate.mean[1] - told.position[1]
     assert abs(off) < 0.03  # of the 0.16 m that it sags
     assert abs(off) < 4 * told.localizer.estimate.deviation(1)
+
+
+def test_a_tag_away_from_the_centre_tells_where_the_centre_is_and_on_a_floor_the_heading():
+    """A floor's gravity tells no heading; a tag that turns about the centre does."""
+    told = Told(speed=0.2, inclination=0.0, initial_heading_deviation=0.1)
+    told.heading = 0.1
+    for _ in range(150):
+        told.go_on(0.1)
+        told.fix(age=0.1, lever=(0.4, -0.2))
+    assert told.off == pytest.approx(0, abs=0.03)
+    motion = told.located[-1].motion
+    assert np.hypot(*(told.position - (motion.x, motion.y))) < 0.03
 
 
 def test_fixes_that_are_off_leave_no_step_and_are_told_apart():

@@ -60,6 +60,13 @@ def test_the_jacobian_of_gravity_is_its_derivative(state, late, along_wall):
     np.testing.assert_allclose(found, expected, atol=1e-7)
 
 
+@given(state=STATES, lever=st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
+def test_the_jacobian_of_a_fix_is_its_derivative(state, lever):
+    found = models.fixed_jacobian(state, lever)
+    expected = difference(lambda state: models.fixed(state, lever), state)
+    np.testing.assert_allclose(found, expected, atol=1e-7)
+
+
 def test_a_climber_that_rolls_up_a_vertical_wall_sags_by_its_creep():
     state = np.array([1.0, 2.0, math.pi / 2, 0.0, 0.1, 0.03, 0, 0])
     after = models.advanced(state, Travel(0.1, 0.2, 0.2, 0.0, True), pull=1.0)

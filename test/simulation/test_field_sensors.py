@@ -108,6 +108,13 @@ def test_fixes_come_at_their_rate_with_the_stamp_at_which_they_were_measured():
     assert [fix.pose[0] for fix in arrived.values()] == pytest.approx([0, 20, 40, 60, 80], abs=1e-6)
 
 
+def test_a_tag_away_from_the_centre_turns_with_the_climber():
+    (fix,) = Fixes(FixErrors(period=0.1, position_noise=1e-9, x=0.3, y=0.1)).measure(
+        SECOND, State(np.array([2.0, 1.0, math.pi / 2]), np.zeros(3))
+    )
+    np.testing.assert_allclose(fix.pose, (1.9, 1.3, math.pi / 2), atol=1e-6)
+
+
 def test_some_fixes_are_off_by_metres_and_the_same_seed_gives_the_same():
     errors = FixErrors(0.1, 0.0, 0.02, outlier_share=0.1, outlier_size=5.0, seed=3)
 
