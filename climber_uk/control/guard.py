@@ -295,8 +295,8 @@ class Guard:
         turn /= climber.half_track
         acted = (drive + yaw_force) / 2, (drive - yaw_force) / 2
         known = (push + turn) / 2, (push - turn) / 2
-        for wheel, torque, *forces in zip(self._wheels, torques, acted, known, strict=True):
-            wheel.add(torque / climber.wheel_radius, *forces, new)
+        for wheel, torque, force, of_it in zip(self._wheels, torques, acted, known, strict=True):
+            wheel.add(torque / climber.wheel_radius, force, of_it, new)
 
     def _watch_wheels(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
         right, left = self._wheels
