@@ -6,6 +6,7 @@ They run on this computer, in a ROS domain of their own unless ROS_DOMAIN_ID is 
 import argparse
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -42,8 +43,9 @@ from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
-# One topic of each node that is published before the trajectory starts. The first two are latched:
-# the recorder subscribes them last, so what comes after their message is not lost.
+# One topic of each node that is published before the trajectory starts; not the second by a
+# controller of somebody else. The first two are latched: the recorder subscribes them last, so what
+# comes after their message is not lost.
 RECORDED = REFERENCE_PATH, PARAMETERS, JOINTS
 COUNT = re.compile(r"^ +name: (\S+)$.*?^ +message_count: (\d+)$", re.MULTILINE | re.DOTALL)
 FELL = "fell off"
@@ -72,10 +74,15 @@ class Demo(ClimberNode):
     """Starts the trajectories once all nodes are connected, and waits for their duration."""
 
     def __init__(
-        self, climbers: Sequence[str], signals: Sequence[int], arguments: Sequence[str]
+        self,
+        climbers: Sequence[str],
+        signals: Sequence[int],
+        arguments: Sequence[str],
+        has_our_controller: bool = True,
     ) -> None:
         super().__init__("run_demo", arguments=arguments)
         self.climbers, self.signals = climbers, signals
+        self.topics = [topic for topic in RECORDED if has_our_controller or topic != PARAMETERS]
         self.processes: Processes = {}  # that have to go on
         self.has_begun = False
         self.parameters.declare(DemoOptions)
@@ -102,7 +109,7 @@ class Demo(ClimberNode):
 
     def records_all(self, bag: Path) -> bool:
         """Whether messages of every node are recorded, and the services to start are there."""
-        wanted = {f"{climber}/{topic}" for climber in self.climbers for topic in RECORDED}
+        wanted = {f"{climber}/{topic}" for climber in self.climbers for topic in self.topics}
         ready = all(starter.service_is_ready() for starter in self.starters)
         return ready and wanted <= recorded_topics(bag)
 
@@ -208,9 +215,12 @@ def executable(name: str, *arguments: str) -> list[str]:
     return [str(Path(sys.argv[0]).parent / name), *arguments]
 
 
-def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dict[str, list[str]]:
+def node_commands(
+    climbers: Sequence[str], config: Path, simulated: bool, controller: Sequence[str]
+) -> dict[str, list[str]]:
     """Commands of the nodes, by names of their logs; climbers share one plant, and its time.
 
+    `controller` is the command of one that takes our controller's place, if it is not empty.
     `wall_odometry` is one of them where the configuration has parameters for it.
     """
 
@@ -230,7 +240,8 @@ def node_commands(climbers: Sequence[str], config: Path, simulated: bool) -> dic
         )
         localizes = given(read_sections(config), f"{climber}/{LOCALIZATION}")
         for node in (CONTROLLER, LOCALIZATION) if localizes else (CONTROLLER,):
-            commands[prefix + node] = executable(node, *ros(use_sim_time, namespace=climber))
+            program = controller if controller and node == CONTROLLER else executable(node)
+            commands[prefix + node] = [*program, *ros(use_sim_time, namespace=climber)]
     commands[PLANT] = executable(
         PLANT,
         *(["--climbers", *climbers] if any(climbers) else []),
@@ -247,6 +258,12 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--duration", type=float, help="[s] (default: that of the config)")
     parser.add_argument(
         "--climbers", type=int, help="how many, in namespaces climber_1, ... (default: one in none)"
+    )
+    parser.add_argument(
+        "--controller",
+        type=shlex.split,
+        default=[],
+        help="command of a controller of yours, in the place of uk_torque_controller",
     )
     parser.add_argument("--clock", choices=("sim", "wall"), default="sim", help="lock-step or not")
     parser.add_argument(
@@ -288,14 +305,14 @@ def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequen
     bag, simulated = options.output / "bag", options.clock == "sim"
     commands = {
         "record_bag": executable("record_bag", "--output", str(bag)),
-        **node_commands(climbers, options.config, simulated),
+        **node_commands(climbers, options.config, simulated, options.controller),
     }
     duration = ["-p", f"duration:={options.duration}"] if options.duration else []
     arguments = ["--ros-args", "--params-file", str(options.config), *duration]
     demo, said = None, ""
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-        demo = Demo(climbers, signals, arguments)
+        demo = Demo(climbers, signals, arguments, not options.controller)
         with running(commands, options.output, signals) as demo.processes:
             print(f"{options.config} in ROS domain {os.environ['ROS_DOMAIN_ID']}")
             demo.start(simulated, bag)

@@ -1,5 +1,8 @@
 """The package of docs/extending.md, installed and run through the real nodes, in lock-step."""
 
+import shlex
+import sys
+
 import numpy as np
 import pytest
 import yaml
@@ -72,6 +75,18 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
     seen, true = places("/climber_1/odom"), places("/climber_1/ground_truth")
     assert np.abs(seen - 1e-3 * np.round(seen / 1e-3)).max() < 1e-12  # whole pixels
     assert np.abs(true - 1e-3 * np.round(true / 1e-3)).max() > 1e-4
+
+
+def test_a_controller_of_somebody_else_s_takes_ours_place(world, tmp_path):
+    own = shlex.join([sys.executable, str(CONFIG.parent / "examples" / "own_controller.py")])
+    options = ["--config", CONFIG / "climber.yaml", "--output", tmp_path / "run"]
+    words = [*options, "--duration", "2", "--controller", own]
+    demo = world.run("run_demo", executable("run_demo"), *words)
+    assert demo.wait(TIMEOUT) == 0, world.log("run_demo")
+    run = read_run(tmp_path / "run" / "bag")
+    assert run.travelled > 0.02
+    assert run.distance.max() < 0.01
+    assert not run.parameters  # it is not ours
 
 
 def test_a_name_that_two_parts_have_is_refused_in_one_line(world, tmp_path):
