@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from scipy.stats import spearmanr
 
 from climber_uk.campaign.counting import histograms, quantiles, rank_correlations
 
@@ -71,6 +70,8 @@ def correlated(number):
 
 
 def spearman(of_all, rows, columns):
+    from scipy.stats import spearmanr  # slow to import, and each test process imports this file
+
     return [[spearmanr(of_all[r], of_all[c]).statistic for c in columns] for r in rows]
 
 

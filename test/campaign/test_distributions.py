@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import truncnorm
+from scipy.special import ndtr
 
 from climber_uk.campaign.distributions import (
     EXTREMES,
@@ -14,13 +14,17 @@ from climber_uk.campaign.distributions import (
 )
 
 N = 200_000
-CUT = truncnorm(-1.0, 0.5, loc=2.0, scale=0.4)
+# of a normal distribution between two bounds, in its standard deviations: density and its share
+BOUNDS = np.array([-1.0, 0.5])
+DENSITY = np.exp(-(BOUNDS**2) / 2) / math.sqrt(2 * math.pi) / np.ptp(ndtr(BOUNDS))
+SHIFT = -np.diff(DENSITY)[0]
+CUT = 2.0 + 0.4 * SHIFT, 0.4 * math.sqrt(1 - np.diff(BOUNDS * DENSITY)[0] - SHIFT**2)
 # the second moment of exp(x), x normal, is exp(2 μ + 2 σ²)
 SPREAD = 0.7 * math.sqrt(math.exp(0.5**2) * (math.exp(0.5**2) - 1))
 MOMENTS = {
     "uniform": ([1.0, 4.0], 2.5, 3 / math.sqrt(12)),
     "normal": ([2.0, 0.4], 2.0, 0.4),
-    "normal, cut": ([2.0, 0.4, 1.6, 2.2], CUT.mean(), CUT.std()),
+    "normal, cut": ([2.0, 0.4, 1.6, 2.2], *CUT),
     "lognormal": ([0.7, 0.5], 0.7 * math.exp(0.5**2 / 2), SPREAD),
     "choice": ([1.0, 2.0, 6.0], 3.0, math.sqrt(14 / 3)),
     "choice, weighed": ({0.0: 3.0, 4.0: 1.0}, 1.0, math.sqrt(3)),

@@ -192,7 +192,9 @@ def test_guidance_comes_back_from_far_off_without_spinning(seed):
     assert np.abs(run.torques).max() <= 4.0
 
 
-@pytest.mark.parametrize("time", [6.0, 14.0, 34.0, 42.0])
+@pytest.mark.parametrize(
+    "time", [6.0, *(pytest.param(time, marks=pytest.mark.soak) for time in (14.0, 34.0)), 42.0]
+)
 def test_a_slow_climber_comes_to_a_new_path_from_anywhere_on_the_old_one(time):
     """Behind, ahead, beside, turned the other way: it once drove off backwards for ever."""
     eight = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))

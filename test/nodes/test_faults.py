@@ -34,9 +34,9 @@ WALL_CLOCK = {  # patient, and not often: what is slow here is the machine
     ],
     PLANNER: ["rest_to_rest.ramp_time:=1.0"],
 }
-LOCK_STEP = {
-    PLANT: ["simulated_time:=true", "lockstep_timeout:=2.0"],
-    CONTROLLER: ["use_sim_time:=true", *QUICK_APPROACH],
+LOCK_STEP = {  # at half the rate, for half the time
+    PLANT: ["simulated_time:=true", "lockstep_timeout:=2.0", "control_period:=0.01"],
+    CONTROLLER: ["use_sim_time:=true", "control_period:=0.01", *QUICK_APPROACH],
     PLANNER: ["use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"],
 }
 

@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
-from test_faults import LIMIT, PLANNER
+from test_faults import LIMIT, LOCK_STEP, PLANNER, PLANT
 from test_waiting import Waiting
 from world import executable
 
@@ -19,10 +19,15 @@ pytestmark = pytest.mark.nodes
 
 
 class Operated(Waiting):
-    """A climb with an operator."""
+    """A climb with an operator, in a time twice as fast as theirs: else it would end meanwhile."""
 
-    def __init__(self, world, changed=None):
-        super().__init__(world, changed)
+    def __init__(self, world, changed):
+        slow = {
+            name: [word.replace("period:=0.01", "period:=0.02") for word in words]
+            for name, words in LOCK_STEP.items()
+        }
+        slow[PLANT].append("real_time_factor:=2.0")
+        super().__init__(world, changed, slow)
         self.progress = world.listen(DiagnosticArray, f"{PLANNER}/progress")
 
     def pause(self, paused):
@@ -57,8 +62,8 @@ class Operated(Waiting):
         """Wait until its speed [m/s] is between these for 0.5 s."""
 
         def is_so():
-            last = [m.twist.twist.linear.x for m in self.odometry[-100:]]
-            return len(last) == 100 and low <= min(last) <= max(last) <= high
+            last = [m.twist.twist.linear.x for m in self.odometry[-25:]]
+            return len(last) == 25 and low <= min(last) <= max(last) <= high
 
         self.world.wait(is_so, f"a speed of {low} to {high} m/s")
 
@@ -78,7 +83,7 @@ def path(places, frame="odom"):
 
 def test_a_path_from_outside_is_taken_up_in_mid_course_or_refused_in_words(world):
     line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
-    climb = Operated(world, {PLANNER: line, "plant_simulator": ["initial_heading:=0.0"]})
+    climb = Operated(world, {PLANNER: line, PLANT: ["initial_heading:=0.0"]})
     climb.drives(0.28, 0.31)
     given = world.speak(Path, "path")
     given.publish(path([(0.0, 0.0), (1.0, 1.0)], "map"))
@@ -103,14 +108,14 @@ def test_a_path_from_outside_is_taken_up_in_mid_course_or_refused_in_words(world
 
 
 def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(world):
-    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    line = ["shape:=line", "line.length:=2.0", "rest_to_rest.rate:=0.3"]
     start = ["initial_heading:=0.0"]
-    climb = Operated(world, {PLANNER: line, "plant_simulator": start})
+    climb = Operated(world, {PLANNER: line, PLANT: start})
     climb.drives(0.28, 0.31)
     assert climb.pause(True).success
     paused = climb.is_told_to_be("paused")
     climb.drives(-1e-3, 1e-3)
-    assert paused["done"] + paused["left"] == pytest.approx(4.0, abs=1e-6)
+    assert paused["done"] + paused["left"] == pytest.approx(2.0, abs=1e-6)
     x = climb.odometry[-1].pose.pose.position.x
     assert paused["done"] == pytest.approx(x, abs=0.01)
     assert climb.is_told_to_be("paused")["done"] == pytest.approx(paused["done"], abs=1e-6)
@@ -143,7 +148,7 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.ask("start").message == "comes to rest, then starts"
     climb.is_told_to_be("approaching")
     climb.is_told_to_be("done")
-    assert climb.odometry[-1].pose.pose.position.x == pytest.approx(4.0, abs=0.01)
+    assert climb.odometry[-1].pose.pose.position.x == pytest.approx(2.0, abs=0.01)
     assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
     assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01
 
@@ -171,7 +176,7 @@ def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
     by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2"]
     heading = ["initial_heading:=0.0"]
-    climb = Operated(world, {PLANNER: [*line, *by_hand], "plant_simulator": heading})
+    climb = Operated(world, {PLANNER: [*line, *by_hand], PLANT: heading})
     climb.drives(0.28, 0.31)
     stick = world.speak(TwistStamped, "cmd_vel")
     asked = TwistStamped()
@@ -179,7 +184,7 @@ def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
 
     def drives_by_hand():
         stick.publish(asked)
-        last = [m.twist.twist for m in climb.odometry[-60:]]
+        last = [m.twist.twist for m in climb.odometry[-15:]]
         return all(
             abs(twist.linear.x - 0.2) < 0.01 and abs(twist.angular.z - 0.3) < 0.02 for twist in last
         )

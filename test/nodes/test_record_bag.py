@@ -453,7 +453,15 @@ def test_what_the_middleware_lost_is_told_and_counted_in_the_metadata(graph):
 
     text = (recorder.bag / "metadata.yaml").read_text()
     told = yaml.safe_load(text)["rosbag2_bagfile_information"]["custom_data"]
-    assert list(told) == ["messages lost on /numbers"]
+    # a busy machine may have filled its queue as well
+    assert (
+        {"messages lost on /numbers"}
+        <= set(told)
+        <= {
+            "messages lost on /numbers",
+            "queue full on /numbers",
+        }
+    )
     read = recorder.numbers()
     missing = read[-1] - read[0] + 1 - len(read)
     assert missing > 1000
