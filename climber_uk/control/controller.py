@@ -102,7 +102,7 @@ class Controller:
         self._now = 0  # [ns] of the last look at the clock
         self._unsettled = 0  # odometry messages until a jump is forgiven
         self._twist = TwistCheck()
-        self._moved_without_twist = 0.0  # [m]
+        self._without_twist = ""  # field of the twist that is zero while the pose goes
         self._waiting_since: int | None = None  # [ns] stamp of the first one not answered
         self._calm, self._safe_output = Calm(), SafeOutput(self.safety)
 
@@ -135,7 +135,7 @@ class Controller:
     def enable(self, enabled: bool) -> None:
         """Follow the reference, or give the safe output; what was wrong before is forgiven."""
         self._enabled = enabled
-        self._moved_without_twist = 0.0
+        self._without_twist = ""
         if enabled:
             self.guard.fault = None
             self.stops.enable()
@@ -233,27 +233,24 @@ class Controller:
             self._watch(stamp, observed, self._check_twist(observed))
         if self._unsettled:
             return Mode.JUMPED, ""
-        if self._moved_without_twist > self.safety.max_twist_error:
-            return Mode.NO_TWIST, "set velocity_source to pose"
+        if self._without_twist:
+            return Mode.NO_TWIST, f"{self._without_twist}; set velocity_source to pose"
         return None
 
     def _watch_anew(self) -> None:
         """Watch from now on: the climber is elsewhere."""
         self.guard.restart()
         self._twist.restart()
-        self._moved_without_twist = 0.0
+        self._without_twist = ""
 
     def _check_twist(self, observed: Observed) -> Trouble | None:
-        """Trouble if the twist is not the pose's rate; counts how far it goes without a twist."""
-        before, after = observed.before, observed.after
+        """Trouble if the twist is not the pose's rate; notices one that is zero while that goes."""
+        before, after, largest = observed.before, observed.after, self.safety.max_twist_error
         if self.estimator.observer.velocity_source == "pose":
             return None
-        if after.speed == 0 and after.yaw_rate == 0:
-            self._moved_without_twist += math.hypot(after.x - before.x, after.y - before.y)
-            return None
-        self._moved_without_twist = 0.0
         self._twist.add(before, after, observed.time, self._law.climber.half_track)
-        detail, is_sign = self._twist.trouble(self.safety.max_twist_error)
+        self._without_twist = self._twist.missing(largest)
+        detail, is_sign = self._twist.trouble(largest)
         if not detail:
             return None
         return Mode.SIGN_WRONG if is_sign else Mode.TWIST_WRONG, detail

@@ -14,6 +14,7 @@ from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Adhesion
 from climber_uk.mechanics.climber import GRAVITY, Climber
+from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.parameters.declaration import parameter, parameters
 
@@ -34,7 +35,7 @@ EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a 
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
 PROOF_IF_TOO_FAST = 0.4  # of `EXCITED` and `UNANSWERED` is enough where it is too fast as well
-RIM_REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests
+RIM_REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests, by its twist and its pose
 STALL_REST = 10  # times the rest after which a stalled climber tries again
 
 
@@ -163,6 +164,7 @@ class Guard:
         self.options, self.adhesion = options, adhesion
         self.fault: Trouble | None = None  # that was found, until the climber has rested
         self._rested = 0.0  # [s] since it is at rest
+        self._rests_at: Motion | None = None
         self._followed = math.inf  # [s] since the last fault
         self.faults: deque[int] = deque()  # [ns] stamps
         self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
@@ -295,8 +297,8 @@ class Guard:
         turn /= climber.half_track
         acted = (drive + yaw_force) / 2, (drive - yaw_force) / 2
         known = (push + turn) / 2, (push - turn) / 2
-        for wheel, torque, force, of_it in zip(self._wheels, torques, acted, known, strict=True):
-            wheel.add(torque / climber.wheel_radius, force, of_it, new)
+        for wheel, torque, force, push in zip(self._wheels, torques, acted, known, strict=True):
+            wheel.add(torque / climber.wheel_radius, force, push, new)
 
     def _watch_wheels(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
         right, left = self._wheels
@@ -320,6 +322,7 @@ class Guard:
     def count(self, stamp: int, fault: Trouble) -> None:
         """Remember a fault, at `stamp` [ns]."""
         self.fault, self._rested, self._followed = fault, 0.0, 0.0
+        self._rests_at = None
         self.faults.append(stamp)
         while stamp - self.faults[0] > self.options.memory * SECOND:
             self.faults.popleft()
@@ -327,7 +330,11 @@ class Guard:
     def rest(self, climber: Climber, motion: Motion, time: float) -> None:
         """A climber that had a fault is in `motion` for `time` [s]; if it has rested, trust it."""
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
-        self._rested = self._rested + time if rim < RIM_REST else 0.0
+        at, most = self._rests_at or motion, RIM_REST * self.options.recovery_time
+        gone = math.hypot(motion.x - at.x, motion.y - at.y)
+        gone += climber.half_track * abs(wrapped(motion.heading - at.heading))
+        rests = rim < RIM_REST and gone <= most
+        self._rested, self._rests_at = (self._rested + time, at) if rests else (0.0, motion)
         needed = self.options.recovery_time * (STALL_REST if self._is(Mode.STALLED) else 1)
         if self._rested > needed and not self.is_for_good:
             self.fault = None

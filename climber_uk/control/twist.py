@@ -14,7 +14,9 @@ SHARE = 0.3  # by which they may differ: slip, scale
 # A twist that tells less than a half of the pose's way, as in another unit, is found over this
 # share of the largest error, where both go alike for some messages: else a pose is noisy or jumps
 TOO_LITTLE, TOO_LITTLE_DISTANCE, ALIKE, AT_LEAST = 0.5, 0.05, 0.9, 4
-OPPOSED_DISTANCE = 0.2  # of the largest error: distance of both, to opposite sides
+# One that goes over this share of the largest error, while the other stays exactly as it is
+STILL_DISTANCE, STILL = 0.1, 0.02  # and [m/s] of a rim: less may be noise of what stands
+OPPOSED_DISTANCE = 0.1  # of the largest error: distance of both, to opposite sides
 OPPOSED_IN_A_ROW = 3  # odometry messages
 OPPOSED_IF_TOO_FAST = 0.02  # of the largest error: enough, once, where it is too fast as well
 
@@ -61,6 +63,8 @@ class TwistCheck:
         # [m²] sums of products, of the same two: pose's by twist's, pose's and twist's squares
         self._products = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         self._opposed = 0
+        # [m] of the same two, by pose while the twist is zero, and by twist while the pose stands
+        self._alone = (0.0, 0.0), (0.0, 0.0)
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
         """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
@@ -78,6 +82,18 @@ class TwistCheck:
         )
         drive, yaw = self._products
         self._products = _summed(left, drive, forward, way), _summed(left, yaw, turned, rim)
+        least, (on, round_) = STILL * time, self._alone
+        self._alone = (
+            _alone(on, forward, way, least, motion.speed == 0),
+            _alone(round_, turned, rim, least, motion.yaw_rate == 0),
+        )
+
+    def missing(self, largest: float) -> str:
+        """Field of the twist that is zero while the pose goes; else ''."""
+        for name, (by_pose, _) in zip(FIELDS, self._alone, strict=True):
+            if abs(by_pose) > STILL_DISTANCE * largest:
+                return name
+        return ""
 
     def opposed(self, least: float) -> str:
         """Field of the twist whose sign is not its pose's, over `least` [m] of both; else ''."""
@@ -103,10 +119,20 @@ class TwistCheck:
         self._opposed = self._opposed + 1 if opposed else 0
         if self._opposed >= OPPOSED_IN_A_ROW:
             return opposed, True
+        if max(abs(by_twist) for _, by_twist in self._alone) > STILL_DISTANCE * largest:
+            return "the pose stands", False
         if slow := self.too_little(TOO_LITTLE_DISTANCE * largest):
             return slow, False
         differs = max(_difference(*self._distances[0]), _difference(*self._distances[1]))
         return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
+
+
+def _alone(
+    sums: tuple[float, float], pose: float, twist: float, least: float, is_zero: bool
+) -> tuple[float, float]:
+    by_pose, by_twist = sums
+    tells_alone = pose == 0 and abs(twist) > least
+    return by_pose + pose if is_zero else 0.0, by_twist + twist if tells_alone else 0.0
 
 
 def _summed(left: float, sums: Products, pose: float, twist: float) -> Products:

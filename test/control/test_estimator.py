@@ -177,7 +177,7 @@ def test_a_missing_twist_is_noticed():
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
     simulate(RAMPED, start, 3.0, ours, CLIMBER, Link(with_twist=False))
     assert ours.mode is Mode.NO_TWIST
-    assert ours.detail == "set velocity_source to pose"
+    assert ours.detail == "linear.x; set velocity_source to pose"
 
 
 @pytest.mark.parametrize("seed", range(8))
