@@ -106,7 +106,7 @@ CONTENTS = {
     topics.private(
         topics.PROGRESS
     ): "one status; `message`: waiting, approaching, following, paused "
-    "or done; values: done, left [m], time_left [s], lap, segment; 10 Hz, if anybody listens",
+    "or done; values: done, left [m], time_left [s], lap, segment, mode; 10 Hz, if anybody listens",
     topics.private(
         topics.EVENTS
     ): "one status for each tag of the path, when the climber reaches it: "

@@ -7,7 +7,7 @@ as it has waited.
 import math
 from typing import NamedTuple
 
-from climber_uk.control.approach import Approach, nearest
+from climber_uk.control.approach import Approach, braked, nearest
 from climber_uk.control.constraint_set import ConstraintSet
 from climber_uk.control.guard import STANDS, Expected, Rates
 from climber_uk.control.guidance import Guidance
@@ -19,6 +19,8 @@ from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
 
 TOLERANCE = 0.05  # [m, rad] within which a new preview goes on with the old one
+SAME = 1e-4  # [m, rad] the same for one that rests, and where it need not be approached
+NEAR = 0.05  # [m, rad] from where it should rest, from where it is approached then
 AROUND = SECOND // 2  # [ns] of what is followed, before and after, whose fastest motion counts
 GOES = 0.02  # [m/s] of a reference, from which on it is clear which way it goes
 KEPT_BEHIND = 2 * SECOND  # [ns] of a reference that is kept behind the climber
@@ -29,6 +31,9 @@ STRAYED = 1.5  # times `max_distance`, beyond which a climber that follows is of
 LONGEST_LAG = 5.0  # [s] that is made up for later; a longer delay shifts the rest of the reference
 LONGEST_GAP = round(0.3 * SECOND)  # [ns] between two answers over which the reference goes on
 IN_TIME_AGAIN = 1e-3  # 1 - σ at the end of a restart
+
+
+AT_REST = Approach(max_distance=SAME, max_heading=SAME)
 
 
 class Progress(NamedTuple):
@@ -93,6 +98,7 @@ class ActiveReference:
         # what is followed, number of `AROUND`, and the fastest motion around it
         self._around: tuple[Preview, int, tuple[float, float]] | None = None
         self._began_at = 0.0  # [m] from the reference, when it was begun to follow it
+        self._rested: ReferencePoint | None = None  # where it should rest, at the end of another
 
     @property
     def followed(self) -> Preview | None:
@@ -121,15 +127,36 @@ class ActiveReference:
 
     def take(self, preview: Preview) -> None:
         """Take a newer part of the reference, or another reference."""
-        if self.preview is None or not self.preview.goes_on_with(preview, TOLERANCE):
-            self.preview, self.way, self._position, self._is_paused = preview, None, None, True
+        rests = self.preview is not None and self._rests()
+        tolerance = SAME if rests else TOLERANCE
+        if self.preview is None or not self.preview.goes_on_with(preview, tolerance):
+            self._replace(preview)
             return
         here = int(preview.times[0]) if self._position is None else self._position
         self.preview = self.preview.continued(preview, here - KEPT_BEHIND).last(MOST_POINTS)
 
+    def _rests(self) -> bool:
+        """Whether what is followed rests where the climber has come to."""
+        time = self.progress.time
+        target = None if time is None else self.at(time)
+        return target is not None and max(abs(target.speed), abs(target.yaw_rate)) < STANDSTILL
+
+    def _replace(self, preview: Preview) -> None:
+        """Take another reference: what is followed comes to rest first, so that no torque jumps."""
+        followed, progress, time = self.followed, self.progress, self.progress.time
+        is_followed = followed is not None and not self._is_paused
+        self.preview, self.way, self._position, self._is_paused = preview, None, None, True
+        self._rested = None
+        if is_followed and followed and time and preview.times[0] <= time + LONGEST_GAP:
+            self.way = braked(followed, progress.at(time), progress.pace, time)
+        if self.way is not None and time:
+            self._rested = self.way.target(int(self.way.times[-1]))
+            self._is_paused, self.progress = False, Progress()
+            self._position = self._first_position(time)
+
     def pause(self, stamp: int) -> None:
         """Stand still on the reference, which is not followed at `stamp` [ns]."""
-        self._is_paused, self.way = True, None
+        self._is_paused, self.way, self._rested = True, None, None
         if self._position is None and self.preview is not None and not self.begins_after(stamp):
             self._position = self._first_position(stamp)
 
@@ -191,8 +218,9 @@ class ActiveReference:
             if point is None:  # it has arrived
                 self.way, self._is_paused = None, True
                 return self.target(motion, begins, target_time)
-            mode, detail = Mode.APPROACHING, f"{self._began_at:.2f} m away"
-            return Target(mode, detail, point, True, progress)
+            brakes = self._rested is not None
+            detail = "comes to rest first" if brakes else f"{self._began_at:.2f} m away"
+            return Target(Mode.APPROACHING, detail, point, True, progress)
         point = progress.target(self.preview, target_time)
         if point is None:
             return Target(Mode.WAITING)
@@ -245,15 +273,25 @@ class ActiveReference:
                 f"{point.y:.2f}); max_start_distance is {options.max_start_distance} m",
             )
         self._is_paused, self._began_at, self._position = False, distance, position
-        heading_error = abs(wrapped(motion.heading - point.heading))
-        if distance > options.max_distance or heading_error > options.max_heading:
-            self.way = options.way(motion, point, time)
+        begin, self._rested = self._begins_at(motion), None
+        far, turn = _apart(begin, point)
+        most = options if begin is motion else AT_REST
+        if far > most.max_distance or turn > most.max_heading:
+            self.way = options.way(begin, point, time)
             self.progress = Progress()
         else:
             rate = _rate(motion, point)
             pace = IN_TIME if rate > 1 - IN_TIME_AGAIN else Pace(rate=rate)
             self.progress = Progress(time, time - position, pace, pace != IN_TIME)
         return None
+
+    def _begins_at(self, motion: Motion) -> Motion | ReferencePoint:
+        """Pose from which another reference is approached: where it should be, if it rests there.
+
+        Friction holds it a little off, and with it a torque that would jump.
+        """
+        rested = self._rested
+        return motion if rested is None or max(_apart(motion, rested)) > NEAR else rested
 
     def _where(self, preview: Preview, motion: Motion, time: int) -> int:
         """Time of the reference [ns] at which to go on: the climber may have gone on unanswered."""
@@ -263,6 +301,12 @@ class ActiveReference:
         position, answered = max(self._position, first), self.progress.time
         skip = 0 if answered is None else min(time - answered, LONGEST_SKIP, last - position)
         return position if skip <= 0 else nearest(preview, motion, position, skip)
+
+
+def _apart(one: Motion | ReferencePoint, other: ReferencePoint) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of two poses."""
+    distance = math.hypot(one.x - other.x, one.y - other.y)
+    return distance, abs(wrapped(one.heading - other.heading))
 
 
 def _rate(motion: Motion, target: ReferencePoint) -> float:

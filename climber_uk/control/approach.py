@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from climber_uk.control.time_scaling import STANDSTILL
+from climber_uk.control.time_scaling import STANDSTILL, Pace
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.preview import Preview
@@ -16,9 +16,12 @@ from climber_uk.mechanics.quantities import Motion, ReferencePoint
 from climber_uk.parameters.declaration import parameter, parameters
 
 PEAK_RATE = 15 / 8  # of p'
-SHORTEST = 0.4  # [s] that a move takes
+PEAK_CHANGE = 10 / 3**0.5  # of p''
+ACCELERATION, YAW_ACCELERATION = 0.1, 1.0  # [m/s²], [rad/s²] that short moves do not exceed
+SHORTEST = 0.8  # [s] that a move takes
 POINT_PERIOD = 0.05  # [s]
-NO_DISTANCE = 1e-3  # [m] that need not be driven
+SHIFT = 5e-3  # [m] up to which it need not turn to drive there
+BRAKING, BRAKING_PERIOD = 0.8, 0.02  # [s] from full speed to rest, and between its points
 SKIP_STEPS = 20  # in which it is looked for where the climber is ahead
 
 
@@ -38,48 +41,36 @@ class Approach:
     approach_speed: float = parameter(0.1, "m/s", "fastest speed of the approach", above=0)
     approach_yaw_rate: float = parameter(0.5, "rad/s", "fastest turn of the approach", above=0)
 
-    def way(self, motion: Motion, target: ReferencePoint, begin: int) -> Preview:
-        """Preview from a climber's pose at `begin` [ns], at rest there, to the pose of `target`."""
-        offset_x, offset_y = target.x - motion.x, target.y - motion.y
-        distance = math.hypot(offset_x, offset_y)
-        first, direction = float(motion.heading), 1.0
-        if distance > NO_DISTANCE:
+    def way(self, start: Motion | ReferencePoint, target: ReferencePoint, begin: int) -> Preview:
+        """Preview from the pose of `start` at `begin` [ns], at rest there, to that of `target`."""
+        offset_x, offset_y = target.x - start.x, target.y - start.y
+        first = driven = float(start.heading)
+        if math.hypot(offset_x, offset_y) > SHIFT:
             heading_change = float(wrapped(math.atan2(offset_y, offset_x) - first))
             if abs(heading_change) > math.pi / 2:  # in reverse gear it is less of a turn
-                heading_change, direction = float(wrapped(heading_change + math.pi)), -1.0
-            drive_heading = first + heading_change
-        else:
-            distance, drive_heading = 0.0, first
-        last = drive_heading + float(wrapped(target.heading - drive_heading))
-        start = (motion.x, motion.y)
-        end = (target.x, target.y) if distance else start
+                heading_change = float(wrapped(heading_change + math.pi))
+            driven = first + heading_change
+        last = driven + float(wrapped(target.heading - driven))
+        here, there = np.array([start.x, start.y]), np.array([target.x, target.y])
         moves = [
-            self._turn(start, first, drive_heading),
-            self._drive(start, drive_heading, direction, distance),
-            self._turn(end, drive_heading, last),
+            self._move(here, here, first, driven),
+            self._move(here, there, driven, driven),
+            self._move(there, there, driven, last),
         ]
-        return _joined([move for move in moves if move is not None] or [_rest(end, last)], begin)
+        return _joined([move for move in moves if move is not None] or [_rest(here, last)], begin)
 
-    def _turn(self, place: tuple[float, float], first: float, last: float) -> Array | None:
-        angle = last - first
-        if not angle:
+    def _move(self, place: Array, end: Array, first: float, last: float) -> Array | None:
+        """Rows of a move from a place (2,) [m] and a heading to others; None if they are those."""
+        way = np.array([*(end - place), last - first])
+        if not way.any():
             return None
-        time, p, p_1, p_2 = _move(abs(angle), self.approach_yaw_rate)
+        sizes = np.array([math.hypot(*way[:2]), abs(way[2])])
+        by_speed = PEAK_RATE * sizes / (self.approach_speed, self.approach_yaw_rate)
+        gently = np.sqrt(PEAK_CHANGE * sizes / (ACCELERATION, YAW_ACCELERATION))
+        time, p, p_1, p_2 = _smooth(max(*by_speed, *gently, SHORTEST))
         rows = np.zeros((len(time), 10))
-        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place, first + p * angle
-        rows[:, 6], rows[:, 9] = p_1 * angle, p_2 * angle
-        return rows
-
-    def _drive(
-        self, place: tuple[float, float], heading: float, direction: float, distance: float
-    ) -> Array | None:
-        if not distance:
-            return None
-        time, p, p_1, p_2 = _move(distance, self.approach_speed)
-        displacement = direction * distance * np.array([math.cos(heading), math.sin(heading)])
-        rows = np.zeros((len(time), 10))
-        rows[:, 0], rows[:, 1:3], rows[:, 3] = time, place + p[:, None] * displacement, heading
-        rows[:, 4:6], rows[:, 7:9] = p_1[:, None] * displacement, p_2[:, None] * displacement
+        rows[:, 0], rows[:, 1:4] = time, np.array([*place, first]) + p[:, None] * way
+        rows[:, 4:7], rows[:, 7:10] = p_1[:, None] * way, p_2[:, None] * way
         return rows
 
 
@@ -105,9 +96,30 @@ def nearest(preview: Preview, motion: Motion, begin: int, skip: int) -> int:
     return min(max(time + round(ahead * SECOND), begin), begin + skip)
 
 
-def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:
-    """Times (n,) [s], and p, ṗ, p̈ at them, of a move of `size` at a rate of `fastest` at most."""
-    duration = max(PEAK_RATE * size / fastest, SHORTEST)
+def braked(followed: Preview, position: int, pace: Pace, begin: int) -> Preview | None:
+    """Preview from `begin` [ns] on that comes to rest along one that is at `position` [ns].
+
+    That goes on at a `pace`. None if so little of it is left that it cannot.
+    """
+    left = (int(followed.times[-1]) - position) / SECOND
+    number = math.floor(min(BRAKING, 2 * left) / BRAKING_PERIOD)
+    if number < 2:
+        return None
+    duration, rows = number * BRAKING_PERIOD, np.zeros((number + 1, 10))
+    for i in range(number + 1):
+        u = i / number
+        rate = pace.rate * (1 - u**3 * (10 - 15 * u + 6 * u**2))
+        change = -pace.rate * 30 * u**2 * (1 - u) ** 2 / duration
+        on = pace.rate * duration * (u - u**4 * (2.5 - 3 * u + u**2))
+        point = Pace(0.0, rate, change).target(followed, position + round(on * SECOND))
+        if point is None:  # it goes on faster than its own time
+            return None
+        rows[i] = i * BRAKING_PERIOD, *point[:9]
+    return _joined([rows], begin)
+
+
+def _smooth(duration: float) -> tuple[Array, Array, Array, Array]:
+    """Times (n,) [s], and p, ṗ, p̈ at them, of a move of a duration [s]."""
     time = np.linspace(0.0, duration, math.ceil(duration / POINT_PERIOD) + 1)
     u = time / duration
     p = u**3 * (10 - 15 * u + 6 * u**2)
@@ -116,7 +128,7 @@ def _move(size: float, fastest: float) -> tuple[Array, Array, Array, Array]:
     return time, p, p_1, p_2
 
 
-def _rest(place: tuple[float, float], heading: float) -> Array:
+def _rest(place: Array, heading: float) -> Array:
     rows = np.zeros((2, 10))
     rows[:, 0], rows[:, 1:3], rows[:, 3] = (0.0, POINT_PERIOD), place, heading
     return rows

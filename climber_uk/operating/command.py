@@ -112,8 +112,13 @@ class Operator:
 def told(message: DiagnosticArray) -> tuple[str, str]:
     """State of a progress, and a line of all of it."""
     (status,) = message.status
-    value = {pair.key: float(pair.value) for pair in status.values}
-    said = [status.message, f"{value['done']:.2f} m done"]
+    text = {pair.key: pair.value for pair in status.values}
+    mode = text.pop("mode", "").replace("_", " ")
+    value = {key: float(number) for key, number in text.items()}
+    state = status.message
+    if state == "waiting" and mode:
+        state += f" (the controller: {mode}; its log says why, 'climber enable' forgives it)"
+    said = [state, f"{value['done']:.2f} m done"]
     if math.isfinite(value["left"]):
         said += [f"{value['left']:.2f} m left", f"{value['time_left']:.0f} s"]
     if value["lap"]:

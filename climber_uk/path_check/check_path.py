@@ -22,6 +22,7 @@ from climber_uk.messages.topics import CONTROLLER, PLANNER
 from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import Demands, demands
+from climber_uk.path_check.fastest import fastest
 from climber_uk.system.command_line import Parser, between
 
 NAMES = {
@@ -87,6 +88,13 @@ def lines(numbers: dict[str, Any], is_whole: bool) -> list[str]:
             f"{name}: {limit['reserve']:.3g} times what is asked for, at ({x:.3g}, {y:.3g}) m, "
             f"{limit['at [s]']:.4g} s{verdict}"
         )
+    if "fastest rate" in numbers:
+        rate = numbers["fastest rate"]
+        said.append(
+            f"highest rate: {rate:.4g}, in {numbers['fastest duration [s]']:.4g} s"
+            if rate
+            else "highest rate: none is slow enough"
+        )
     return [*said, "feasible" if numbers["feasible"] else "NOT feasible"]
 
 
@@ -108,12 +116,19 @@ def main() -> None:
         default=1.5,
         help="of slipping that is to be kept (default: 1.5, as the alarm's)",
     )
+    parser.add_argument(
+        "--fastest", action="store_true", help="tell the highest rate at which all limits hold, too"
+    )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
     try:
         trajectory, climber, attachment = read(options.params, dict(options.param))
         found = demands(trajectory, climber, attachment, options.margin)
         numbers = told(found, trajectory, climber.half_track)
+        if options.fastest:
+            best = fastest(trajectory, climber, attachment, options.margin)
+            numbers["fastest rate"] = best and best.law.rate
+            numbers["fastest duration [s]"] = best and best.duration
         print("\n".join(lines(numbers, found.is_whole)))
         if options.output:
             from climber_uk.path_check.figure import draw  # matplotlib, which takes a second

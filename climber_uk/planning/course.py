@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.parameters.declaration import parameter, parameters
@@ -22,6 +23,7 @@ from climber_uk.planning.path_clock import PathClock
 PEAK_RATE = 15 / 8  # of a smooth start's ramp, of its mean
 NEAREST_STEP = 0.05  # [s] in which the nearest place is looked for
 AS_NEAR, AROUND = 0.05, 2.0  # [m] and [s], of places that are about as near
+HELD = 0.02  # [m, rad] from where a course rests
 SAMPLES = 4001  # of a trajectory, to find its highest speed and acceleration
 Row = TypeVar("Row")
 
@@ -135,6 +137,17 @@ class Course(Generic[Row]):
             return True
         clock = self.clock
         return clock is not None and not self.asked and self.time(position) >= clock.settles()
+
+    def rested(self, position: int, pose: Array) -> Array:
+        """Pose (3,) at which it rests at `position` [ns], if a climber is at about that `pose`.
+
+        It is held a little off by friction: what begins there begins without a jump.
+        """
+        planned = self.trajectory.at(self.own_time(position)[0]).pose
+        off = planned - pose
+        off[2] = wrapped(off[2])
+        is_there = self.rests(position) and np.abs(off).max() <= HELD
+        return np.asarray(planned if is_there else pose)
 
     def nearest(self, place: Array, left: float) -> float:
         """Own time [s] at which it is nearest to a place (2,) [m].

@@ -71,6 +71,7 @@ class Journey(Generic[Row]):
         if what == HAND:
             if course is not None:
                 self._left, _ = course.own_time(position)
+                pose = course.rested(position, pose)
             self.hand = ByHand(pose, start, options, self._hand_options, self._make)
             return
         trajectory, begin = self.planned, 0.0

@@ -24,6 +24,7 @@ class Progress:
     time_left: float = math.nan  # [s] at the speed asked for
     lap: int = 0  # of a closed path; run of one that is driven forth and back; from 1
     segment: int = 0  # number of the last point of a polyline that it has passed, from 1
+    mode: str = ""  # what the controller does; empty if none tells
 
 
 class Odometer:
@@ -87,6 +88,7 @@ def progress(course: Course[Row], odometer: Odometer, position: int, mode: str) 
         time_left=(duration - u if course.direction > 0 else u) / speed,
         lap=int(min(math.floor(lap + 1e-9) + 1, laps)),
         segment=int(path.segment(np.array(s))),
+        mode=mode,
     )
 
 

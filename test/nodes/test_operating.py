@@ -51,7 +51,9 @@ class Operated(Waiting):
     def told(self):
         """What was told last of the progress: its state, and numbers by name."""
         (status,) = self.progress[-1].status
-        return status.message, {pair.key: float(pair.value) for pair in status.values}
+        return status.message, {
+            pair.key: float(pair.value) for pair in status.values if pair.key != "mode"
+        }
 
     def is_told_to_be(self, state):
         self.progress.clear()

@@ -1,8 +1,12 @@
 """What the command line of `climber` takes."""
 
+from dataclasses import replace
+
 import pytest
 
-from climber_uk.operating.command import parse
+from climber_uk.messages import writing
+from climber_uk.operating.command import parse, told
+from climber_uk.planning.progress import Progress
 
 
 @pytest.mark.parametrize(
@@ -30,3 +34,16 @@ def test_what_means_nothing_is_refused_in_one_line(monkeypatch, capsys, words, l
 def test_namespaces_are_taken_with_and_without_slashes(monkeypatch, name):
     monkeypatch.setattr("sys.argv", ["climber", "status", "--namespace", name])
     assert parse().namespace == name.strip("/")
+
+
+def test_a_climber_that_waits_tells_for_what():
+    how_far = Progress("waiting", done=1.0, left=2.0, time_left=3.0, lap=1, segment=1)
+    for mode, said in (
+        ("too_fast", "waiting (the controller: too fast; "),
+        ("", "waiting, 1.00 m"),
+    ):
+        message = writing.progress("planner", vars(replace(how_far, mode=mode)), 0)
+        state, line = told(message)
+        assert state == "waiting"
+        assert line.startswith(said)
+        assert line.endswith("1.00 m done, 2.00 m left, 3 s, lap 1, segment 1")

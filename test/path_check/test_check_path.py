@@ -15,6 +15,7 @@ from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.path_check import check_path
 from climber_uk.path_check.demands import demands
+from climber_uk.path_check.fastest import fastest
 
 CONFIG = Path(__file__).parents[2] / "config"
 CLIMBER = Climber(
@@ -49,6 +50,22 @@ def test_straight_up_it_carries_its_weight_and_friction():
     assert limits["slip"].reserve == pytest.approx(friction * 0.8 * 480 / force, rel=1e-4)
     # what it does: weight and friction, all along
     assert found.energy == pytest.approx(3.0 * (5 * 9.81 + FRICTION), rel=1e-3)
+
+
+def test_the_highest_rate_is_that_at_which_the_least_reserve_is_one():
+    """Of a line upwards by hand: what torque or wheels can do beyond weight and friction."""
+    up = Trajectory(Line(60.0, direction=math.pi / 2), RestToRest(rate=5.0, ramp_time=2.0))
+    best = fastest(up, CLIMBER, HELD, 1.5)
+    limits, _ = least(best, margin=1.5)
+    assert min(limit.reserve for limit in limits.values()) == pytest.approx(1.0, abs=2e-3)
+    most = min(2 * 4.0 / 0.027, Grip().wheel_friction_coefficient * 0.8 * 480 / 1.5)
+    force = most - 5 * 9.81 - FRICTION
+    assert best.law.rate == pytest.approx(force / 5 * 2.0 * 8 / 15, rel=2e-3)
+
+
+def test_a_climber_that_cannot_carry_its_weight_has_no_rate():
+    up = Trajectory(Line(3.0, direction=math.pi / 2), RestToRest(rate=0.2, ramp_time=2.0))
+    assert fastest(up, replace(CLIMBER, max_wheel_torque=0.5), HELD, 1.5) is None
 
 
 def test_straight_down_the_motors_take_back_no_energy():

@@ -30,9 +30,6 @@ class Sent(UnderWay):
     No torque changes by more than 0.2 N m from one odometry to the next (5 ms).
     """
 
-    def __init__(self, trajectory):
-        super().__init__(trajectory, max_torque_rate=40.0)
-
     def send(self, trajectory):
         self.course.pause(self.position)
         self.run(20, until=lambda: self.course.rests(self.position))

@@ -5,11 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from climber_uk.control.build import build_controller
+from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import State
 from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.planning.by_hand import HandOptions
 from climber_uk.planning.course import Course, CourseOptions
+from climber_uk.planning.journey import BACK, HAND, PATH, Journey
 from climber_uk.simulation.plant import Plant
 
 CONFIG = Path(__file__).parents[2] / "config" / "climber.yaml"
@@ -83,3 +86,67 @@ class UnderWay:
     def largest_jump(self):
         """Largest change [N m] of a wheel's torque from one odometry to the next."""
         return np.abs(np.diff(self.sent, axis=0)).max()
+
+
+class Travelling(UnderWay):
+    """The same with a stick, paths from outside and starts in mid-course, as the planner has it."""
+
+    def __init__(self, trajectory):
+        hand = HandOptions(input="twist", speed=0.2)
+        make = lambda reference, time: (time, reference)  # noqa: E731
+        self.journey = Journey(trajectory, CourseOptions(), hand, make)
+        super().__init__(trajectory)
+
+    def begin(self, trajectory, **_):
+        self.position, self.period, self.course = 0, 0, self
+        self.replace(trajectory)
+
+    # what `UnderWay` asks of its course
+
+    def preview(self, position):
+        under_way = self.journey.under_way
+        rows = under_way.preview(position, self.now)
+        return [(under_way.start + round(time * SECOND), reference) for time, reference in rows]
+
+    def own_time(self, position):
+        return (np.nan, 0.0) if self.journey.hand else self.journey.course.own_time(position)
+
+    # what an operator asks for
+
+    def ask(self, what):
+        is_driven = self.modes[-1:] in ([], [Mode.FOLLOWING])
+        self.is_due, _ = self.journey.begin(what, self.position, is_driven)
+
+    def replace(self, trajectory):
+        self.journey.planned = trajectory
+        self.start()
+
+    def start(self):
+        self.journey.is_paused = False
+        self.ask(PATH)
+
+    def go_on(self):
+        if self.journey.hand is None:
+            self.journey.go_on(self.position)
+        else:
+            self.journey.is_paused = False
+            self.ask(BACK)
+
+    def stick(self, speed, yaw_rate):
+        if self.journey.takes_over(speed, yaw_rate, self.now):
+            self.ask(HAND)
+        self.run(0.1)
+
+    def run(self, seconds, until=lambda: False):
+        journey = self.journey
+        for _ in range(round(seconds / PERIOD)):
+            if journey.waits_for_rest and self.period % PUBLISHED_EVERY == 0:
+                self.ask(journey.next)
+            if self.is_due:
+                journey.start(self.now, self.state.pose, self.position)
+                self.is_due = False
+            self.position = max(self.position, journey.under_way.start)
+            super().run(PERIOD)
+            if until():
+                break
+        return self
