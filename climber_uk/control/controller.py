@@ -9,7 +9,6 @@ Times are integers in nanoseconds: stamps on the odometry's clock, `now` on the 
 while there is none.
 """
 
-import math
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
