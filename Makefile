@@ -73,7 +73,7 @@ TESTS := -m pytest --numprocesses 5 --dist worksteal
 # Of many hundred processes each would compile the package again
 KEEPING_BYTECODE := env -u PYTHONDONTWRITEBYTECODE
 
-## the tests, in four processes
+## the tests, in five processes
 unit: $(TOOLS)
 	$(KEEPING_BYTECODE) $(BIN)/python $(TESTS)
 
