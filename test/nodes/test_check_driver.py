@@ -129,13 +129,14 @@ def test_the_plant_passes_all_checks(world, clock, parameters, skipped):
 
 
 def test_with_a_controller_in_lock_step_it_listens_and_refuses_to_move(world):
-    world.start_node("plant_simulator", *PACED, config="climber.yaml")
-    world.start_node("uk_torque_controller", "use_sim_time:=true", config="climber.yaml")
+    slow = "control_period:=0.01"
+    world.start_node("plant_simulator", *PACED, slow, config="climber.yaml")
+    world.start_node("uk_torque_controller", "use_sim_time:=true", slow, config="climber.yaml")
     quick = "use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"
     world.start_node("trajectory_publisher", *quick, config="climber.yaml")
     odometry = world.listen(Odometry, "odom")
     world.wait(lambda: odometry and odometry[-1].twist.twist.linear.x > 0.1, "motion")
-    sim_time = (*PARAMETERS, "-p", "use_sim_time:=true")
+    sim_time = (*PARAMETERS, "-p", "use_sim_time:=true", "-p", slow)
     status, rows, _ = check(world, "--move", "--duration", "1", parameters=sim_time)
     assert status == 1
     assert those(rows, "fail") == ["trial"], told(rows)
