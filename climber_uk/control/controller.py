@@ -9,7 +9,6 @@ Times are integers in nanoseconds: stamps on the odometry's clock, `now` on the 
 while there is none.
 """
 
-import math
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -218,7 +217,7 @@ class Controller:
         """Take in an odometry; return what is wrong with it."""
         is_first = self.estimator.motion is None
         observed = self.estimator.see(stamp, motion)
-        self._safe_output.watch(self._law.climber, observed)
+        self._safe_output.watch(self._law.climber, observed, motion)
         if observed is None and not is_first:
             self._watch_anew()
             self._unsettled = self.safety.settling_messages
