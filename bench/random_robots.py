@@ -157,9 +157,12 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first one")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--guard", action="store_true", help="with the guard: whom does it stop?")
-    what = "forth_and_back reverses, which counts as chatter: use it with --guard"
+    what = "forth_and_back turns back, which is no limit cycle: it needs --guard"
     parser.add_argument("--path", choices=PATHS, default="eight", help=what)
     options = parser.parse_args()
+    turns_back = options.path == "forth_and_back"
+    if turns_back and not options.guard:
+        parser.error("--path forth_and_back needs --guard: what turns back is no limit cycle")
     path = PATHS[options.path]
     guard = GuardOptions() if options.guard else UNGUARDED
     seeds = range(options.first, options.first + options.robots)
@@ -169,8 +172,9 @@ def main() -> None:
             results = pool.map(drive, seeds, chunksize=1)
             cycles = [seed for seed, result in zip(seeds, results, strict=True) if result.cycles]
             worst = 1e3 * max(result.distance for result in results)
-            said = f"{name}: {len(cycles)} of {len(seeds)} in a limit cycle {cycles or ''}"
-            print(f"{said}; largest RMS distance {worst:.2g} mm", flush=True)
+            if not turns_back:
+                print(f"{name}: {len(cycles)} of {len(seeds)} in a limit cycle {cycles or ''}")
+            print(f"{name}: largest RMS distance {worst:.2g} mm", flush=True)
             stopped = [seed for seed, result in zip(seeds, results, strict=True) if result.stopped]
             if options.guard:
                 print(f"{name}: {len(stopped)} stopped by the guard {stopped or ''}", flush=True)

@@ -221,7 +221,7 @@ class Controller:
         """Take in an odometry; return what is wrong with it."""
         is_first = self.estimator.motion is None
         observed = self.estimator.see(stamp, motion)
-        self._safe_output.watch(self._law.climber, observed)
+        self._safe_output.watch(self._law.climber, observed, motion)
         self.stops.move(self.estimator.motion if observed or is_first else None)
         if observed is None and not is_first:
             self._watch_anew()

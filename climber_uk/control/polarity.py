@@ -9,6 +9,7 @@ import math
 
 from climber_uk.control.estimator import Observed
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.elementary import wrapped
 
 SWING_TIME = 0.15  # [s] what changes more slowly is left out: weight, friction, load
 MEMORY = 1.0  # [s]
@@ -16,6 +17,7 @@ LEAST_SWING = 0.005  # [m/s] of a rim that torques should cause, RMS, to tell an
 # correlation of what they should cause with what is measured, for a sign that is right, and wrong:
 # odometry that is late by a third of an oscillation goes against its torques, too
 RIGHT, WRONG = 0.5, -0.85
+POSE_SMOOTHING = 0.03  # [s] of speeds that are taken from poses
 TINY = 1e-30
 
 
@@ -89,3 +91,31 @@ class Polarities:
     def signs(self) -> tuple[int, int]:
         """Of speed and yaw rate; see `Polarity.sign`."""
         return self.drive.sign, self.yaw.sign
+
+
+class PoseSpeeds:
+    """Speed and yaw rate by poses, for where the twist is in doubt, and whether they follow."""
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Know nothing."""
+        self.polarities, self.speeds = Polarities(), (0.0, 0.0)
+
+    def add(self, climber: Climber, observed: Observed) -> None:
+        """Take what an odometry tells of the time since the last."""
+        before, after, time = observed.before, observed.after, observed.time
+        if time <= 0:
+            return
+        gone = (after.x - before.x) * after.cosine + (after.y - before.y) * after.sine
+        by_pose = gone / time, wrapped(after.heading - before.heading) / time
+        new, last = 1 - math.exp(-time / POSE_SMOOTHING), self.speeds
+        speed, yaw_rate = self.speeds = tuple(
+            old + new * (now - old) for old, now in zip(last, by_pose, strict=True)
+        )
+        smoothed = observed._replace(
+            before=before._replace(speed=last[0], yaw_rate=last[1]),
+            after=after._replace(speed=speed, yaw_rate=yaw_rate),
+        )
+        self.polarities.add(climber, smoothed)

@@ -2,7 +2,7 @@
 
 from climber_uk.control.control_law import Braking, ControlLaw, check_finite
 from climber_uk.control.estimator import Estimator, Observed
-from climber_uk.control.polarity import Polarities
+from climber_uk.control.polarity import Polarities, PoseSpeeds
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
@@ -23,7 +23,8 @@ class SafeOutput:
     """Torques for the last odometry while nothing is followed."""
 
     def __init__(self, safety: Safety) -> None:
-        self.safety, self.polarities = safety, Polarities()
+        self.safety, self.polarities, self.by_pose = safety, Polarities(), PoseSpeeds()
+        self._seen: Motion | None = None
         self.forget()
 
     def forget(self) -> None:
@@ -36,25 +37,34 @@ class SafeOutput:
         self._braked: tuple[int, float] | None = None  # [ns] begin of the safe output, rim speed
         self._doubted: int | None = None  # [ns] since when speeds are in doubt
 
-    def watch(self, climber: Climber, observed: Observed | None) -> None:
-        """Take what an odometry tells, for modes that doubt it; None: it is another climber's."""
-        if observed is None:
-            self.polarities.restart()
-        else:
+    def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
+        """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
+        seen, self._seen = self._seen or motion, motion
+        if observed is not None:
             self.polarities.add(climber, observed)
+            self.by_pose.add(climber, observed)
+            return
+        self.polarities.restart()
+        pose = motion._replace(
+            speed=seen.speed, yaw_rate=seen.yaw_rate, cosine=seen.cosine, sine=seen.sine
+        )
+        if self.safety.has_jumped(seen, pose, climber.half_track):
+            self.by_pose.restart()
 
     def send(
         self, mode: Mode, stamp: int, age: float, estimator: Estimator, law: ControlLaw
     ) -> Torques:
         """Torques in a mode, for the odometry of `stamp` [ns], of `age` [s]; they count as sent."""
         motion, climber, safety = estimator.motion, law.climber, self.safety
-        if motion is None or safety.safe_output != "hold" or stamp < self._coasts_until:
+        if motion is None or safety.safe_output != "hold":
             return _let_go(estimator, age)
+        if stamp < self._coasts_until:
+            return _coast(estimator, law, age)
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
         begin, before = self._braked = self._braked or (stamp, rim)
         if stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
-            return _let_go(estimator, age)
+            return _coast(estimator, law, age)
         try:
             if not mode.doubts_odometry:
                 self._doubted = None
@@ -62,27 +72,51 @@ class SafeOutput:
                 self._doubted = stamp
                 self.polarities.forget_unknown()
             since = None if self._doubted is None else stamp - self._doubted
-            return _brake(estimator, law, age, self._braking(mode, climber, motion, since))
+            believed, signs = self._believed(mode, motion) if since is not None else (motion, None)
+            braking = self._braking(mode, climber, believed, signs, since)
+            return _brake(estimator, law, age, braking, None if since is None else believed)
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
 
+    def _believed(self, mode: Mode, motion: Motion) -> tuple[Motion, tuple[int, int]]:
+        """Motion in doubt, with those speeds that follow torques, and their signs.
+
+        They are the twist's, or else the pose's, which come first where there is no twist.
+        """
+        by_twist = zip((motion.speed, motion.yaw_rate), self.polarities.signs, strict=True)
+        by_pose = zip(self.by_pose.speeds, self.by_pose.polarities.signs, strict=True)
+        ways = [*zip(by_twist, by_pose, strict=True)]
+        if mode is Mode.NO_TWIST:
+            ways = [(pose, twist) for twist, pose in ways]
+        (speed, sign), (yaw_rate, yaw_sign) = (
+            first if first[1] or not second[1] else second for first, second in ways
+        )
+        return motion._replace(speed=speed, yaw_rate=yaw_rate), (sign, yaw_sign)
+
     def _braking(
-        self, mode: Mode, climber: Climber, motion: Motion, doubted: int | None
+        self,
+        mode: Mode,
+        climber: Climber,
+        motion: Motion,
+        doubtful: tuple[int, int] | None,
+        doubted: int | None,
     ) -> Braking:
         """How to brake; `doubted` is for how long [ns] speeds are in doubt, None: they are not."""
-        rate, signs = self.safety.braking_rate, self.polarities.signs
-        if doubted is None:
-            drive, yaw = (rate * (sign or 1) for sign in signs)
+        rate = self.safety.braking_rate
+        if doubtful is None or doubted is None:
+            drive, yaw = (rate * (sign or 1) for sign in self.polarities.signs)
             # the other wheel can brake a turn, while the seal holds what it drives
-            one = mode is Mode.DEAD_WHEEL and climber.seal_friction >= climber.weight_along_wall
+            one = mode is Mode.DEAD_WHEEL and not _falls(climber)
             return Braking(0.0, yaw, carries=False) if one else Braking(drive, yaw)
+        if _falls(climber) and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
+            doubtful = doubtful[0] or 1, doubtful[1] or 1
         rims = motion.speed, climber.half_track * motion.yaw_rate
         drive, yaw = (
             0.0 if sign or abs(rim) < SHAKEN else _shaking(doubted)
-            for sign, rim in zip(signs, rims, strict=True)
+            for sign, rim in zip(doubtful, rims, strict=True)
         )
-        return Braking(rate * signs[0], rate * signs[1], shaking=(drive, yaw))
+        return Braking(rate * doubtful[0], rate * doubtful[1], shaking=(drive, yaw))
 
 
 def _shaking(doubted: int) -> float:
@@ -97,9 +131,29 @@ def _let_go(estimator: Estimator, age: float) -> Torques:
     return NO_TORQUES
 
 
-def _brake(estimator: Estimator, law: ControlLaw, age: float, braking: Braking) -> Torques:
-    """Torques that carry the weight and brake; raises `ValueError` if they are not finite."""
+def _falls(climber: Climber) -> bool:
+    """Whether its weight is more than its seal holds."""
+    return climber.seal_friction < climber.weight_along_wall
+
+
+def _coast(estimator: Estimator, law: ControlLaw, age: float) -> Torques:
+    """Torques that brake nothing, and carry the weight where no seal holds it."""
+    if not _falls(law.climber):
+        return _let_go(estimator, age)
+    return _brake(estimator, law, age, Braking(0.0, 0.0), None)
+
+
+def _brake(
+    estimator: Estimator, law: ControlLaw, age: float, braking: Braking, believed: Motion | None
+) -> Torques:
+    """Torques that carry the weight and brake; raises `ValueError` if they are not finite.
+
+    `believed` has the speeds that are braked, if not those of the estimator.
+    """
     ahead = estimator.ahead(age)
+    if believed is not None:
+        speeds = {"speed": believed.speed, "yaw_rate": believed.yaw_rate}
+        ahead = ahead._replace(motion=ahead.motion._replace(**speeds))
     if age >= LONGEST_STEP:  # it has been braked, as far as can be known
         at_rest = ahead.motion._replace(speed=0.0, yaw_rate=0.0)
         ahead = ahead._replace(motion=at_rest)
