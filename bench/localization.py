@@ -9,6 +9,7 @@ import argparse
 import math
 import time
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from identification_experiments import SCENARIOS
@@ -49,6 +50,7 @@ FILTER = LocalizationOptions(
     initial_y=3.0,
     initial_heading=math.pi / 4,
     way_noise=5e-4,
+    output_frequency=50.0,
 )
 
 
@@ -121,7 +123,13 @@ class Loop:
         start = State(pose, np.zeros(3))
         physics = Physics(creep=case.creep)
         parts = Parts(Plant(believed, PERIOD), Motors(), Sensors(), physics)
-        self.robot = SimulatedRobot(parts, start, PERIOD)
+        self.robot: Any = SimulatedRobot(parts, start, PERIOD)
+        self.trajectory = RUN.trajectory
+        self.sense(start, seed)
+
+    def sense(self, start: State, seed: int) -> None:
+        """Begin with sensors and filter."""
+        case = self.case
         seeded = [
             replace(errors, seed=3 * seed + number)
             for number, errors in enumerate((case.imu, case.encoders, case.fixes))
@@ -134,7 +142,7 @@ class Loop:
     def run(self) -> "Loop":
         """Go through it."""
         case = self.case
-        self.controller.on_reference(0, sampled(RUN.trajectory, case.duration))
+        self.controller.on_reference(0, sampled(self.trajectory, case.duration))
         for number in range(round(case.duration / PERIOD) + 1):
             now = number * PERIOD
             stamp = SECOND + round(now * SECOND)
@@ -150,7 +158,8 @@ class Loop:
                 if answer is not None:
                     self.torques = answer.torques
             self.sent.append(self.torques)
-            self.robot.advance(self.torques)
+            for _ in range(round(PERIOD / self.robot.plant.step)):
+                self.robot.advance(self.torques)
         return self
 
     def locate(self, stamp: int, now: float) -> Located | None:

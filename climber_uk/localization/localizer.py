@@ -74,7 +74,7 @@ class Localizer:
         self._early: list[Fix] = []  # that are ahead of the encoders
         self._disagrees = 0.0  # [s]
         self._is_first = False  # whether gravity's first samples tell the heading, each anew
-        self._output = OutputSpeed()
+        self._output = OutputSpeed(options.output_frequency)
 
     @property
     def estimate(self) -> Estimate:

@@ -93,6 +93,10 @@ class LocalizationOptions:
     pull_speed: float = parameter(0.05, "m/s", "fastest that it follows", above=0)
     pull_yaw_rate: float = parameter(0.1, "rad/s", "fastest that it follows", above=0)
 
+    output_frequency: float = parameter(
+        100.0, "rad/s", "W of the output's speeds: lower is smoother, and later", above=0
+    )
+
     @cached_property
     def turning_lever(self) -> float:
         """Half track of the wheels' turns [m]."""

@@ -12,20 +12,20 @@ import math
 
 from climber_uk.localization.imu import Mean
 
-FREQUENCY = 50.0  # [rad/s] W
 GYRO_TIME = 0.2  # [s]
 
 
 class Rate:
     """Rate of what has gone a way since the last time."""
 
-    def __init__(self) -> None:
-        self.value = 0.0
+    def __init__(self, frequency: float) -> None:
+        """Poles at a `frequency` W [rad/s]."""
+        self.value, self._frequency = 0.0, frequency
         self._ahead = self._change = 0.0  # p - p̂, â
 
     def go_on(self, way: float, duration: float) -> float:
         """Rate after a way that took `duration` [s]: three poles at exp(-W `duration`)."""
-        kept = math.exp(-FREQUENCY * duration)
+        kept = math.exp(-self._frequency * duration)
         new = 1 - kept
         expected = self.value * duration + self._change * duration**2 / 2
         error = self._ahead + way - expected
@@ -38,8 +38,9 @@ class Rate:
 class OutputSpeed:
     """Goes on from one sample of the encoders to the next."""
 
-    def __init__(self) -> None:
-        self._speed, self._yaw_rate = Rate(), Rate()
+    def __init__(self, frequency: float) -> None:
+        """With a filter's W [rad/s]."""
+        self._speed, self._yaw_rate = Rate(frequency), Rate(frequency)
         self._lag = Mean(GYRO_TIME)  # [rad/s] by which the wheels' yaw rate is below the gyro's
 
     def go_on(

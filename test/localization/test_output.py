@@ -52,7 +52,7 @@ COUNT = 2 * np.pi / 4096 * 0.027  # [m] of a wheel
 
 def told(rate, time, of=lambda wheels: wheels):
     """Speeds and yaw rates of the output, of wheels with counts, of a climber with one `rate`."""
-    output, ways = OutputSpeed(), COUNT * np.floor(np.cumsum(rate) * STEP / COUNT)
+    output, ways = OutputSpeed(50.0), COUNT * np.floor(np.cumsum(rate) * STEP / COUNT)
     steps = np.diff(ways, prepend=0.0)
     both = [output.go_on(way, way / STEP, of(way / STEP), STEP) for way in steps]
     return np.array(both)[time > 2].T
@@ -75,7 +75,7 @@ def test_at_rest_both_are_zero_soon_and_at_any_period_they_follow():
     speeds, _ = told(np.where(time < 3, 0.1, 0.0), time)
     assert np.abs(speeds[time[time > 2] > 3.3]).max() < 1e-4
     for period in (0.001, 0.02, 0.1, 1.0):
-        output = OutputSpeed()
+        output = OutputSpeed(50.0)
         for _ in range(round(2 / period) + 3):
             speed, yaw_rate = output.go_on(0.3 * period, 0.5, 0.5, period)
         assert (speed, yaw_rate) == pytest.approx((0.3, 0.5), rel=1e-3)
