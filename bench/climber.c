@@ -38,7 +38,7 @@ INLINE Motion predicted(const Climber *p, Motion m, Wrench w, double time, doubl
   double half = time / 2, omega_1 = w.turn / p->inertia, c, s, most = p->friction + friction;
   rotate(m.cosine, m.sine, half * (m.yaw_rate + half / 2 * omega_1), &c, &s);
   double push = w.drive - p->weight * s, held = clip(push, -most, most);
-  double rub = fabs(m.speed) > SLOW ? copysign(most, m.speed) : held;
+  double rub = m.speed != 0 ? copysign(most, m.speed) : held;
   double v_1 = (push - rub) / p->mass, way = time * (m.speed + half * v_1);
   double v = m.speed + time * v_1, stops = m.speed * v < 0;
   double left = time + m.speed / (stops ? v_1 : 1), back_1 = (push - held) / p->mass;
@@ -86,7 +86,7 @@ INLINE void demand(const Gains *k, const Track *t, Motion m, double *v_1, double
   double led_1 = omega + steered, led_2 = slope * w_2 - 2 * w * steered * steered;
   double rate = led_1 + t->turn * tanh(k->omega_n / k->damping * led / t->turn);
   *turning = t->omega_1 - led_2 - k->damping * k->omega_n * rate;
-  *wanted = v * t->v < 0 ? 0 : v;
+  *wanted = v;
 }
 
 INLINE Wrench limited(const Climber *p, Wrench w) {
@@ -129,7 +129,9 @@ INLINE Wrench wanted_of(const Law *k, const Track *t, Motion found, Wrench held,
   Motion aim = predicted(p, found, push, period / 2, r.friction);
   double v_1, turning, speed;
   demand(&k->gains, t, aim, &v_1, &turning, &speed);
-  double rub = (p->friction + r.friction) * tanh(speed / k->friction_speed);
+  double comes = 8 * t->v / (fabs(t->v) + 0.45 * k->friction_speed);
+  double fast = clip(speed / k->friction_speed, -8, 8), waits = clip(1 + fast * comes / 8, 0, 1);
+  double rub = (p->friction + r.friction) * tanh(waits * (fast + comes));
   Wrench wanted = {p->mass * v_1 + rub + p->weight * aim.sine - r.force,
                    p->inertia * turning - r.turn};
   return wanted;

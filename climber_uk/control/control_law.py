@@ -34,6 +34,8 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
+CLEARLY = 8.0  # as many times `friction_speed` is a speed whose friction is overcome in full
+RESTS = 0.45  # of `friction_speed`: speed of a reference that may as well rest
 TURN_SPEED = 0.05  # [rad/s] of a wanted yaw rate below which what resists turning fades
 Solve = Callable[..., tuple[Any, Any, Any, Any]]  # force, moment, v̇, yaw rate wanted
 
@@ -161,12 +163,14 @@ class ControlLaw:
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         right, left = self._fixed_bounds or self._bounds(situation)
-        solve = self._solve
+        solve, comes = self._solve, self.comes(target)
         drive, yaw_moment = climber.wrench(held.right, held.left)
         for _ in range(2 if ahead else 1):
             force, moment = drive + r_F, yaw_moment + r_N
             predicted = predict(climber, motion, force, moment, ahead, friction, turning, aside)
-            force, moment, v_1, yaw_rate = solve(prepared, predicted, friction, turning, course)
+            force, moment, v_1, yaw_rate = solve(
+                prepared, predicted, comes, friction, turning, course
+            )
             force, moment = force - r_F, moment - r_N
             drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
         lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
@@ -174,10 +178,26 @@ class ControlLaw:
         demanded, wheels = Wrench(force, moment), Torques(tau_r, tau_l)
         return Command(wheels, demanded, lateral, lost, predicted, v_1, yaw_rate)
 
+    def direction(self, speed: Any, comes: Any) -> Any:
+        """Friction's share and sign (-1 to 1) of a wanted speed [m/s], with a reference's `comes`.
+
+        Along a reference that comes it is 1 until the reference rests, 0 well ahead of it; at rest
+        it fades below `friction_speed`.
+        """
+        relative = clipped(speed / self.options.friction_speed, -CLEARLY, CLEARLY)
+        waits = clipped(1.0 + relative * comes / CLEARLY, 0.0, 1.0)
+        return tanh(waits * (relative + comes))
+
+    def comes(self, target: ReferencePoint) -> Any:
+        """How clearly a reference moves: ±`CLEARLY` forwards, backwards, and 0 at rest."""
+        v = target.speed
+        return CLEARLY * v / (abs(v) + RESTS * self.options.friction_speed)
+
     def closed_form(
         self,
         prepared: Any,
         motion: Motion,
+        comes: Any,
         friction: Any = 0.0,
         turning: Any = 0.0,
         course: Course | None = None,
@@ -191,7 +211,7 @@ class ControlLaw:
         v_1, yaw_acceleration, speed, yaw_rate = self._desired(prepared, motion, course)
         sideways = 0.0 if course is None else motion.yaw_rate * motion.speed * course.slope
         mass, inertia, modelled, weight = self.climber.inertial
-        rubbing = (modelled + friction) * tanh(speed / self.options.friction_speed)
+        rubbing = (modelled + friction) * self.direction(speed, comes)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
         force = mass * (v_1 - sideways) + rubbing + weight * motion.sine
         return force, inertia * yaw_acceleration + scrubbing, v_1, yaw_rate
@@ -214,6 +234,7 @@ class ControlLaw:
         self,
         prepared: Any,
         motion: Motion,
+        comes: Any,
         friction: Any = 0.0,
         turning: Any = 0.0,
         course: Course | None = None,
@@ -231,7 +252,7 @@ class ControlLaw:
             desired = self._desired(prepared, motion, course)
             speed, yaw_rate = desired.speed, desired.yaw_rate
             A, b = rows(state, desired, ratio, 0.0 if course is None else course.rate)
-        direction = tanh(speed / self.options.friction_speed)
+        direction = self.direction(speed, comes)
         Q = self.climber.applied_force(heading, direction)
         Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
@@ -240,13 +261,18 @@ class ControlLaw:
         return force, moment, v_1, yaw_rate
 
     def of_forces(
-        self, target: ReferencePoint, motion: Motion, friction: Any = 0.0, *_unknown: Any
+        self,
+        target: ReferencePoint,
+        motion: Motion,
+        comes: Any,
+        friction: Any = 0.0,
+        *_unknown: Any,
     ) -> tuple[Any, Any, Any, Any]:
         """Force and moment of another law, which knows the climber's friction only, and v̇."""
         assert self.other is not None
         force, moment = self.other.wrench(self.climber, target, motion)
         mass, _, rubbing, weight = self.climber.inertial
-        direction = tanh(target.speed / self.options.friction_speed)
+        direction = self.direction(target.speed, comes)
         v_1 = (force - rubbing * direction - weight * motion.sine) / mass
         return force + friction * direction, moment, v_1, 0.0
 

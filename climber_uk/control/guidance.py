@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from climber_uk.mechanics.elementary import (
     arctan,
-    clipped,
     cos,
     select,
     sin,
@@ -28,7 +27,6 @@ from climber_uk.mechanics.quantities import DesiredAcceleration, Motion, Referen
 from climber_uk.parameters.declaration import parameter, parameters
 
 HEADING_SHARE = 2 / 3  # of the frequency: what the heading leads back is one integral away
-COMES = 2e-3  # [m/s] of a reference, from which on it comes without a doubt
 
 
 class PreparedTarget(NamedTuple):
@@ -166,9 +164,4 @@ class Guidance:
         omega_n = HEADING_SHARE * omega_x
         s = psi_1 + R * tanh(omega_n / damping * psi / R)
         theta_2 = omega_d1 - psi_2 - damping * omega_n * s
-        # ahead of a reference that comes it waits, and overcomes no friction to go back; gradually,
-        # for the sign of the speed of a reference at rest is but rounding
-        comes = clipped(abs(v_d) / COMES, 1e-9, 1.0)
-        most = COMES * (1.0 - comes) / comes
-        wanted = select(wanted * v_d < 0.0, clipped(wanted, -most, most), wanted)
         return DesiredAcceleration(v_1, theta_2, wanted, omega - s)

@@ -47,10 +47,9 @@ def predict(
     """Motion `time` [s] later under a constant force [N] and moment [N m], by the midpoint rule.
 
     Both include the disturbance; `friction` [N] is that of the seal beyond the model's f, `turning`
-    [N m] what resists turning, and `aside` [m/s] how fast the wheels give way to the left. Below
-    `SLOW`, where the sign of a measured speed is chance, friction is taken to balance what
-    pushes, up to all of it: while that suffices the speed stays as it is, rather than being braked
-    to rest (docs/theory.md, §8.2).
+    [N m] what resists turning, and `aside` [m/s] how fast the wheels give way to the left.
+    Friction ends a motion and reverses none; at rest it balances what pushes, up to all of it
+    (docs/theory.md, §8.2).
     """
     mass, inertia, modelled, weight = climber.inertial
     friction = modelled + friction
@@ -62,7 +61,7 @@ def predict(
     c, s, heading, cosine, sine = swept(heading, cosine, sine, halfway, angle)
     push = force - weight * s
     # sliding, friction is all of f, against the motion; at rest, as much as is pushed against it
-    rubbing, slides = with_sign_of(friction, v), abs(v) > SLOW
+    rubbing, slides = with_sign_of(friction, v), v != 0.0
     if not (slides is True or everywhere(slides)):
         rubbing = select(slides, rubbing, clipped(push, -friction, friction))
     v_1 = (push - rubbing) / mass + omega * aside

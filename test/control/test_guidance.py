@@ -34,7 +34,7 @@ def state_at(gains, v_d, e_x, e_y, speed, yaw_rate):
 
 
 def wanted_speed(gains, v_d, e_x):
-    """w = v_d - L tanh(k_x e_x / L) [m/s]; the law's own is 0 where this is backwards."""
+    """w = v_d - L tanh(k_x e_x / L) [m/s]."""
     half = gains.fade_speed / 2
     behind = np.minimum(gains.catch_up_share * np.abs(v_d), gains.catch_up_speed)
     limit = np.hypot(np.where(e_x * v_d > 0, v_d, behind), half)
@@ -46,7 +46,7 @@ def approach(gains, v_d, e_x, e_y, omega_d):
     wanted = wanted_speed(gains, v_d, e_x)
     still = state_at(gains, v_d, e_x, e_y, 0.0 * e_x, omega_d)
     of_the_law = demanded(gains, still, on_a_circle(v_d, omega_d)).speed
-    np.testing.assert_allclose(of_the_law, np.maximum(wanted, 0.0), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(of_the_law, wanted, rtol=1e-9, atol=1e-12)
     state = state_at(gains, v_d, e_x, e_y, wanted, omega_d)
     v_x, v_y, _ = np.moveaxis(state.velocity, -1, 0)
     return e_x * (v_x - v_d + omega_d * e_y) + e_y * (v_y - omega_d * e_x)
