@@ -17,7 +17,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 PEAK_RATE = 15 / 8  # of p'
 PEAK_CHANGE = 10 / 3**0.5  # of p''
-ACCELERATION, YAW_ACCELERATION = 0.1, 1.0  # [m/s²], [rad/s²] that short moves do not exceed
+REACHING = 1.0, 0.5  # [s] in which a short move's acceleration would make the fastest speed, turn
 SHORTEST = 0.8  # [s] that a move takes
 POINT_PERIOD = 0.05  # [s]
 SHIFT = 5e-3  # [m] up to which it need not turn to drive there
@@ -65,8 +65,9 @@ class Approach:
         if not way.any():
             return None
         sizes = np.array([math.hypot(*way[:2]), abs(way[2])])
-        by_speed = PEAK_RATE * sizes / (self.approach_speed, self.approach_yaw_rate)
-        gently = np.sqrt(PEAK_CHANGE * sizes / (ACCELERATION, YAW_ACCELERATION))
+        fastest = np.array([self.approach_speed, self.approach_yaw_rate])
+        by_speed = PEAK_RATE * sizes / fastest
+        gently = np.sqrt(PEAK_CHANGE * sizes * REACHING / fastest)
         time, p, p_1, p_2 = _smooth(max(*by_speed, *gently, SHORTEST))
         rows = np.zeros((len(time), 10))
         rows[:, 0], rows[:, 1:4] = time, np.array([*place, first]) + p[:, None] * way

@@ -298,21 +298,34 @@ def test_a_reference_far_away_is_refused_in_words_until_one_is_near(loop):
     assert loop.tell() is Mode.FOLLOWING
 
 
+def rolls(loop, speed, yaw_rate):
+    """Have the climber go on from where it is, along an arc."""
+    begin, pose = loop.now, loop.state(loop.now).pose
+
+    def state(stamp):
+        time = (stamp - begin) / SECOND
+        turned = yaw_rate * time
+        along = pose[2] + turned / 2
+        way = speed * time * np.array([np.cos(along), np.sin(along)])
+        return State.rolling(pose + [*way, turned], speed, yaw_rate)
+
+    loop.state = state
+
+
 def runs_away(loop):
     """It is too fast for a moment, and rests from then on where it is."""
-    pose = loop.state(loop.now).pose
-    loop.state = lambda _: State.rolling(pose, 1.5, 0.5)
+    rolls(loop, 1.5, 0.5)
     assert loop.tell(times=3) is Mode.TOO_FAST
     assert is_safe(loop)
-    loop.state = lambda _: State(pose, np.zeros(3))
+    rolls(loop, 0.0, 0.0)
 
 
 def test_what_the_guard_found_is_over_when_the_climber_has_rested(loop):
     runs_away(loop)
     assert loop.tell(times=98) is Mode.TOO_FAST  # half a second
-    loop.state = lambda _, rest=loop.state: State.rolling(rest(0).pose, 0.021, 0.0)
+    rolls(loop, 0.021, 0.0)
     assert loop.tell(times=200) is Mode.TOO_FAST  # it creeps
-    loop.state = lambda _, creeps=loop.state: State(creeps(0).pose, np.zeros(3))
+    rolls(loop, 0.0, 0.0)
     assert loop.tell(times=98) is Mode.TOO_FAST
     assert loop.tell(times=4) is Mode.FOLLOWING
 

@@ -73,7 +73,7 @@ LIES = {  # and the most [rad/s] it may turn at the end, where nothing resists t
     "twist frozen": (frozen(twist=True), 0.3),
     "pose frozen": (frozen(pose=True), 0.1),
     "all frozen": (frozen(pose=True, twist=True), 0.3),
-    "heading mirrored": (told((1, 1, -1)), 0.05),
+    "heading mirrored": (told((1, 1, -1)), 0.1),
     "heading in degrees": (told((1, 1, 57.3)), 0.1),
     "heading turned by 90 degrees": (told(turned=np.pi / 2), 0.6),
     "pose in mm": (told((1000, 1000, 1)), 0.05),
