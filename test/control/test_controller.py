@@ -307,7 +307,7 @@ def rolls(loop, speed, yaw_rate):
         turned = yaw_rate * time
         along = pose[2] + turned / 2
         way = speed * time * np.array([np.cos(along), np.sin(along)])
-        return State.rolling(pose + [*way, turned], speed, yaw_rate)
+        return State.rolling(pose + np.array([*way, turned]), speed, yaw_rate)
 
     loop.state = state
 
