@@ -38,7 +38,7 @@ from climber_uk.messages.topics import (
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import given, read_file, read_sections
 from climber_uk.ros.running import ClimberNode
-from climber_uk.ros.transport import use_udp
+from climber_uk.ros.transport import free_domain, use_udp
 from climber_uk.system.command_line import Parser
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
@@ -281,7 +281,7 @@ def main() -> None:
         die_with(os.getppid())
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     use_udp()  # the nodes and the recorder inherit it
-    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    os.environ.setdefault("ROS_DOMAIN_ID", str(free_domain()))
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:
         for node in NODES:

@@ -4,6 +4,7 @@ docs/hardware.md, "Middleware", has the figures, and how to choose something els
 """
 
 import os
+import socket
 from collections.abc import MutableMapping
 from pathlib import Path
 
@@ -28,3 +29,19 @@ def use_udp(environment: MutableMapping[str, str] = os.environ) -> None:
     # the older variable goes before the range
     if environment.pop(ONLY_LOCAL, "0") == "1" or environment.get(RANGE) == "LOCALHOST":
         environment.update({RANGE: "SUBNET", PROFILES: str(LOCALHOST)})
+
+
+def free_domain() -> int:
+    """Return a ROS domain, 1 to 100, that nobody on this computer seems to be in."""
+    domains = [1 + (os.getpid() + number) % 100 for number in range(100)]
+    return next(filter(is_free, domains), domains[0])
+
+
+def is_free(domain: int) -> bool:
+    """Whether nobody on this computer has the port of a domain's first participant."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("", 7410 + 250 * domain))
+        except OSError:
+            return False
+    return True

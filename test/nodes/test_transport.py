@@ -6,7 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from climber_uk.ros.transport import LOCALHOST, ONLY_LOCAL, PROFILES, RANGE, TRANSPORTS, use_udp
+from climber_uk.ros.transport import (
+    LOCALHOST,
+    ONLY_LOCAL,
+    PROFILES,
+    RANGE,
+    TRANSPORTS,
+    free_domain,
+    use_udp,
+)
 
 UDP, LOCAL = {TRANSPORTS: "UDPv4"}, {RANGE: "SUBNET", PROFILES: str(LOCALHOST)}
 SHARED_MEMORY = "/dev/shm/fastrtps"
@@ -39,6 +47,16 @@ def test_udp_is_chosen_where_nothing_else_was_and_the_range_stays(before, after)
 
 def test_the_tests_themselves_have_the_transport_that_is_the_default():
     assert os.environ.items() >= (UDP | LOCAL).items()
+
+
+def test_a_demonstration_takes_a_domain_that_nobody_is_in(world):
+    """Two in the same one would drive each other's climber."""
+    mine = os.getpid()
+    for domain in (world.domain, free_domain()):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(os, "getpid", lambda at=domain: at - 1)  # which is where it looks first
+            assert (free_domain() == domain) == (domain != world.domain)
+    assert os.getpid() == mine
 
 
 ONCE = """

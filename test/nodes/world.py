@@ -3,7 +3,6 @@
 import itertools
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,6 +14,8 @@ from ament_index_python import PackageNotFoundError, get_package_prefix
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+
+from climber_uk.ros.transport import is_free
 
 OPTION = {False: "-p", True: "-r"}
 TIMEOUT = 120.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
@@ -32,16 +33,6 @@ def new_domain():
     domain = next(domain for domain in domains if is_free(domain))
     sweep(domain)
     return domain
-
-
-def is_free(domain):
-    """Whether nobody has the port of a domain's first participant."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("", 7410 + 250 * domain))
-        except OSError:
-            return False
-    return True
 
 
 def sweep(domain):
