@@ -81,12 +81,13 @@ class SideSlip(NamedTuple):
         faster, tighter = now.speed - before.speed, now.yaw_rate - before.yaw_rate
         aside -= time / 12 * (rate * faster - mean * tighter)
         v, scrubbing = abs(mean), _scrubbing(climber, now)
-        most = v + climber.half_track * abs(now.yaw_rate)  # a pose that jumps is no side slip
-        error = clipped(aside - self.creep * v - self.scrub * scrubbing, -most, most)
+        error = aside - self.creep * v - self.scrub * scrubbing
         by_creep, by_scrub = CREEP**2 * v, SCRUB**2 * scrubbing
         size = by_creep * v + by_scrub * scrubbing + (CREEP * SLOW_TO_LEARN) ** 2
         poles = min(bandwidth, FASTEST / time)
-        offset = self.offset + time * error
+        # a pose that jumps is no side slip; of noise, each difference takes back the last one
+        most = (v + climber.half_track * abs(now.yaw_rate)) / (2 * poles)
+        offset = clipped(self.offset + time * error, -most, most)
         gain = poles * poles * offset / size
         creep = clipped(self.creep + time * gain * by_creep, -LARGEST * CREEP, LARGEST * CREEP)
         scrub = clipped(self.scrub + time * gain * by_scrub, 0.0, LARGEST * SCRUB)

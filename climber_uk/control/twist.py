@@ -63,8 +63,9 @@ class TwistCheck:
         # [m²] sums of products, of the same two: pose's by twist's, pose's and twist's squares
         self._products = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         self._opposed = 0
-        # [m] of the same two, by pose while the twist is zero, and by twist while the pose stands
-        self._alone = (0.0, 0.0), (0.0, 0.0)
+        # of the same two: by pose while the twist is zero [m], the squares of its steps [m²], and
+        # by twist while the pose stands [m]
+        self._alone = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
         """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
@@ -90,8 +91,9 @@ class TwistCheck:
 
     def missing(self, largest: float) -> str:
         """Field of the twist that is zero while the pose goes; else ''."""
-        for name, (by_pose, _) in zip(FIELDS, self._alone, strict=True):
-            if abs(by_pose) > STILL_DISTANCE * largest:
+        for name, (by_pose, pose_2, _) in zip(FIELDS, self._alone, strict=True):
+            is_way = abs(by_pose) > STILL_DISTANCE * largest  # and not a noisy pose, at rest
+            if is_way and by_pose * by_pose > AT_LEAST * pose_2:
                 return name
         return ""
 
@@ -119,7 +121,7 @@ class TwistCheck:
         self._opposed = self._opposed + 1 if opposed else 0
         if self._opposed >= OPPOSED_IN_A_ROW:
             return opposed, True
-        if max(abs(by_twist) for _, by_twist in self._alone) > STILL_DISTANCE * largest:
+        if max(abs(by_twist) for *_, by_twist in self._alone) > STILL_DISTANCE * largest:
             return "the pose stands", False
         if slow := self.too_little(TOO_LITTLE_DISTANCE * largest):
             return slow, False
@@ -127,12 +129,10 @@ class TwistCheck:
         return (f"by {differs:.2f} m", False) if differs > largest else ("", False)
 
 
-def _alone(
-    sums: tuple[float, float], pose: float, twist: float, least: float, is_zero: bool
-) -> tuple[float, float]:
-    by_pose, by_twist = sums
-    tells_alone = pose == 0 and abs(twist) > least
-    return by_pose + pose if is_zero else 0.0, by_twist + twist if tells_alone else 0.0
+def _alone(sums: Products, pose: float, twist: float, least: float, is_zero: bool) -> Products:
+    by_pose, pose_2, by_twist = sums
+    by_twist = by_twist + twist if pose == 0 and abs(twist) > least else 0.0
+    return (by_pose + pose, pose_2 + pose * pose, by_twist) if is_zero else (0.0, 0.0, by_twist)
 
 
 def _summed(left: float, sums: Products, pose: float, twist: float) -> Products:

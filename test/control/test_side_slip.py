@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from climber_uk.closed_loop.simulate import sampled, simulate
+from climber_uk.closed_loop.simulate import Link, sampled, simulate
 from climber_uk.control.active_reference import KEPT_BEHIND
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
@@ -21,6 +21,7 @@ from climber_uk.mechanics.quantities import Motion, ReferencePoint, State, Torqu
 from climber_uk.mechanics.shapes import Circle, Line
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.simulation.sensors import Sensors
 
 CLIMBER = Climber(
     seal_friction_coefficient=0.6,
@@ -169,14 +170,33 @@ def test_a_heading_that_has_to_be_ahead_solves_its_equation(lead, coefficients):
 
 @given(st.floats(-0.5, 0.5))
 def test_a_pose_that_jumps_is_hardly_a_side_slip(jump):
-    before = Motion.at(0.0, 0.0, 0.3, 0.2, 0.1)
-    ahead = 0.2 * PERIOD
-    x, y = ahead * np.cos(0.3) - jump * np.sin(0.3), ahead * np.sin(0.3) + jump * np.cos(0.3)
-    after = Motion.at(float(x), float(y), 0.3, 0.2, 0.1)
-    slip = SideSlip().learnt(CLIMBER, before, after, PERIOD, 6.0)
-    for _ in range(200):
-        slip = slip.learnt(CLIMBER, after, after._replace(x=x + ahead), PERIOD, 0.0)
+    """Of a climber that goes straight on before and after."""
+    slip, before = SideSlip(), Motion.at(0.0, 0.0, 0.3, 0.2, 0.0)
+    for number in range(1, 200):
+        way = 0.2 * PERIOD * number
+        x, y = way * np.cos(0.3) - jump * np.sin(0.3), way * np.sin(0.3) + jump * np.cos(0.3)
+        now = Motion.at(float(x), float(y), 0.3, 0.2, 0.0)
+        slip, before = slip.learnt(CLIMBER, before, now, PERIOD, 6.0), now
+        assert abs(slip.creep) < 0.2
     assert abs(slip.creep) < 0.01
+
+
+@pytest.mark.parametrize(("noise", "most"), [(1e-3, 0.6e-3), (3e-3, 3e-3)])
+def test_noise_of_poses_is_no_side_slip_and_no_missing_twist(noise, most):
+    """The twist is that of encoders: exactly zero at rest, and clean under way."""
+    modes = set()
+
+    class Watched(Controller):
+        def on_odometry(self, *told):
+            answer = super().on_odometry(*told)
+            modes.add(self.mode)
+            return answer
+
+    controlling = Watched(Settings(ControlLaw(CLIMBER, GAINS), Observer()), approach=ANYWHERE)
+    link, start = Link(sensors=Sensors(position_noise=noise)), State(LINE.at(0).pose, np.zeros(3))
+    run = simulate(LINE, start, 8.0, controlling, CLIMBER, link)
+    assert modes == {Mode.FOLLOWING}
+    assert run.rms() < most
 
 
 def test_resisted_turns_end_and_do_not_begin_below_the_resistance():
