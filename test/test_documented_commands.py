@@ -64,7 +64,7 @@ def of(*programs):
 
 def check_files(words):
     """Assert that files which are named are in the repository, or are somebody's own."""
-    for word in words:
+    for word in " ".join(words).split():
         path = word.split("=")[-1]
         if re.search(r"/|\.(yaml|csv|py)$", path) and not PLACEHOLDER.fullmatch(
             path.strip("/").split("/")[0]

@@ -34,8 +34,8 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
-CLEARLY = 4.0  # as many times `friction_speed` is a speed whose friction is overcome in full
-RESTS = 1.0  # of `friction_speed`: speed of a reference that may as well rest
+CLEARLY = 8.0  # as many times `friction_speed` is a speed whose friction is overcome in full
+RESTS = 3.0  # of `friction_speed`: speed of a reference that may as well rest
 TURN_SPEED = 0.05  # [rad/s] of a wanted yaw rate below which what resists turning fades
 Solve = Callable[..., tuple[Any, Any, Any, Any]]  # force, moment, v̇, yaw rate wanted
 
