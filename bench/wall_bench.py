@@ -58,13 +58,13 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", help="of the rows, those that begin so")
     options = parser.parse_args()
     rows = load((HERE / "wall_bench.yaml").read_text())
-    print(f"{'':32}" + "".join(f"{name:>15}" for name in HEAD))
+    print(f"{'':36}" + "".join(f"{name:>15}" for name in HEAD))
     for name, changes in rows.items():
         if options.only and not name.startswith(tuple(options.only)):
             continue
         with TemporaryDirectory() as folder:
             run = drive(changes, options.controller, Path(folder))
-        print(f"{name:32}" + "".join(f"{text:>15}" for text in numbers(run)), flush=True)
+        print(f"{name:36}" + "".join(f"{text:>15}" for text in numbers(run)), flush=True)
 
 
 if __name__ == "__main__":
