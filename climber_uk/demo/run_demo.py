@@ -281,7 +281,9 @@ def main() -> None:
         die_with(os.getppid())
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     use_udp()  # the nodes and the recorder inherit it
-    os.environ.setdefault("ROS_DOMAIN_ID", str(free_domain()))
+    if "ROS_DOMAIN_ID" not in os.environ:
+        domain, _reserved = free_domain()  # as long as this lasts
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:
         for node in NODES:

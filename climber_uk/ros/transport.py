@@ -13,6 +13,8 @@ TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 # up to Jazzy, which is what the wheels are, and from Kilted on; distributions go by the alphabet
 BOTH_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"
 PROFILES = BOTH_PROFILES[os.environ.get("ROS_DISTRO", "jazzy") > "jazzy"]
+# ports of domain 0, of which each domain has 250: one that DDS leaves free, and its first
+MARK, FIRST_PARTICIPANT = 7405, 7410
 RANGE, ONLY_LOCAL = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
 
 
@@ -31,17 +33,26 @@ def use_udp(environment: MutableMapping[str, str] = os.environ) -> None:
         environment.update({RANGE: "SUBNET", PROFILES: str(LOCALHOST)})
 
 
-def free_domain() -> int:
-    """Return a ROS domain, 1 to 100, that nobody on this computer seems to be in."""
+def free_domain() -> tuple[int, socket.socket | None]:
+    """Return a ROS domain, 1 to 100, that nobody on this computer is in, and what reserves it.
+
+    Without a free one it is any, and not reserved.
+    """
     domains = [1 + (os.getpid() + number) % 100 for number in range(100)]
-    return next(filter(is_free, domains), domains[0])
+    for domain in domains:
+        if mark := reserved(domain):
+            return domain, mark
+    return domains[0], None
 
 
-def is_free(domain: int) -> bool:
-    """Whether nobody on this computer has the port of a domain's first participant."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("", 7410 + 250 * domain))
-        except OSError:
-            return False
-    return True
+def reserved(domain: int) -> socket.socket | None:
+    """Return what reserves a ROS domain while it is open; None if another has it, or is in it."""
+    mark = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        mark.bind(("127.0.0.1", MARK + 250 * domain))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("", FIRST_PARTICIPANT + 250 * domain))
+    except OSError:
+        mark.close()
+        return None
+    return mark

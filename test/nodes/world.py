@@ -15,7 +15,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from climber_uk.ros.transport import is_free
+from climber_uk.ros.transport import reserved
 
 OPTION = {False: "-p", True: "-r"}
 TIMEOUT = 120.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
@@ -28,11 +28,18 @@ DOMAINS = itertools.count(os.getppid() * WORKERS + WORKER, WORKERS)
 
 
 def new_domain():
-    """Return a ROS domain that no other test of this run has, nor anybody else now."""
-    domains = (number % (100 - 100 % WORKERS) + 1 for number in DOMAINS)
-    domain = next(domain for domain in domains if is_free(domain))
-    sweep(domain)
+    """Return a ROS domain that nobody else is in now."""
+    domain, mark = reserved_domain()
+    mark.close()
     return domain
+
+
+def reserved_domain():
+    """Return a ROS domain that nobody else has, and what reserves it until that is closed."""
+    domains = (number % (100 - 100 % WORKERS) + 1 for number in DOMAINS)
+    domain, mark = next((domain, mark) for domain in domains if (mark := reserved(domain)))
+    sweep(domain)
+    return domain, mark
 
 
 def sweep(domain):
@@ -73,7 +80,7 @@ class World:
     """One ROS domain with the processes started in it, and a node of the test's own."""
 
     def __init__(self, directory):
-        self.domain = new_domain()
+        self.domain, self.mark = reserved_domain()
         self.environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain)}
         self.directory = directory
         self.processes = {}
@@ -182,3 +189,4 @@ class World:
         self.executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
+        self.mark.close()
