@@ -29,8 +29,9 @@ class Waiting(Climb):
     def __init__(self, world, changed=None, usual=LOCK_STEP):
         changed = changed or {}
         parameters = {name: [*usual[name], *changed.get(name, [])] for name in usual}
-        super().__init__(world, parameters)
+        # before there are nodes: what they say first counts
         self.positions = world.hear(TimeReference, "reference_time", 1000)
+        super().__init__(world, parameters)
         self._seen = 0  # number of the position that was waited for
 
     def enable(self, enabled):
@@ -177,7 +178,8 @@ def test_a_start_3_m_off_is_refused_in_words(world):
 def test_a_start_that_is_allowed_to_be_far_off_is_approached_at_its_speed(world):
     allowed = ["max_start_distance:=2.0", "approach_speed:=0.8"]
     climb = Waiting(world, {PLANT: ["initial_y:=1.5"], CONTROLLER: allowed})
-    climb.is_in("approaching")
+    said = "approaching the reference (1.50 m away)"  # before we are heard of, perhaps
+    world.wait(lambda: said in world.log(CONTROLLER), said)
     climb.is_in("following")
     assert climb.fastest() < 0.84
     begin = climb.now
