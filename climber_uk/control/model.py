@@ -66,7 +66,7 @@ def predict(
         rubbing = select(slides, rubbing, clipped(push, -friction, friction))
     v_1 = (push - rubbing) / mass + omega * aside
     displacement, end = time * (v + half * v_1), v + time * v_1
-    stops = v * end < 0
+    stops = slides & (with_sign_of(1.0, v) * end < 0)  # v * end may be too small for a number
     if stops is not False and anywhere(stops):  # friction ends a motion, and does not reverse it
         left = time + v / select(stops, v_1, 1.0)
         back_1 = (push - clipped(push, -friction, friction)) / mass
