@@ -1,6 +1,5 @@
 """Report of a campaign: shares of runs that broke a limit, quantiles, and the worst runs."""
 
-import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -16,17 +15,15 @@ from climber_uk.mechanics import Array
 from climber_uk.messages.topics import PLANT
 
 QUANTILES = {"lowest": 0.0, "1 %": 0.01, "50 %": 0.5, "99 %": 0.99, "highest": 1.0}
-NORMAL_QUANTILE = 1.959963984540054  # of 97.5 %
 WORST = 3  # runs that are reported for each limit
 
 
 def wilson(count: int, number: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a probability, of `count` events in `number` trials."""
-    share, square = count / number, NORMAL_QUANTILE**2
-    middle = share + square / (2 * number)
-    half = NORMAL_QUANTILE * math.sqrt(share * (1 - share) / number + square / (2 * number) ** 2)
-    low, high = ((middle + side) / (1 + square / number) for side in (-half, half))
-    return max(low, 0.0), min(high, 1.0)
+    from scipy.stats import binomtest  # slow to import
+
+    interval = binomtest(count, number).proportion_ci(confidence_level=0.95, method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def broken(limits: Sequence[Limit], batch: dict[str, Array]) -> Any:

@@ -223,7 +223,7 @@ class Guard:
     def _let_go(self, climber: Climber, observed: Observed) -> float:
         """Speed [m/s] at which friction may let go of it before a torque can answer.
 
-        None soon after a fault: what was wrong may be so still.
+        It is 0 soon after a fault: what was wrong may be so still.
         """
         before, after = observed.before.speed, observed.after.speed
         rests = abs(after) < MOVES or before * after < 0

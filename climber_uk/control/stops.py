@@ -65,7 +65,7 @@ class Stops:
 
     def __init__(self, options: StopOptions | None = None) -> None:
         self.options = options or StopOptions()
-        self.way = 0.0  # [m] on the wall, since it was enabled
+        self.way = 0.0  # [m] on the wall, since the start, or since its end was forgiven
         self._lasting: Trouble | None = None  # the last cause
         self._pressed: Trouble | None = None  # what the emergency stop says now
         self._battery: Trouble | None = None  # what that says now
@@ -73,8 +73,10 @@ class Stops:
         self._counted: Motion | None = None  # up to where the way is counted
 
     def enable(self) -> None:
-        """Forgive what is over, and count the tether's way anew."""
-        self._lasting, self.way = self._pressed or self._battery, 0.0
+        """Forgive what is over; where the tether ended the way, it is counted anew."""
+        if self._lasting is not None and self._lasting[0] is Mode.TETHER:
+            self.way = 0.0
+        self._lasting = self._pressed or self._battery
 
     def press(self, is_pressed: bool, now: int) -> None:
         """Take what the emergency stop says."""

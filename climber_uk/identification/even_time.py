@@ -25,7 +25,10 @@ def rate(time: Array, gone: Array, smoothing: float) -> Array:
         half = min(max(2, round(smoothing / step)), (len(values) - 1) // 2)
         if half < 2:
             return np.gradient(values, step) if len(values) > 1 else 0 * values
-        return _slopes(values, half) / step
+        from scipy.signal import savgol_filter  # slow to import
+
+        smooth: Array = savgol_filter(values, 2 * half + 1, 3, deriv=1, delta=step)
+        return smooth
 
     return _evenly(time, gone, slope)
 
@@ -44,19 +47,6 @@ def lagging(time: Array, values: Array, lag: float) -> Array:
         return late
 
     return _evenly(time, values, filtered)
-
-
-def _slopes(values: Array, half: int) -> Array:
-    """Derivative (n,), per sample, of the cubic fitted to each sample and `half` to either side.
-
-    Those at the ends share the first and the last cubic.
-    """
-    samples = np.linspace(-1.0, 1.0, 2 * half + 1)
-    cubic = np.linalg.pinv(np.vander(samples, 4))
-    slopes: Array = np.convolve(values, cubic[2, ::-1], "same")
-    for end, own in (np.s_[: 2 * half + 1], np.s_[:half]), (np.s_[-2 * half - 1 :], np.s_[-half:]):
-        slopes[own] = np.polyval(np.polyder(cubic @ values[end]), samples[own])
-    return slopes / half
 
 
 def _evenly(time: Array, values: Array, function: Callable[[Array, float], Array]) -> Array:

@@ -135,13 +135,14 @@ class UkTorqueController(ManagedNode):
 
     def listen(self) -> list[Subscription]:
         """Reset the controller to its safe output, and subscribe all inputs."""
+        stops = self.controller.stops
         self.controller = build_controller(self.parameters, self.pressure)
+        self.controller.stops = stops  # a button that is pressed stays so
         self.controller.enable(False)
-        stops = self.controller.stops.options
         inputs = []
-        if stops.emergency_stop:
+        if stops.options.emergency_stop:
             inputs.append(self.subscription(Bool, EMERGENCY_STOP, self.on_emergency_stop))
-        if stops.reads_battery:
+        if stops.options.reads_battery:
             battery = self.subscription(BatteryState, BATTERY, self.on_battery, BEST_EFFORT)
             inputs.append(battery)
         return [

@@ -95,7 +95,17 @@ def test_the_tether_ends_the_way_and_is_counted_anew_when_enabled():
     assert loop.tell(times=20) is Mode.TETHER
     assert stops.way == pytest.approx(0.5, abs=0.02)
     loop.controller.enable(True)
+    assert stops.way == 0.0
     assert loop.tell() is Mode.FOLLOWING
+
+
+def test_another_stop_that_is_forgiven_gives_no_more_tether():
+    loop, stops = stopped(tether_length=0.5, **ON)
+    assert loop.tell(times=100) is Mode.FOLLOWING
+    stops.press(True, loop.now)
+    stops.press(False, loop.now)
+    loop.controller.enable(True)
+    assert loop.tell(times=110) is Mode.TETHER
 
 
 def test_a_pose_that_trembles_goes_no_way():

@@ -352,6 +352,14 @@ def test_an_emergency_stop_lasts_until_it_is_enabled_and_a_low_battery_stops_it(
     button.publish(Bool(data=True))
     loop.is_safe()
     world.wait(lambda: "safe output: emergency stop (pressed)" in world.log(NAME), "word of it")
+    speakers = button, battery, loop.odometry, loop.reference
+    # a button stays pressed over these
+    for label, heard in (("deactivate", 1), ("cleanup", 0), ("configure", 1), ("activate", 1)):
+        change = ChangeState.Request(transition=Transition(label=label))
+        assert world.call(ChangeState, f"{NAME}/change_state", change).success
+        world.wait(lambda n=heard: {s.get_subscription_count() for s in speakers} == {n}, label)
+    loop.plan()
+    loop.is_safe()
     button.publish(Bool(data=False))
     battery.publish(BatteryState(percentage=87.0, voltage=24.0))
     world.wait(lambda: "battery_state: refused (percentage=87" in world.log(NAME), "a refusal")
