@@ -359,7 +359,9 @@ def test_an_emergency_stop_lasts_until_it_is_enabled_and_a_low_battery_stops_it(
         assert world.call(ChangeState, f"{NAME}/change_state", change).success
         world.wait(lambda n=heard: {s.get_subscription_count() for s in speakers} == {n}, label)
     loop.plan()
-    loop.is_safe()
+    seen = len(loop.torques)
+    world.wait(lambda: loop.tell() and len(loop.torques) > seen + 50, "answers")
+    assert not any(any(message.effort) for message in loop.torques[seen:])
     button.publish(Bool(data=False))
     battery.publish(BatteryState(percentage=87.0, voltage=24.0))
     world.wait(lambda: "battery_state: refused (percentage=87" in world.log(NAME), "a refusal")
