@@ -20,7 +20,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 MASS, INERTIA, RADIUS, HALF_TRACK, WEIGHT, FRICTION = 5.0, 0.33, 0.027, 0.3, 49.05, 57.6
 ALONG, ACROSS, HEADING = 2.0, 15.0, 6.0  # gains of Kanayama's law [1/s, 1/m², 1/m]
 SPEED, YAW_RATE, INTEGRAL = 20.0, 20.0, 60.0  # gains of the PI [1/s, 1/s, 1/s²]
-MOST = 4.0  # [N m] of a wheel
+MOST, MOST_SUM = 4.0, 12.0  # [N m] of a wheel; [m/s², rad/s²] of an integral
+LOST = 0.3  # [m] from the reference
 
 
 class OwnController(Node):
@@ -43,7 +44,7 @@ class OwnController(Node):
         """Answer with torques, in the wall's frame: x horizontal, y up."""
         now = seconds(odometry.header.stamp)
         step, self.last = now - (self.last or now), now
-        force, moment = self.law(odometry, now, step) if self.points else (0.0, 0.0)
+        force, moment = self.law(odometry, now, step)
         halves = force / 2 - moment / HALF_TRACK / 2, force / 2 + moment / HALF_TRACK / 2
         answer = JointState(name=["left_wheel_joint", "right_wheel_joint"])
         answer.header.stamp = odometry.header.stamp
@@ -51,26 +52,31 @@ class OwnController(Node):
         self.torques.publish(answer)
 
     def law(self, odometry: Odometry, now: float, step: float) -> tuple[float, float]:
-        """Force [N] and moment [N m]."""
+        """Force [N] and moment [N m]; without a reference that is near, those that brake."""
         place, heading = odometry.pose.pose.position, yaw(odometry.pose.pose.orientation)
         v, w = odometry.twist.twist.linear.x, odometry.twist.twist.angular.z
-        point = min(self.points, key=lambda p: abs(self.start + seconds(p.time_from_start) - now))
-        there, turn = point.transforms[0].translation, yaw(point.transforms[0].rotation)
-        v_d = math.hypot(point.velocities[0].linear.x, point.velocities[0].linear.y)
-        w_d = point.velocities[0].angular.z
-        dx, dy = there.x - place.x, there.y - place.y
-        e_x = dx * math.cos(heading) + dy * math.sin(heading)
-        e_y = dy * math.cos(heading) - dx * math.sin(heading)
-        off = math.remainder(turn - heading, math.tau)
+        v_d = w_d = e_x = e_y = off = 0.0
+        if self.points:
+            point = min(
+                self.points, key=lambda p: abs(self.start + seconds(p.time_from_start) - now)
+            )
+            there, turn = point.transforms[0].translation, yaw(point.transforms[0].rotation)
+            dx, dy = there.x - place.x, there.y - place.y
+            if math.hypot(dx, dy) < LOST:  # it may fail, but not run away
+                v_d = math.hypot(point.velocities[0].linear.x, point.velocities[0].linear.y)
+                w_d = point.velocities[0].angular.z
+                e_x = dx * math.cos(heading) + dy * math.sin(heading)
+                e_y = dy * math.cos(heading) - dx * math.sin(heading)
+                off = math.remainder(turn - heading, math.tau)
         errors = (
             v_d * math.cos(off) + ALONG * e_x - v,
             w_d + v_d * (ACROSS * e_y + HEADING * math.sin(off)) - w,
         )
-        self.sums = [s + INTEGRAL * e * step for s, e in zip(self.sums, errors, strict=True)]
+        sums = (s + INTEGRAL * e * step for s, e in zip(self.sums, errors, strict=True))
+        self.sums = [max(-MOST_SUM, min(MOST_SUM, s)) for s in sums]
         force = MASS * (SPEED * errors[0] + self.sums[0]) + WEIGHT * math.sin(heading)
-        return force + FRICTION * math.tanh(v_d / 0.01), INERTIA * (
-            YAW_RATE * errors[1] + self.sums[1]
-        )
+        force += FRICTION * math.tanh(v_d / 0.01)
+        return force, INERTIA * (YAW_RATE * errors[1] + self.sums[1])
 
 
 def seconds(time: Time | Duration) -> float:
