@@ -129,9 +129,9 @@ INLINE Wrench wanted_of(const Law *k, const Track *t, Motion found, Wrench held,
   Motion aim = predicted(p, found, push, period / 2, r.friction);
   double v_1, turning, speed;
   demand(&k->gains, t, aim, &v_1, &turning, &speed);
-  double comes = 8 * t->v / (fabs(t->v) + 3 * k->friction_speed);
+  double comes = 8 * t->v / (fabs(t->v) + 5 * k->friction_speed);
   double fast = clip(speed / k->friction_speed, -8, 8), waits = clip(1 + fast * comes / 8, 0, 1);
-  double rub = (p->friction + r.friction) * tanh(waits * (fast + comes));
+  double rub = (p->friction + r.friction) * tanh(0.8 * waits * (fast + comes));
   Wrench wanted = {p->mass * v_1 + rub + p->weight * aim.sine - r.force,
                    p->inertia * turning - r.turn};
   return wanted;

@@ -35,7 +35,8 @@ from climber_uk.parameters.declaration import parameter, parameters
 NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
 CLEARLY = 8.0  # as many times `friction_speed` is a speed whose friction is overcome in full
-RESTS = 3.0  # of `friction_speed`: speed of a reference that may as well rest
+SLOPE = 0.8  # of friction's share by relative speed: steeper, and torques change faster
+RESTS = 5.0  # of `friction_speed`: speed of a reference that may as well rest
 TURN_SPEED = 0.05  # [rad/s] of a wanted yaw rate below which what resists turning fades
 Solve = Callable[..., tuple[Any, Any, Any, Any]]  # force, moment, v̇, yaw rate wanted
 
@@ -186,7 +187,7 @@ class ControlLaw:
         """
         relative = clipped(speed / self.options.friction_speed, -CLEARLY, CLEARLY)
         waits = clipped(1.0 + relative * comes / CLEARLY, 0.0, 1.0)
-        return tanh(waits * (relative + comes))
+        return tanh(SLOPE * waits * (relative + comes))
 
     def comes(self, target: ReferencePoint) -> Any:
         """How clearly a reference moves: ±`CLEARLY` forwards, backwards, and 0 at rest."""

@@ -9,7 +9,7 @@ from under_way import Travelling
 from climber_uk.control.safety import Mode
 from climber_uk.planning.given_path import planned
 
-JUMP = 0.21  # [N m] from one odometry to the next, 5 ms later
+JUMP = 0.2  # [N m] from one odometry to the next, 5 ms later
 
 
 def some_path(random, place=None):
