@@ -275,6 +275,7 @@ def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     assert 5 < run.time[-1] < 20  # that of the configuration
     assert np.median(run.distance[run.time > 4.0]) < 0.05
     assert np.median(np.abs(run.error[:, 1])) < 0.05
+    assert run.distance.max() < 0.3  # where the guard is late, too: it does not run away
 
 
 def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_path):
