@@ -11,6 +11,7 @@ from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from test_uk_torque_controller import Loop
+from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
@@ -34,8 +35,11 @@ WALL_CLOCK = {  # patient, and not often: what is slow here is the machine
     ],
     PLANNER: ["rest_to_rest.ramp_time:=1.0"],
 }
-LOCK_STEP = {  # at half the rate, for half the time
-    PLANT: ["simulated_time:=true", "lockstep_timeout:=2.0", "control_period:=0.01"],
+LOCK_STEP = {  # at half the rate, for half the time; from the moment on that the test listens
+    PLANT: [
+        *("simulated_time:=true", "lockstep_timeout:=2.0", "control_period:=0.01"),
+        "wait_for:=test",
+    ],
     CONTROLLER: ["use_sim_time:=true", "control_period:=0.01", *QUICK_APPROACH],
     PLANNER: ["use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"],
 }
@@ -65,12 +69,13 @@ class Climb:
 
     def __init__(self, world, parameters):
         self.world, self.parameters = world, parameters
+        self.torques = world.hear(JointState, "wheel_torques")
+        self.joints = world.hear(JointState, "joint_states")
+        self.odometry = world.hear(Odometry, "odom")
+        self.reference = world.hear(MultiDOFJointTrajectory, "reference")
+        self.errors = world.hear(Vector3Stamped, f"{CONTROLLER}/tracking_error")
         for name in parameters:
             self.start(name)
-        self.torques = world.listen(JointState, "wheel_torques")
-        self.joints = world.listen(JointState, "joint_states")
-        self.odometry = world.listen(Odometry, "odom")
-        self.errors = world.listen(Vector3Stamped, f"{CONTROLLER}/tracking_error")
 
     def start(self, name, *others):
         self.world.start_node(name, *self.parameters[name], *others, config="climber.yaml")
