@@ -170,7 +170,9 @@ def test_odometry_that_waited_for_it_is_no_older(world):
 def test_when_it_is_interrupted_its_last_word_is_no_torque(world):
     slow = "control_period:=0.02"
     paced = "simulated_time:=true", "real_time_factor:=1.0"  # it is interrupted in mid-course
-    world.start_node("plant_simulator", *paced, "command_timeout:=60.0", slow, config="climber.yaml")
+    world.start_node(
+        "plant_simulator", *paced, "command_timeout:=60.0", slow, config="climber.yaml"
+    )
     told = world.hear(JointState, "wheel_torques")
     sim_time = (*PARAMETERS, "-p", "use_sim_time:=true", "-p", slow)
     world.start("check_driver", "--move", "--duration", "0.5", *sim_time)
