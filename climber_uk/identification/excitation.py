@@ -130,8 +130,10 @@ def driven(trajectory: Trajectory, climber: Climber) -> tuple[RecordedMotion, Ar
     reference = trajectory.at(time)
     heading, speed = np.unwrap(reference.heading), reference.speed
     resisted = climber.seal_friction * sign(speed) + climber.weight_along_wall * sin(heading)
-    force = climber.mass * reference.forward_acceleration + resisted
-    torques = climber.wheel_torques(force, climber.yaw_inertia * unpack(reference.acceleration)[2])
+    force = climber.driven_mass * reference.forward_acceleration + resisted
+    torques = climber.wheel_torques(
+        force, climber.driven_inertia * unpack(reference.acceleration)[2]
+    )
     motion = RecordedMotion(
         time=time,
         pose=np.column_stack([reference.pose[:, :2], heading]),
