@@ -255,7 +255,7 @@ class ControlLaw:
             A, b = rows(state, desired, ratio, 0.0 if course is None else course.rate)
         direction = self.direction(speed, comes)
         Q = self.climber.applied_force(heading, direction)
-        Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
+        Qc = constraint_force(self.climber.mass_matrix_at(heading), Q, A, b)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
         v_1 = (
             along(heading, Q + Qc) / self.climber.driven_mass

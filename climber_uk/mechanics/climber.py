@@ -86,8 +86,18 @@ class Climber:
 
     @cached_property
     def mass_matrix(self) -> Array:
-        """M = diag(m, m, J), (3, 3), with rotors: across, where they do not turn, wheels hold."""
-        return np.diag([self.driven_mass, self.driven_mass, self.driven_inertia])
+        """M = diag(m, m, J), (3, 3), of a climber without rotors, as the paper's."""
+        return np.diag([self.mass, self.mass, self.yaw_inertia])
+
+    def mass_matrix_at(self, heading: Array) -> Array:
+        """M (..., 3, 3) with the rotors, which turn as it goes along its heading, not across."""
+        M = np.zeros((*np.shape(heading), 3, 3)) + np.diag([self.mass, self.mass, 0.0])
+        rims, (c, s) = self.driven_mass - self.mass, (cos(heading), sin(heading))
+        M[..., 0, 0] += rims * c * c
+        M[..., 1, 1] += rims * s * s
+        M[..., 0, 1] = M[..., 1, 0] = rims * c * s
+        M[..., 2, 2] = self.driven_inertia
+        return M
 
     @cached_property
     def driven_mass(self) -> float:
