@@ -117,7 +117,7 @@ def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
     if not found.sought[NAMES.index(ROTORS)]:
         yield (
             ROTORS,
-            Reason("absent", "acceleration and weight, if there is any, tell the same mass"),
+            Reason("absent", "none shows beside the mass"),
         )
     if not found.sought[NAMES.index("viscous_friction")]:
         together = f"{found.friction:.3g} N at {found.extent.speed:.3g} m/s"
