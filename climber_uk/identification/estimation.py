@@ -50,6 +50,7 @@ SPREAD = 0.05  # of the speed: least difference of speeds that shows viscous fri
 REJECTIONS = 3  # times that windows are left out
 SURE = 4.0  # standard deviations, above which rotors are significant
 LEAST_ROTORS = 0.03  # of the inertia: a wall that is not as steep as assumed shows as much
+EXPLAINED = 0.05  # of what is lacking, that rotors may leave
 # [SI] of speed, way; yaw rate, heading; way; heading: noise to begin with, and a tenth of it is the
 # least that is assumed of a sensor.
 NOISE = {DRIVE: (1e-2, 1e-3), YAW: (1e-2, 1e-3), WAY: (1e-3,), HEADING: (1e-3,)}
@@ -68,12 +69,16 @@ def identify(
     if (count := len(task.windows[DRIVE])) < LEAST_WINDOWS:
         raise ValueError(f"{count} windows of {cut.window} s in motion must be >= {LEAST_WINDOWS}")
     columns = _columns(task.extent)
-    rotors = (*columns[DRIVE], WEIGHTLESS)
-    _, fits = task.fitted({DRIVE: (*rotors, LATE)})
-    if _shows_rotors(fits[DRIVE], len(rotors) - 1, climber.rotor_inertia > 0):
-        columns = {**columns, DRIVE: rotors}
     first = {kind: (*columns[kind], LATE) for kind in task.kinds if kind in (DRIVE, YAW)}
     usual, fits = task.fitted(first)
+    rotors = (*columns[DRIVE], WEIGHTLESS)
+    of_rotors, more = task.fitted({DRIVE: (*rotors, LATE)})
+    if _shows_rotors(more[DRIVE], len(rotors) - 1, fits[DRIVE], climber.rotor_inertia > 0):
+        columns, fits = {**columns, DRIVE: rotors}, {**fits, **more}
+        first[DRIVE], usual = (
+            (*rotors, LATE),
+            replace(usual, windows={**usual.windows, **of_rotors.windows}),
+        )
     late = lateness(fits, columns, lambda delay, lag: usual.acting(delay, lag).equations)
     if late != IN_TIME:  # and the coefficient by which that may still be wrong
         task, columns = task.acting(*late), {**columns, **first}
@@ -185,10 +190,16 @@ def _columns(extent: Extent) -> dict[str, tuple[int, ...]]:
     return {**both, WAY: (0,), HEADING: (0,)}
 
 
-def _shows_rotors(fit: WindowFit, number: int, expected: bool) -> bool:
-    """Whether a coefficient of the fit shows rotors: inertia that has no weight."""
+def _shows_rotors(fit: WindowFit, number: int, without: WindowFit, expected: bool) -> bool:
+    """Whether a coefficient of the fit shows rotors: inertia that has no weight.
+
+    Where they are not `expected`, they must explain what the fit `without` them does not.
+    """
     share, error = -float(fit.coefficients[number]), SURE * fit.deviation(number)
-    return error < 1.0 if expected else share > max(LEAST_ROTORS, error)
+    if expected:
+        return error < 1.0
+    (left, *_), (lacking, *_) = fit.misfit.excess, without.misfit.excess
+    return max(LEAST_ROTORS, error) < share < 1.0 and bool(left < EXPLAINED * lacking)
 
 
 def _fitted(
