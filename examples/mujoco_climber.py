@@ -140,7 +140,8 @@ class Model:
     def tyres(self, radius: float) -> Iterator[tuple[str, str]]:
         """Wheels, and their contacts."""
         climber, grip = self.parts.plant.climber, self.parts.plant.contact.grip
-        spin, mu = grip.wheel_inertia / len(self.footholds), grip.wheel_friction_coefficient
+        spin = (grip.wheel_inertia + climber.rotor_inertia) / len(self.footholds)
+        mu = grip.wheel_friction_coefficient
         for name, (x, y) in self.wheels.items():
             body = (
                 f'<body name="{name}" pos="{x} {y} 0"><joint name="{name}" axis="0 1 0"/>'

@@ -28,16 +28,17 @@ ITERATIONS = 5  # of Newton's method to an instant within a step; each squares w
 class UnicycleModel(NamedTuple):
     """The parameters of (11) and (15), of one climber or of many."""
 
-    mass: Any  # [kg]
-    yaw_inertia: Any  # [kg m²]
+    mass: Any  # with what turns with the wheels [kg]
+    yaw_inertia: Any  # the same [kg m²]
     friction: Any  # f [N]
-    gravity: Any  # g_t along the wall, towards -y [m/s²]
+    gravity: Any  # that weight accelerates it by along the wall, towards -y [m/s²]
 
     @classmethod
     def of(cls, climber: Climber) -> "UnicycleModel":
         """Model of a climber whose parameters are floats, or arrays (N,)."""
-        gravity = GRAVITY * sin(climber.inclination * DEGREE)
-        return cls(climber.mass, climber.yaw_inertia, climber.seal_friction, gravity)
+        mass, inertia, friction, _ = climber.inertial
+        along = GRAVITY * sin(climber.inclination * DEGREE)
+        return cls(mass, inertia, friction, along * (climber.mass / mass))
 
     def under(self, wrench: Wrench) -> "Accelerations":
         """Accelerations by friction, gravity and a wrench [N, N m]."""

@@ -255,9 +255,12 @@ class ControlLaw:
             A, b = rows(state, desired, ratio, 0.0 if course is None else course.rate)
         direction = self.direction(speed, comes)
         Q = self.climber.applied_force(heading, direction)
-        Qc = constraint_force(self.climber.mass_matrix, Q, A, b)
+        Qc = constraint_force(self.climber.mass_matrix_at(heading), Q, A, b)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
-        v_1 = along(heading, Q + Qc) / self.climber.mass + ratio * motion.speed * motion.yaw_rate
+        v_1 = (
+            along(heading, Q + Qc) / self.climber.driven_mass
+            + ratio * motion.speed * motion.yaw_rate
+        )
         force, moment = along(heading, Qc) + friction * direction, unpack(Qc)[2] + scrubbing
         return force, moment, v_1, yaw_rate
 
@@ -282,9 +285,9 @@ class ControlLaw:
         climber, motion = self.climber, situation.motion
         weight = climber.weight_along_wall * motion.sine if braking.carries else 0.0
         shaken, shaken_yaw = braking.shaking
-        force = weight + climber.mass * (shaken - braking.drive * motion.speed)
+        force = weight + climber.driven_mass * (shaken - braking.drive * motion.speed)
         turning = shaken_yaw / climber.half_track - braking.yaw * motion.yaw_rate
-        moment = climber.yaw_inertia * turning
+        moment = climber.driven_inertia * turning
         return Torques(*climber.saturate(force, moment, *self._bounds(situation))[2:4])
 
     @cached_property

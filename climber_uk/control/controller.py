@@ -367,7 +367,9 @@ class Controller:
             command = law.command(ahead, point)
             lost = command.lost.force
             if abs(lost) > CUT and active.pacing.catch_up > 0:
-                target = active.slowed(target, lost / law.climber.mass, target_time, ahead.period)
+                target = active.slowed(
+                    target, lost / law.climber.driven_mass, target_time, ahead.period
+                )
                 command = law.command(ahead, target.point or point)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:

@@ -260,7 +260,7 @@ class Estimator:
         climber = self.climber
         force, moment = climber.wrench(*acting)
         lever = climber.half_track
-        accelerations = force / climber.mass, lever * moment / climber.yaw_inertia
+        accelerations = force / climber.driven_mass, lever * moment / climber.driven_inertia
         errors = measured.speed - expected.speed, lever * (measured.yaw_rate - expected.yaw_rate)
         sample = Sample(accelerations, errors, time, abs(measured.speed) > SLOW)
         self.latency.learn(sample, shares, self.timing.transport_delay)

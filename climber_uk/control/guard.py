@@ -231,7 +231,7 @@ class Guard:
         answered = observed.reaction + UNKNOWN_DELAY
         if self._since_rest > LETS_GO + answered or self._followed < self.options.memory:
             return 0.0
-        return climber.seal_friction / climber.mass * answered
+        return climber.seal_friction / climber.driven_mass * answered
 
     def _watch_limit(
         self, climber: Climber, observed: Observed, expected: Expected, torques: Torques

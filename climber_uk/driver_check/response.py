@@ -48,7 +48,7 @@ def expected_gain(climber: Climber) -> Array:
     """Accelerations (2,) per torque of the wheels of each pair: [m/s² / N m], [rad/s² / N m]."""
     force, _ = climber.force_and_moment(PAIR[0])
     _, moment = climber.force_and_moment(PAIR[1])
-    return np.array([force / climber.mass, moment / climber.yaw_inertia])
+    return np.array([force / climber.driven_mass, moment / climber.driven_inertia])
 
 
 def expected_rim_gain(climber: Climber) -> Array:

@@ -1,6 +1,8 @@
 """Parameters and their intervals, from the coefficients that were fitted.
 
-a = (1/(m r), μ/m, c/m)      b = (d/(J r), C/J, D/J)      and with wheel angles  r  and  r/d
+a = (1/(m' r), μ/m', c/m', m/m' - 1)   b = (d/(J' r), C/J', D/J')   and by wheel angles  r  and  r/d
+
+m' = m + 2 I/r² and J' = J + 2 I d²/r² with the inertia I of rotors, which have no weight.
 """
 
 from collections.abc import Mapping
@@ -23,22 +25,24 @@ from climber_uk.identification.identified import (
     Identified,
     Widths,
 )
+from climber_uk.identification.lateness import Columns
 from climber_uk.identification.window_fit import WindowFit
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
-FIRST = {DRIVE: 0, YAW: 3, WAY: 6, HEADING: 7}  # of the coefficients of each kind of equation
+FIRST = {DRIVE: 0, YAW: 4, WAY: 7, HEADING: 8}  # of the coefficients of each kind of equation
 VISCOUS, LATE = 2, 3  # columns of (11) and (15)
+WEIGHTLESS = 4  # of (11)
 QUANTILE = 0.975  # of intervals of 95 %
 SURE = 2.0  # half widths of its interval from zero, above which a friction is significant
-Columns = Mapping[str, tuple[int, ...]]
 
 
 class Given(NamedTuple):
-    """Geometry that wheel angles do not tell."""
+    """What the motion does not tell."""
 
     track: float | None = None  # half track of the contacts [m]
     radius: float | None = None  # [m]
+    rotors: float | None = None  # their inertia [kg m²]
 
 
 NONE = Given()
@@ -47,17 +51,23 @@ NONE = Given()
 def parameters(
     fits: Mapping[str, WindowFit], columns: Columns, climber: Climber, given: Given = NONE
 ) -> tuple[Array, Widths, Choice]:
-    """Values (8,), half widths, and which were sought, from the fits by kind of equation.
+    """Values (9,), half widths, and which were sought, from the fits by kind of equation.
 
     What is `given` is not taken from the wheel angles.
     """
     r, d = climber.wheel_radius, climber.half_track
-    coefficients = np.array([np.nan, 0, 0, np.nan, 0, 0, r, r / d])
+    coefficients = np.array([np.nan, 0, 0, 0, np.nan, 0, 0, r, r / d])
     sought, chosen = np.zeros(len(NAMES), bool), {}
     for kind, fit in fits.items():
-        chosen[kind] = [FIRST[kind] + column for column in columns[kind] if column != LATE]
+        chosen[kind] = [
+            FIRST[kind] + (3 if column == WEIGHTLESS else column)
+            for column in columns[kind]
+            if column != LATE
+        ]
         coefficients[chosen[kind]] = fit.coefficients[: len(chosen[kind])]
         sought[chosen[kind]] = True
+    if not sought[NAMES.index("rotor_inertia")]:
+        given = given._replace(rotors=climber.rotor_inertia)
     values, slopes = _parameters(coefficients, given), _slopes(coefficients, given)
     squares, white, bias = [], np.zeros(len(NAMES)), np.zeros(len(NAMES))
     freedom = np.full(len(NAMES), np.inf)  # windows more than coefficients
@@ -100,20 +110,25 @@ def with_scrub(found: Identified, columns: Columns, climber: Climber, slips: boo
 
 
 def _parameters(coefficients: Array, given: Given) -> Array:
-    """Parameters (8,) of coefficients (8,)."""
-    a_1, a_2, a_3, b_1, b_2, b_3, r, per_track = coefficients
+    """Parameters (9,) of coefficients (9,)."""
+    a_1, a_2, a_3, a_4, b_1, b_2, b_3, r, per_track = coefficients
     with np.errstate(all="ignore"):  # what was not fitted is not finite
         lever = given.radius or r
         d = lever / per_track
-        m, J = 1 / (lever * a_1), (given.track or d) / (lever * b_1)
-        return np.array([m, a_2 * m, a_3 * m, J, b_2 * J, b_3 * J, r, d])
+        track = given.track or d
+        m, J = 1 / (lever * a_1), track / (lever * b_1)  # with rotors
+        inertia = -a_4 * m * lever**2 / 2 if given.rotors is None else given.rotors
+        rotors = 2 * inertia / lever**2  # [kg] at the rims
+        own = m - rotors, J - rotors * track**2
+        return np.array([own[0], a_2 * m, a_3 * m, inertia, own[1], b_2 * J, b_3 * J, r, d])
 
 
 def _slopes(coefficients: Array, given: Given) -> Array:
-    """Derivatives of the parameters by the coefficients (8, 8); exact, by a complex step."""
+    """Derivatives of the parameters by the coefficients (9, 9); exact, by a complex step."""
     step = 1e-20
-    moved = [_parameters(coefficients + 1j * step * unit, given) for unit in np.eye(len(NAMES))]
-    slopes = np.stack(moved, axis=1).imag / step
+    moved = [coefficients + 1j * step * unit for unit in np.eye(len(NAMES))]
+    found = [_parameters(each, given) for each in moved]
+    slopes = np.stack(found, axis=1).imag / step
     return np.where(np.isfinite(slopes), slopes, 0.0)
 
 

@@ -11,7 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from climber_uk.identification.coefficients import LATE, VISCOUS, Columns, parameters, with_scrub
+from climber_uk.identification.coefficients import (
+    LATE,
+    VISCOUS,
+    WEIGHTLESS,
+    parameters,
+    with_scrub,
+)
 from climber_uk.identification.fit_test import lacks
 from climber_uk.identification.identified import (
     DRIVE,
@@ -32,7 +38,7 @@ from climber_uk.identification.integral_equations import (
     wheel_equations,
     yaw_equations,
 )
-from climber_uk.identification.lateness import DELAYS, lateness
+from climber_uk.identification.lateness import DELAYS, Columns, lateness
 from climber_uk.identification.recorded_motion import Indices, RecordedMotion
 from climber_uk.identification.verdict import reasons
 from climber_uk.identification.window_fit import FEW, WindowFit
@@ -42,6 +48,9 @@ from climber_uk.mechanics.climber import Climber
 CUT, SITE, LEAST_WINDOWS = Cut(), Site(), 5
 SPREAD = 0.05  # of the speed: least difference of speeds that shows viscous friction
 REJECTIONS = 3  # times that windows are left out
+SURE = 4.0  # standard deviations, above which rotors are significant
+LEAST_ROTORS = 0.03  # of the inertia: a wall that is not as steep as assumed shows as much
+EXPLAINED = 0.05  # of what is lacking, that rotors may leave
 # [SI] of speed, way; yaw rate, heading; way; heading: noise to begin with, and a tenth of it is the
 # least that is assumed of a sensor.
 NOISE = {DRIVE: (1e-2, 1e-3), YAW: (1e-2, 1e-3), WAY: (1e-3,), HEADING: (1e-3,)}
@@ -62,7 +71,15 @@ def identify(
     columns = _columns(task.extent)
     first = {kind: (*columns[kind], LATE) for kind in task.kinds if kind in (DRIVE, YAW)}
     usual, fits = task.fitted(first)
-    late = lateness(fits, lambda delay, lag: usual.acting(delay, lag).equations)
+    rotors = (*columns[DRIVE], WEIGHTLESS)
+    of_rotors, more = task.fitted({DRIVE: (*rotors, LATE)})
+    if _shows_rotors(more[DRIVE], len(rotors) - 1, fits[DRIVE], climber.rotor_inertia > 0):
+        columns, fits = {**columns, DRIVE: rotors}, {**fits, **more}
+        first[DRIVE], usual = (
+            (*rotors, LATE),
+            replace(usual, windows={**usual.windows, **of_rotors.windows}),
+        )
+    late = lateness(fits, columns, lambda delay, lag: usual.acting(delay, lag).equations)
     if late != IN_TIME:  # and the coefficient by which that may still be wrong
         task, columns = task.acting(*late), {**columns, **first}
     kept, fits = task.fitted({kind: columns[kind] for kind in task.kinds})
@@ -171,6 +188,18 @@ def _columns(extent: Extent) -> dict[str, tuple[int, ...]]:
     }
     both = {kind: (0, 1, VISCOUS) if differs else (0, 1) for kind, differs in spreads.items()}
     return {**both, WAY: (0,), HEADING: (0,)}
+
+
+def _shows_rotors(fit: WindowFit, number: int, without: WindowFit, expected: bool) -> bool:
+    """Whether a coefficient of the fit shows rotors: inertia that has no weight.
+
+    Where they are not `expected`, they must explain what the fit `without` them does not.
+    """
+    share, error = -float(fit.coefficients[number]), SURE * fit.deviation(number)
+    if expected:
+        return error < 1.0
+    (left, *_), (lacking, *_) = fit.misfit.excess, without.misfit.excess
+    return max(LEAST_ROTORS, error) < share < 1.0 and bool(left < EXPLAINED * lacking)
 
 
 def _fitted(

@@ -26,7 +26,8 @@ from climber_uk.parameters.declaration import parameter, parameters
 PERIOD = 0.02  # [s]
 AMPLE = 1.6  # times the least number of windows
 RAMPS = (0.5, 1.0, 2.0, 4.0)  # [s]
-SHOWN = ~np.isin(NAMES, ("wheel_radius", "half_track"))  # which any motion shows, by wheel angles
+# the others are shown by any motion with wheel angles, or are no part of the plan
+SHOWN = ~np.isin(NAMES, ("wheel_radius", "half_track", "rotor_inertia"))
 SOUGHT = np.isin(NAMES, ("mass", "seal_friction_coefficient", "yaw_inertia"))
 
 
@@ -130,8 +131,10 @@ def driven(trajectory: Trajectory, climber: Climber) -> tuple[RecordedMotion, Ar
     reference = trajectory.at(time)
     heading, speed = np.unwrap(reference.heading), reference.speed
     resisted = climber.seal_friction * sign(speed) + climber.weight_along_wall * sin(heading)
-    force = climber.mass * reference.forward_acceleration + resisted
-    torques = climber.wheel_torques(force, climber.yaw_inertia * unpack(reference.acceleration)[2])
+    force = climber.driven_mass * reference.forward_acceleration + resisted
+    torques = climber.wheel_torques(
+        force, climber.driven_inertia * unpack(reference.acceleration)[2]
+    )
     motion = RecordedMotion(
         time=time,
         pose=np.column_stack([reference.pose[:, :2], heading]),

@@ -51,16 +51,26 @@ def motors_wrench(motion: RecordedMotion, values: Array, window: Indices) -> Arr
 def model_wrench(
     motion: RecordedMotion, climber: Climber, site: Site, values: Array, window: Indices
 ) -> Array:
-    """Force [N] and moment [N m] (2,) that the motion in a window takes with parameters (8,)."""
-    mass, coefficient, viscous, inertia, coulomb, resistance, _, _ = values
+    """Force [N] and moment [N m] (2,) that the motion in a window takes with parameters (9,)."""
+    mass, coefficient, viscous, rotor, inertia, coulomb, resistance, radius, half_track = values
+    rotors = 2 * rotor / radius**2
     time, heading = motion.time[window], motion.pose[window, 2]
     gone = np.column_stack([motion.way[window], heading])
     gone = gone - gone.mean(axis=0)
     (speed, yaw_rate), (speed_1, yaw_rate_1) = (weak_mean(time, gone, order) for order in (1, 2))
     pulled = weak_mean(time, gravity_ahead(motion, climber, site)[window], 0)
     load = weak_mean(time, friction_load(motion, climber, site)[window], 0)
-    drive = mass * (speed_1 - pulled) + coefficient * load * np.sign(speed) + viscous * speed
-    moment = inertia * yaw_rate_1 + coulomb * np.sign(yaw_rate) + resistance * yaw_rate
+    drive = (
+        (mass + rotors) * speed_1
+        - mass * pulled
+        + coefficient * load * np.sign(speed)
+        + viscous * speed
+    )
+    moment = (
+        (inertia + rotors * half_track**2) * yaw_rate_1
+        + coulomb * np.sign(yaw_rate)
+        + resistance * yaw_rate
+    )
     return np.array([drive, moment])
 
 

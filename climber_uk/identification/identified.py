@@ -17,6 +17,7 @@ UNITS = {
     "mass": "kg",
     "seal_friction_coefficient": "",
     "viscous_friction": "N s/m",
+    "rotor_inertia": "kg m²",
     "yaw_inertia": "kg m²",
     "turning_friction": "N m",
     "turning_resistance": "N m s",
@@ -61,7 +62,7 @@ class Extent(NamedTuple):
 
 
 class Widths(NamedTuple):
-    """By how much each parameter (8,) may be wrong, by cause: half widths of 95 % intervals."""
+    """By how much each parameter (9,) may be wrong, by cause: half widths of 95 % intervals."""
 
     spread: Array  # what differs from window to window
     white: Array  # noise alone
@@ -69,7 +70,7 @@ class Widths(NamedTuple):
 
     @property
     def whole(self) -> Array:
-        """Half widths of the whole intervals (8,)."""
+        """Half widths of the whole intervals (9,)."""
         return np.maximum(self.spread, self.white) + self.bias
 
 
@@ -107,9 +108,9 @@ class Lack(NamedTuple):
 class Identified:
     """Parameters in the order of `NAMES`, and what they were found from."""
 
-    values: Array  # (8,) if not sought: the climber's, or zero; nan: undetermined
+    values: Array  # (9,) if not sought: the climber's, or zero; nan: undetermined
     widths: Widths
-    sought: Choice  # (8,) which were fitted
+    sought: Choice  # (9,) which were fitted
     fits: Mapping[str, WindowFit]  # by kind of equation, of those with enough windows
     extent: Extent
     windows: Mapping[str, list[Indices]]  # the times in each, by kind
@@ -126,12 +127,12 @@ class Identified:
 
     @property
     def half_widths(self) -> Array:
-        """Half widths of the 95 % intervals (8,)."""
+        """Half widths of the 95 % intervals (9,)."""
         return self.widths.whole
 
     @property
     def known(self) -> Choice:
-        """Which parameters are determined (8,)."""
+        """Which parameters are determined (9,)."""
         return np.array([name not in self.reasons for name in NAMES])
 
     @property
@@ -161,8 +162,8 @@ class Identified:
 
     @property
     def uncertainty(self) -> Array:
-        """Half widths (8,) relative to the value; for frictions, to the drive if that is more."""
+        """Half widths (9,) relative to the value; for frictions, to the drive if that is more."""
         force, moment, load, speed, yaw_rate, *_ = np.maximum(self.extent, NOTHING)
-        whole = np.array([0, force / load, force / speed, 0, moment, moment / yaw_rate, 0, 0])
+        whole = np.array([0, force / load, force / speed, 0, 0, moment, moment / yaw_rate, 0, 0])
         values = np.nan_to_num(np.abs(self.values))
         return self.half_widths / np.maximum(values, np.maximum(whole, NOTHING))

@@ -1,13 +1,15 @@
 """The climber's equations in integral form, linear in their coefficients, window by window.
 
-    v - ∫ (g·e + u ω) dt = v₀ + a₁ ∫ (τR + τL) dt - a₂ ∫ (1-k) P S σ dt - a₃ ∫ v dt       (11)
+    v - ∫ (g·e + u ω) dt = v₀ + a₁ ∫ (τR + τL) dt - a₂ ∫ (1-k) P S σ dt - a₃ ∫ v dt
+                           + a₄ ∫ g·e dt                                                  (11)
     ω                    = ω₀ + b₁ ∫ (τR - τL) dt - b₂ ∫ sgn ω dt - b₃ ∫ ω dt             (15)
 
 and integrated once more, for the way and the heading; where wheel angles are known, way and heading
 by these. g·e is gravity along the heading, u a side slip (0 of wheels that hold), and σ
-the direction in which the seal slides. Nothing is differentiated, and what is integrated are
-torques, which are known: only the noise of heading and way gets into the regressors, where it
-hardly counts. v₀, ω₀ and the like are different in each window, and projected out.
+the direction in which the seal slides. a₄ is of rotors, which have inertia and no weight. Nothing
+is differentiated, and what is integrated are torques, which are known: only the noise of heading
+and way gets into the regressors, where it hardly counts. v₀, ω₀ and the like are different in each
+window, and projected out.
 """
 
 from collections.abc import Sequence
@@ -87,14 +89,19 @@ class Cut:
 def drive_equations(
     motion: RecordedMotion, climber: Climber, site: Site, windows: Sequence[Indices]
 ) -> list[Equations]:
-    """(11) in each window: a₁, a₂, a₃, and a₁ times how much later torques act than assumed."""
+    """(11) in each window: a₁, a₂, a₃, a₁ times how much later torques act than assumed, and a₄."""
     gravity, load = gravity_ahead(motion, climber, site), friction_load(motion, climber, site)
     speed, yaw_rate = motion.smooth_rates.T
     sliding = np.hypot(speed, motion.side_slip)
     share = speed / np.maximum(sliding, 1e-9)  # of the seal's friction that is along the heading
     resisted = np.column_stack([load * share, speed])
     known = gravity + motion.side_slip * yaw_rate
-    return [_driven(motion, w, 0, motion.way, resisted[w], known[w]) for w in windows]
+    found = []
+    for window in windows:
+        pulled = integral(gravity[window], motion.time[window])
+        driven = np.column_stack([_impulses(motion, window, 0, resisted[window]), pulled])
+        found.append(_driven(motion, window, 0, motion.way, driven, known[window]))
+    return found
 
 
 def yaw_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
@@ -103,8 +110,8 @@ def yaw_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Eq
     for window in windows:
         sign = np.sign(yaw_rate[window[len(window) // 2]])
         resisted = np.column_stack([np.full(len(window), sign), yaw_rate[window]])
-        known = np.zeros(len(window))
-        found.append(_driven(motion, window, 1, motion.pose[:, 2], resisted, known))
+        driven, known = _impulses(motion, window, 1, resisted), np.zeros(len(window))
+        found.append(_driven(motion, window, 1, motion.pose[:, 2], driven, known))
     return found
 
 
@@ -136,18 +143,26 @@ def gravity_ahead(motion: RecordedMotion, climber: Climber, site: Site) -> Array
     return along
 
 
-def _driven(
-    motion: RecordedMotion, window: Indices, column: int, gone: Array, resisted: Array, known: Array
-) -> Equations:
-    """Of the speed (column 0), which τR + τL changes, or the yaw rate (1), which τR - τL does.
+def _impulses(motion: RecordedMotion, window: Indices, column: int, resisted: Array) -> Array:
+    """What a₁, a₂, a₃ and a₁ δ of a delay δ are multiplied with, or b₁ to b₁ δ (m, 4).
 
-    `gone` (n,) is how far the climber has gone, or turned, by each of the motion's times. In the
-    window, `resisted` (m, 2) is what friction's coefficients are multiplied with, and `known` (m,)
-    the acceleration that has no coefficient.
+    The speed (column 0) is changed by τR + τL, the yaw rate (1) by τR - τL. `resisted` (m, 2) is
+    what friction's coefficients are multiplied with.
     """
     time, pair = motion.time[window], np.array([1.0, (1.0, -1.0)[column]])
     pushed, late = motion.impulse[window] @ pair, motion.torques[window] @ pair
-    impulses = np.column_stack([pushed - pushed[0], -integral(resisted, time), late[0] - late])
+    return np.column_stack([pushed - pushed[0], -integral(resisted, time), late[0] - late])
+
+
+def _driven(
+    motion: RecordedMotion, window: Indices, column: int, gone: Array, impulses: Array, known: Array
+) -> Equations:
+    """Of the speed (column 0) or the yaw rate (1), by `impulses` (m, c) in the window.
+
+    `gone` (n,) is how far the climber has gone, or turned, by each of the motion's times, `known`
+    (m,) the acceleration that has no coefficient.
+    """
+    time = motion.time[window]
     rate = None if motion.rates is None else motion.rates[window, column]
     return _twice_integrated(time, rate, gone[window], impulses, integral(known, time))
 

@@ -13,6 +13,8 @@ from climber_uk.identification.identified import IN_TIME
 from climber_uk.identification.integral_equations import Equations
 from climber_uk.identification.window_fit import WindowFit
 
+Columns = Mapping[str, tuple[int, ...]]
+
 # [s] tried first; the last ones are the most that is found
 DELAYS, LAGS = (0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2), (0.0, 0.02, 0.04, 0.08)
 SURE = 4.0  # standard deviations, above which a delay is significant
@@ -21,10 +23,12 @@ EVALUATIONS = 60
 EquationsAt = Callable[[float, float], Mapping[str, Sequence[Equations]]]  # of delay and lag
 
 
-def lateness(fits: Mapping[str, WindowFit], equations_at: EquationsAt) -> tuple[float, float]:
+def lateness(
+    fits: Mapping[str, WindowFit], columns: Columns, equations_at: EquationsAt
+) -> tuple[float, float]:
     """Delay and lag [s]; `fits` are those for none, with the delay's coefficient as their last.
 
-    `equations_at` gives the equations of the same windows, without that coefficient.
+    `columns` are the others, and `equations_at` gives the equations of the same windows.
     """
     if not any(is_late(fit) for fit in fits.values()):
         return IN_TIME
@@ -33,7 +37,7 @@ def lateness(fits: Mapping[str, WindowFit], equations_at: EquationsAt) -> tuple[
     def cost(late: Sequence[float]) -> float:
         equations = equations_at(*np.abs(late).tolist())
         return sum(
-            WindowFit.standardised(equations[kind], range(fit.design.shape[1] - 1), fit.noise).cost
+            WindowFit.standardised(equations[kind], columns[kind], fit.noise).cost
             for kind, fit in fits.items()
         )
 
@@ -48,7 +52,4 @@ def lateness(fits: Mapping[str, WindowFit], equations_at: EquationsAt) -> tuple[
 
 def is_late(fit: WindowFit) -> bool:
     """Whether the last coefficient differs from zero."""
-    last = len(fit.coefficients) - 1
-    n, changes = len(fit.ends), fit.changes[:, last]
-    variance = max((n - 1) / n * float(changes @ changes), float(fit.covariance[last, last]))
-    return abs(float(fit.coefficients[last])) > SURE * np.sqrt(variance)
+    return abs(float(fit.coefficients[-1])) > SURE * fit.deviation(-1)

@@ -14,7 +14,11 @@ EFFECTIVE = "effective_half_track"  # that the wheels show while they scrub
 COULOMB = "seal_friction_coefficient"
 WITHOUT_SEAL = {COULOMB: ("rolling_friction", "N")}  # what that coefficient is then
 ADVICE = {
-    ("mass", COULOMB): "drive up, down and across the wall; on a floor, change speed",
+    (
+        "mass",
+        COULOMB,
+        "rotor_inertia",
+    ): "drive up, down and across the wall; on a floor, change speed",
     ("yaw_inertia",): "drive bends to both sides",
     ("wheel_radius", "half_track"): "drive further, and turn",
 }

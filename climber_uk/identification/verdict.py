@@ -35,9 +35,15 @@ SAME = 1e-5  # [m], [rad] and of a value: odometry that agrees so well is made o
 MUCH = 0.05  # share of the drive that is unexplained, above which no parameter is determined
 OFF = 0.2  # difference of the torques at the wheels from those commanded, above which none is
 OF_DRIVING = ("mass", "seal_friction_coefficient", "viscous_friction")
+ROTORS = "rotor_inertia"
 OF_WHEELS = ("wheel_radius", "half_track")
-OF_TORQUES = (*OF_DRIVING, *OF_TURNING)
-OF_KIND = {DRIVE: OF_DRIVING, YAW: OF_TURNING, WAY: ("wheel_radius",), HEADING: ("half_track",)}
+OF_TORQUES = (*OF_DRIVING, ROTORS, *OF_TURNING)
+OF_KIND = {
+    DRIVE: (*OF_DRIVING, ROTORS),
+    YAW: OF_TURNING,
+    WAY: ("wheel_radius",),
+    HEADING: ("half_track",),
+}
 
 
 def reasons(
@@ -82,15 +88,15 @@ def _why(found: Identified, name: str) -> Reason:
     if widths.bias[number] > np.maximum(widths.spread, widths.white)[number]:
         return Reason("misfit", f"the model does not fit: {shown}")
     kind = max((kind for kind in found.fits if FIRST[kind] <= number), key=FIRST.__getitem__)
-    fit, own = found.fits[kind], number - FIRST[kind]
+    fit, names = found.fits[kind], NAMES[FIRST[kind] : FIRST[kind] + len(OF_KIND[kind])]
+    names = tuple(each for each in names if found.sought[NAMES.index(each)])
+    own = names.index(name)
     scale = np.sqrt(np.diagonal(fit.covariance))
     goes_with = np.abs(fit.covariance[own] / (scale[own] * scale))
     goes_with[own] = 0.0
     other = int(np.argmax(goes_with))
     if goes_with[other] > TOGETHER:
-        names = (*NAMES[FIRST[kind] :][:3], "the delay of torques")
-        sought = [n for n in names if n not in NAMES or found.sought[NAMES.index(n)]]
-        partner = sought[other].replace("_", " ")
+        partner = (*names, "the delay of torques")[other].replace("_", " ")
         return Reason("collinear", f"not apart from {partner}: {shown}")
     if fit.noise[0] > NOISY * USUAL * (1.0 if len(fit.noise) > 1 else 0.1):
         return Reason("noise", f"odometry is noisy: {shown}")
@@ -108,6 +114,11 @@ def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
         words = f"yaw rates hardly differ: together {together}"
         yield "turning_resistance", Reason("absent", words)
         yield "turning_friction", Reason("absent", words)
+    if not found.sought[NAMES.index(ROTORS)]:
+        yield (
+            ROTORS,
+            Reason("absent", "none shows beside the mass"),
+        )
     if not found.sought[NAMES.index("viscous_friction")]:
         together = f"{found.friction:.3g} N at {found.extent.speed:.3g} m/s"
         words = f"speeds hardly differ: together {together}"

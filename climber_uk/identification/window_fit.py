@@ -153,6 +153,12 @@ class WindowFit:
         changes: Array = (_inverse(rest) @ g[..., None])[..., 0]
         return changes
 
+    def deviation(self, number: int) -> float:
+        """Standard deviation of a coefficient, by differences of the windows or by noise."""
+        n, changes = len(self.ends), self.changes[:, number]
+        white = float(self.covariance[number, number])
+        return float(np.sqrt(max((n - 1) / n * float(changes @ changes), white)))
+
     @cached_property
     def pulls(self) -> Array:
         """Changes of the coefficients (n, 2, c) by an acceleration of 1 missing in a window."""

@@ -36,6 +36,13 @@ class Climber:
     yaw_inertia: float = parameter(
         0.33, "kg m²", "inertia J about the centre of mass", above=0, plausible=(1e-4, 100)
     )
+    rotor_inertia: float = parameter(
+        0.0,
+        "kg m²",
+        "of a side's rotors at its wheels (gear ratio squared), not in mass and yaw_inertia",
+        at_least=0,
+        plausible=(1e-8, 10),
+    )
     wheel_radius: float = parameter(
         0.027, "m", "wheel radius r; too large: so are the torques", above=0, plausible=(0.005, 0.5)
     )
@@ -79,8 +86,30 @@ class Climber:
 
     @cached_property
     def mass_matrix(self) -> Array:
-        """M = diag(m, m, J), (3, 3)."""
+        """M = diag(m, m, J), (3, 3), of a climber without rotors, as the paper's."""
         return np.diag([self.mass, self.mass, self.yaw_inertia])
+
+    def mass_matrix_at(self, heading: Array) -> Array:
+        """M (..., 3, 3) with the rotors, which turn as it goes along its heading, not across."""
+        M = np.zeros((*np.shape(heading), 3, 3)) + np.diag([self.mass, self.mass, 0.0])
+        rims, (c, s) = self.driven_mass - self.mass, (cos(heading), sin(heading))
+        M[..., 0, 0] += rims * c * c
+        M[..., 1, 1] += rims * s * s
+        M[..., 0, 1] = M[..., 1, 0] = rims * c * s
+        M[..., 2, 2] = self.driven_inertia
+        return M
+
+    @cached_property
+    def driven_mass(self) -> float:
+        """m + 2 I/r², with the rotors that turn as it drives [kg]."""
+        return self.mass + 2 * self.rotor_inertia / self.wheel_radius**2
+
+    @cached_property
+    def driven_inertia(self) -> float:
+        """J + 2 I d²/r², with the rotors that turn as it yaws [kg m²]."""
+        return (
+            self.yaw_inertia + 2 * self.rotor_inertia * (self.half_track / self.wheel_radius) ** 2
+        )
 
     @cached_property
     def seal_friction(self) -> float:
@@ -102,13 +131,13 @@ class Climber:
 
     @cached_property
     def inertial(self) -> tuple[float, float, float, float]:
-        """m [kg], J [kg m²], f [N] and m g_t [N]: the numbers of (11) and (15)."""
-        return self.mass, self.yaw_inertia, self.seal_friction, self.weight_along_wall
+        """m + 2 I/r² [kg], J + 2 I d²/r² [kg m²], f [N] and m g_t [N]: of (11) and (15)."""
+        return self.driven_mass, self.driven_inertia, self.seal_friction, self.weight_along_wall
 
     def lateral_reaction(self, motion: Motion) -> Any:
         """What the wheels take to the left [N]: m v ω + w cosθ."""
-        mass, _, _, weight = self.inertial
-        return mass * motion.speed * motion.yaw_rate + weight * motion.cosine
+        turned = self.mass * motion.speed * motion.yaw_rate
+        return turned + self.weight_along_wall * motion.cosine
 
     @cached_property
     def leverage(self) -> tuple[float, float]:
@@ -208,11 +237,11 @@ class Climber:
         force, moment = self.force_and_moment(torques)
         cosine, sine = cos(heading), sin(heading)
         force = force - self.seal_friction * direction - self.weight_along_wall * sine
-        v_1 = force / self.mass
+        v_1 = force / self.driven_mass
         return pack(
             v_1 * cosine - v * omega * sine,
             v_1 * sine + v * omega * cosine,
-            moment / self.yaw_inertia,
+            moment / self.driven_inertia,
         )
 
 

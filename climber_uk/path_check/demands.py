@@ -66,8 +66,8 @@ def demands(
     rubbing = attachment.seal_friction(climber) * np.sign(
         np.where(np.abs(speed) > STANDS, speed, 0)
     )
-    force = climber.mass * reference.forward_acceleration + rubbing + weight * sin(heading)
-    moment = climber.yaw_inertia * reference.acceleration[:, 2]
+    force = climber.driven_mass * reference.forward_acceleration + rubbing + weight * sin(heading)
+    moment = climber.driven_inertia * reference.acceleration[:, 2]
     right, left = climber.torques(force, moment)
     radius = climber.wheel_radius
     across = -weight * cos(heading)

@@ -86,8 +86,8 @@ class Motors:
         share = 1 - math.exp(-time / self.servo_time_constant) if self.servo_time_constant else 1.0
         missing = radius * (share * (commanded - rates) - (rates - rates_before)) / time
         right, left = missing.tolist()  # [m/s²] of the rims
-        force = eagerness * climber.mass * (right + left) / 2
-        moment = eagerness * climber.yaw_inertia * (right - left) / (2 * climber.half_track)
+        force = eagerness * climber.driven_mass * (right + left) / 2
+        moment = eagerness * climber.driven_inertia * (right - left) / (2 * climber.half_track)
         return _within_bounds(climber, wheels, before + climber.wheel_torques(force, moment))
 
 

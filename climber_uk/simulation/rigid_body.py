@@ -125,7 +125,7 @@ class RigidBody:
         force, moment = inputs.force, inputs.moment + inputs.push_moment
         bending = [0.0] * len(deflection)
         if direction == 0:
-            at_rest = [0.0, 0.0, yaw_rate, 0.0, 0.0, moment / climber.yaw_inertia]
+            at_rest = [0.0, 0.0, yaw_rate, 0.0, 0.0, moment / climber.driven_inertia]
             return np.array(at_rest + bending)
 
         A_v = sine * v_x - cosine * v_y
@@ -141,12 +141,16 @@ class RigidBody:
         # as `outside`, without the call: this is where the plant spends its time
         w_x, w_y = self._weight_on_plane if self.wall.flat else self._weight(x, height)
         f_x, f_y = inputs.push_x + w_x, inputs.push_y + w_y
-        a_x = (force * cosine + f_x) / climber.mass
-        a_y = (force * sine + f_y) / climber.mass
+        a_x = (force * cosine + f_x) / climber.driven_mass
+        a_y = (force * sine + f_y) / climber.driven_mass
         b_minus_A_a = -yaw_rate * speed - (sine * a_x - cosine * a_y)
         rates = [
             *(x_dot, y_dot, yaw_rate),
-            *(a_x + sine * b_minus_A_a, a_y - cosine * b_minus_A_a, moment / climber.yaw_inertia),
+            *(
+                a_x + sine * b_minus_A_a,
+                a_y - cosine * b_minus_A_a,
+                moment / climber.driven_inertia,
+            ),
         ]
         return np.array(rates + bending)
 

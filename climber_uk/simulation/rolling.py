@@ -67,7 +67,9 @@ class NoSlipStepper:
     def _steep_parts(self) -> int:
         """Parts of a step that are short enough for the friction's slope over speed."""
         steepness = self.body.contact.friction.steepness(self.body.friction)
-        parts = math.ceil(min(self.body.step * steepness / self.body.climber.mass / STIFF, 1e9))
+        parts = math.ceil(
+            min(self.body.step * steepness / self.body.climber.driven_mass / STIFF, 1e9)
+        )
         return max(1, parts)
 
     @property
@@ -129,9 +131,10 @@ class NoSlipStepper:
 
     @cached_property
     def _lightest(self) -> float:
-        """Least mass that the seal's friction acts on: m, or J/R² of a ring [kg]."""
-        climber, radius = self.body.climber, self.body.contact.grip.seal_radius
-        return min(climber.mass, climber.yaw_inertia / radius**2) if radius > 0 else climber.mass
+        """Least mass that the seal's friction acts on: m, or J/R² of a ring, with rotors [kg]."""
+        mass, inertia, *_ = self.body.climber.inertial
+        radius = self.body.contact.grip.seal_radius
+        return min(mass, inertia / radius**2) if radius > 0 else mass
 
     def _creeps(self, y: Array) -> bool:
         """Whether a ring slides so slowly that its friction changes direction within a step."""

@@ -39,19 +39,21 @@ class ContactStepper:
 
     @cached_property
     def rim(self) -> float:
-        """Inertia of a wheel over r², as a mass at its rim [kg]."""
-        return self.body.contact.grip.wheel_inertia / self.body.climber.wheel_radius**2
+        """Inertia of what turns with a wheel over r², as a mass at its rim [kg]."""
+        climber = self.body.climber
+        inertia = self.body.contact.grip.wheel_inertia + climber.rotor_inertia
+        return inertia / climber.wheel_radius**2
 
     @cached_property
     def mass(self) -> float:
         """Mass [kg] without the wheels' inertia."""
-        return self.body.climber.mass - 2 * self.rim * self.slip
+        return self.body.climber.driven_mass - 2 * self.rim * self.slip
 
     @cached_property
     def yaw_inertia(self) -> float:
         """Yaw inertia [kg m²] without the wheels' inertia."""
         climber = self.body.climber
-        return climber.yaw_inertia - 2 * self.rim * climber.half_track**2 * self.slip
+        return climber.driven_inertia - 2 * self.rim * climber.half_track**2 * self.slip
 
     def wheels_stick(
         self, y: Array, inputs: Inputs, accelerations: tuple[float, float], load: float
@@ -229,8 +231,8 @@ class ContactStepper:
     def _rolling_on(self, y: Array, slip: Array) -> tuple[Array, Array]:
         """(y, no slip) of wheels that roll again: the momentum of rims and climber is kept."""
         climber, d = self.body.climber, self.body.climber.half_track
-        v = forward_speed(y) + self.rim * float(slip.sum()) / climber.mass
-        omega = float(y[5]) + self.rim * d * float(slip[0] - slip[1]) / climber.yaw_inertia
+        v = forward_speed(y) + self.rim * float(slip.sum()) / climber.driven_mass
+        omega = float(y[5]) + self.rim * d * float(slip[0] - slip[1]) / climber.driven_inertia
         heading, end = float(y[2]), y.copy()
         end[3:6] = v * math.cos(heading), v * math.sin(heading), omega
         return end, np.zeros(2)

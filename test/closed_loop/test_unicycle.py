@@ -32,10 +32,11 @@ def wheels(random, motion):
     return PAPER.wheel_torques(drive, turn).T
 
 
-@pytest.mark.parametrize("fastest", [0.2, 6.0])
-def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest):
-    random, body, step = np.random.default_rng(7), UnicycleModel.of(PAPER), 0.0025
-    plant, motion = Plant(PAPER, step), many_starts(12, fastest)
+@pytest.mark.parametrize(("fastest", "rotors"), [(0.2, 0.0), (6.0, 0.0), (1.0, 2e-4)])
+def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest, rotors):
+    climber = replace(PAPER, rotor_inertia=rotors)
+    random, body, step = np.random.default_rng(7), UnicycleModel.of(climber), 0.0025
+    plant, motion = Plant(climber, step), many_starts(12, fastest)
     states = [State.moving(floats(indexed(motion, i))) for i in range(12)]
     alone = [state.motion for state in states]
     changes = 0

@@ -54,10 +54,10 @@ def moved(
     half track were `effective` times what it is.
     """
     (v, v_1), (theta, omega, omega_1) = speed, heading
-    m, J, r, d = true.mass, true.yaw_inertia, true.wheel_radius, true.half_track
+    m, J, r, d = true.driven_mass, true.driven_inertia, true.wheel_radius, true.half_track
     rubs = (1 - true.wheel_load_share) * true.suction_pressure * true.suction_area
     rubs *= true.seal_friction_coefficient
-    pull = m * 9.81 * np.sin(np.radians(true.inclination)) * np.sin(theta)
+    pull = true.mass * 9.81 * np.sin(np.radians(true.inclination)) * np.sin(theta)
     drive = m * v_1 + rubs * np.sign(v) + viscous * v + pull + lacking[0]
     turn = J * omega_1 + scrub * np.sign(omega) + turning * omega + lacking[1]
     torques = r / 2 * np.column_stack([drive + turn / d, drive - turn / d])
@@ -90,7 +90,21 @@ def test_every_parameter_is_found_from_a_motion_that_shows_it():
     assert found["seal_friction_coefficient"] == pytest.approx(0.7, rel=1e-3)
     assert found["viscous_friction"] == pytest.approx(20.0, rel=2e-3)
     assert found["turning_resistance"] == pytest.approx(0.05, rel=2e-3)
-    assert found.known.all()
+    assert [*found.reasons] == ["rotor_inertia"]  # there is none
+
+
+@pytest.mark.parametrize("inertia", [3e-4, 1e-3, 1e-2])  # 0.7 to 22 kg at the rims
+@pytest.mark.parametrize("assumed", [0.0, 1e-3])
+def test_rotors_are_told_from_mass_as_they_have_no_weight(inertia, assumed):
+    true = replace(TRUE, rotor_inertia=inertia)
+    found = identify(
+        moved(true=true, wheels=True, noise=1.0), replace(BELIEVED, rotor_inertia=assumed)
+    )
+    assert "rotor_inertia" not in found.reasons
+    assert found["rotor_inertia"] == pytest.approx(inertia, abs=0.02 * inertia + 5e-5)
+    for name in ("mass", "yaw_inertia"):
+        assert found[name] == pytest.approx(getattr(true, name), rel=0.05)
+        assert abs(found[name] - getattr(true, name)) <= 1.5 * found.half_width(name), name
 
 
 def test_without_wheel_angles_radius_and_track_are_taken_as_they_are():

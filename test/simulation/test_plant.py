@@ -23,6 +23,7 @@ from climber_uk.simulation.rigid_body import RigidBody
 
 PAPER = Climber()
 UPRIGHT = State(np.array([0.0, 6.0, np.pi / 2]), np.zeros(3))
+GEARED = replace(PAPER, rotor_inertia=0.002)  # 5.5 kg at the rims, that weigh nothing
 SLIPPERY = replace(PAPER, seal_friction_coefficient=0.0)
 
 
@@ -31,6 +32,7 @@ def reduced(climber, state, torques, duration):
     drive = torques.sum() / climber.wheel_radius
     turn = climber.half_track * (torques[0] - torques[1]) / climber.wheel_radius
     friction = climber.seal_friction * np.sign(state.forward_speed)
+    rims = 2 * climber.rotor_inertia / climber.wheel_radius**2
 
     def rates(_, y):
         force = drive - friction - climber.weight_along_wall * np.sin(y[2])
@@ -38,8 +40,8 @@ def reduced(climber, state, torques, duration):
             y[3] * np.cos(y[2]),
             y[3] * np.sin(y[2]),
             y[4],
-            force / climber.mass,
-            turn / climber.yaw_inertia,
+            force / (climber.mass + rims),
+            turn / (climber.yaw_inertia + rims * climber.half_track**2),
         ]
 
     start = [*state.pose, state.forward_speed, state.yaw_rate]
@@ -53,15 +55,15 @@ def random_drive(random, state):
     return PAPER.wheel_torques(drive + 5 * random.normal(), -0.4 * state.yaw_rate + random.normal())
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_random_torques_move_it_as_the_reduced_equations_say(seed):
+@pytest.mark.parametrize(("seed", "climber"), [(0, PAPER), (1, PAPER), (2, GEARED)])
+def test_random_torques_move_it_as_the_reduced_equations_say(seed, climber):
     random = np.random.default_rng(seed)
-    plant = Plant(PAPER, 0.001)
+    plant = Plant(climber, 0.001)
     state = oracle = State.rolling(np.array([0.0, 6.0, 0.3]), 6.0, -0.6)
     for _ in range(200):
         torques = random_drive(random, state)
         state = plant.advance(state, torques, steps=100)
-        oracle = reduced(PAPER, oracle, torques, 0.1)
+        oracle = reduced(climber, oracle, torques, 0.1)
         assert np.abs(state.pose - oracle.pose)[:2].max() < 1e-9
         assert abs(state.side_slip) < 1e-9
     assert state.forward_speed > 0  # else the oracle would be none
@@ -95,6 +97,17 @@ def test_halving_the_step_shows_the_fourth_order():
     ]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(orders, 4, atol=0.3)
+
+
+def test_wheels_that_may_slip_and_do_not_turn_the_same_rotors():
+    for geared in (PAPER, GEARED):
+        climber = replace(geared, suction_pressure=8000.0, wheel_load_share=0.8)
+        states = [State.rolling(np.array([0.0, 6.0, 0.3]), 0.5, -0.2)] * 2
+        for plant in (0, 1):
+            body = Plant(climber, 0.001, slip=bool(plant))
+            states[plant] = body.advance(states[plant], np.array([1.9, 1.8]), steps=300)
+        np.testing.assert_allclose(states[0].pose, states[1].pose, atol=1e-6)
+        np.testing.assert_allclose(states[0].velocity, states[1].velocity, atol=1e-5)
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.7, np.pi / 2, -np.pi / 2, 3.0])

@@ -31,7 +31,7 @@ def friction(case: Case) -> float:
     begin, end = ends[:-1], ends[1:]  # of windows, the last of which is not whole
     duration, direction = time[end] - time[begin], (summed[end] - summed[begin]) / (end - begin)
     chosen = (np.abs(direction) == 1) & (duration < 1.5 * WINDOW)
-    lost = pushed[end] - pushed[begin] - climber.mass * (speed[end] - speed[begin])  # [N s]
+    lost = pushed[end] - pushed[begin] - climber.driven_mass * (speed[end] - speed[begin])  # [N s]
     opposed = (direction * duration)[chosen]
     return float(lost[chosen] @ opposed / (opposed @ opposed)) if chosen.any() else NAN
 
