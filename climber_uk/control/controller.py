@@ -275,7 +275,8 @@ class Controller:
         fault = self.guard.watch(self._law.climber, observed, expected)
         fault = fault or self.active.strayed(observed.before, target)
         if fault is not None and fault[0] is Mode.TOO_FAST:
-            sign = self._twist.opposed(OPPOSED_IF_TOO_FAST * self.safety.max_twist_error)
+            least = OPPOSED_IF_TOO_FAST * self.safety.max_twist_error
+            sign = self._twist.opposed(least, is_sure=True)
             return (Mode.SIGN_WRONG, sign) if sign else fault
         return fault
 

@@ -143,8 +143,11 @@ class Guard:
     ) -> Trouble | None:
         options, motion, allowed = self.options, observed.after, expected.allowed
         is_against = motion.speed * expected.speed < 0
-        most = min(allowed.speed, expected.against) if is_against else allowed.speed
-        fastest = most + options.speed_margin + self._let_go(climber, observed)
+        lets_go = self._let_go(climber, observed)  # the way that it is driven
+        most = allowed.speed + lets_go
+        if is_against:
+            most = min(allowed.speed, expected.against)
+        fastest = most + options.speed_margin
         fastest_yaw_rate = allowed.yaw_rate + options.yaw_rate_margin
         is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
         is_yawing = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_yaw_rate
