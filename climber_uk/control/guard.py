@@ -52,6 +52,14 @@ class GuardOptions:
     response_time: float = parameter(
         0.15, "s", "in which a wheel has to answer its torque", at_least=0
     )
+    encoder_distance: float = parameter(
+        0.0,
+        "m",
+        "of a wheel's rim, by which `joint_states` may differ from odometry beside 30 %; 0: nobody "
+        "listens to them, and where odometry is stuck from the start the climber may run away",
+        at_least=0,
+        plausible=(0.002, 0.1),
+    )
     recovery_time: float = parameter(
         0.5, "s", "of rest after which the reference is followed again", at_least=0
     )
