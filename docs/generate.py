@@ -67,7 +67,8 @@ CONTENTS = {
     topics.STICK: "of the controller: the speeds again, if `publish_cmd_vel`: forward, about z; of "
     "the planner: a stick's, by `by_hand.input`",
     topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
-    topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels",
+    topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels; the controller reads "
+    "them with `guard.encoder_distance`",
     topics.IMU: "yaw rate [rad/s] and specific force [m/s²], gravity in it: on a vertical "
     "wall 9.81 upwards; the plant tells it if `imu.enabled`",
     topics.POSE: "x, y [m] and heading of the climber, measured from outside at the stamp, however "

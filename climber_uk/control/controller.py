@@ -17,6 +17,7 @@ from climber_uk.control.active_reference import ActiveReference
 from climber_uk.control.approach import Approach
 from climber_uk.control.constraint_set import ConstraintSet, blended
 from climber_uk.control.control_law import CUT, Command, ControlLaw, check_finite
+from climber_uk.control.encoder_check import EncoderCheck
 from climber_uk.control.estimator import Estimator, Observed
 from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.guidance import Guidance
@@ -100,7 +101,7 @@ class Controller:
         self._stamp = 0  # [ns] of the last good one
         self._now = 0  # [ns] of the last look at the clock
         self._unsettled = 0  # odometry messages until a jump is forgiven
-        self._twist = TwistCheck()
+        self._twist, self.encoders = TwistCheck(), EncoderCheck()
         self._without_twist = ""  # field of the twist that is zero while the pose goes
         self._waiting_since: int | None = None  # [ns] stamp of the first one not answered
         self._calm, self._safe_output = Calm(), SafeOutput(self.safety)
@@ -229,7 +230,8 @@ class Controller:
         if not is_first:
             self._unsettled -= self._unsettled > 0
         if observed is not None:
-            self._watch(stamp, observed, self._check_twist(observed))
+            wheels = self._check_encoders(observed)
+            self._watch(stamp, observed, self._check_twist(observed) or wheels)
         if self._unsettled:
             return Mode.JUMPED, ""
         if self._without_twist:
@@ -240,7 +242,21 @@ class Controller:
         """Watch from now on: the climber is elsewhere."""
         self.guard.restart()
         self._twist.restart()
+        self.encoders.restart()
         self._without_twist = ""
+
+    def on_encoders(self, right: float, left: float) -> None:
+        """Take the wheels' angles [rad]: a witness of odometry, for the guard."""
+        self.encoders.turn(self._law.climber, right, left)
+
+    def _check_encoders(self, observed: Observed) -> Trouble | None:
+        """Trouble if the wheels turn otherwise than odometry says."""
+        most = self.guard.options.encoder_distance
+        if most == 0:
+            return None
+        self.encoders.go(self._law.climber, observed.after, observed.time)
+        detail = self.encoders.trouble(most)
+        return (Mode.WHEELS_DIFFER, detail) if detail else None
 
     def _check_twist(self, observed: Observed) -> Trouble | None:
         """Trouble if the twist is not the pose's rate; notices one that is zero while that goes."""
@@ -261,6 +277,7 @@ class Controller:
             guard.rest(self._law.climber, observed.after, observed.time)
             if guard.fault is None:
                 self._twist.restart()
+                self.encoders.restart()
         elif self.mode in (FOLLOWING, APPROACHING) and observed.time > 0:
             fault = trouble or self._find_fault(observed)
             if fault is not None:
@@ -275,7 +292,8 @@ class Controller:
         fault = self.guard.watch(self._law.climber, observed, expected)
         fault = fault or self.active.strayed(observed.before, target)
         if fault is not None and fault[0] is Mode.TOO_FAST:
-            sign = self._twist.opposed(OPPOSED_IF_TOO_FAST * self.safety.max_twist_error)
+            least = OPPOSED_IF_TOO_FAST * self.safety.max_twist_error
+            sign = self._twist.opposed(least, is_sure=True)
             return (Mode.SIGN_WRONG, sign) if sign else fault
         return fault
 

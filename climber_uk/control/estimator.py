@@ -7,7 +7,15 @@ nanoseconds, on the clock of the odometry.
 from typing import Any, NamedTuple
 
 from climber_uk.control.control_law import ControlInput
-from climber_uk.control.model import SLOW, SLOW_TURN, DisturbanceEstimate, Observer, Shares, predict
+from climber_uk.control.model import (
+    SETTLES,
+    SLOW,
+    SLOW_TURN,
+    DisturbanceEstimate,
+    Observer,
+    Shares,
+    predict,
+)
 from climber_uk.control.safety import Safety
 from climber_uk.control.side_slip import NO_SLIP
 from climber_uk.control.timing import LONGEST_STEP, Latency, Sample, Timing, TorqueHistory
@@ -225,6 +233,9 @@ class Estimator:
         self._period_is_measured = True
         is_known = self._sent.are_known_since(self.stamp)
         shares = self.observer.shares(time, self._delay)
+        left = clipped(self.learnt.settling - time, 0.0, SETTLES)
+        settling = select(abs(motion.speed) > SLOW, left, SETTLES)
+        self.learnt = self.learnt._replace(settling=settling)
         if has_twist:
             motion = self._at_its_stamp(before, expected, motion, time)
             if self.timing.learn_delay and is_known:

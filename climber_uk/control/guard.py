@@ -8,6 +8,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
+from climber_uk.control.actuator_check import ActuatorCheck
 from climber_uk.control.estimator import Observed
 from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.safety import Mode, Trouble
@@ -20,21 +21,14 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 TOO_FAST_IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
-SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: a limit cycle
 SWING_MEMORY = 0.4  # [s] of them
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
-UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
-LACKS = 0.3, 1.3  # of a wheel's torque that is missing all at once, if nothing of the other one's
-LACKS_ELSE = 0.25  # of the same, is missing or too much there
-LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
-LACKS_IN_A_ROW = 3  # odometry messages
-EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
-PROOF_IF_TOO_FAST = 0.4  # of `EXCITED` and `UNANSWERED` is enough where it is too fast as well
+PROOF_IF_TOO_FAST = 0.4  # of that of a dead wheel is enough where it is too fast as well
 RIM_REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests, by its twist and its pose
 STALL_REST = 10  # times the rest after which a stalled climber tries again
 
@@ -57,6 +51,14 @@ class GuardOptions:
     )
     response_time: float = parameter(
         0.15, "s", "in which a wheel has to answer its torque", at_least=0
+    )
+    encoder_distance: float = parameter(
+        0.0,
+        "m",
+        "of a wheel's rim, by which `joint_states` may differ from odometry beside 30 %; 0: nobody "
+        "listens to them, and where odometry is stuck from the start the climber may run away",
+        at_least=0,
+        plausible=(0.002, 0.1),
     )
     recovery_time: float = parameter(
         0.5, "s", "of rest after which the reference is followed again", at_least=0
@@ -89,23 +91,6 @@ class Expected(NamedTuple):
     against: float = math.inf  # [m/s] at most, the other way than that
 
 
-class Variance:
-    """Mean and variance of what was added, each older value counting less."""
-
-    def __init__(self) -> None:
-        self.number, self.mean, self.variance = 0, 0.0, 0.0
-
-    def add(self, value: float, weight: float) -> None:
-        """Add a value that has `weight` (0 to 1), and all before it the rest."""
-        self.number += 1
-        if self.number == 1:
-            self.mean = value
-            return
-        off = value - self.mean
-        self.mean += weight * off
-        self.variance = (1 - weight) * (self.variance + weight * off * off)
-
-
 class Swings:
     """How often a torque of late went from a strong one to the opposite."""
 
@@ -121,42 +106,6 @@ class Swings:
         self._side = load
 
 
-class Wheel:
-    """A wheel that answers its torque: the force that acted follows the one that was asked for.
-
-    Of a dead one the force stays what it was, and what is unexplained, the difference, varies.
-    What resists the climber as a whole makes that vary on both sides.
-    """
-
-    def __init__(self) -> None:
-        self.asked, self.acted, self.unexplained = Variance(), Variance(), Variance()
-        self.force = self.missing = 0.0  # [N] that was asked for last, and what of it did not act
-        self.lacking = 0  # odometry messages in a row, for which it was
-
-    def add(self, asked: float, acted: float, known: float, weight: float) -> None:
-        """Add the force [N] that a torque should cause, the one that acted, and a known one."""
-        self.asked.add(asked, weight)
-        self.acted.add(acted, weight)
-        self.unexplained.add(acted - asked, weight)
-        self.force, self.missing = asked, asked + known - acted
-
-    def lacks(self, other: "Wheel", largest: float) -> bool:
-        """Whether its force is missing all at once, of `largest` [N], and only its force."""
-        force = abs(self.force)
-        missing = math.copysign(1.0, self.force) * self.missing
-        least, most = LACKS
-        is_missing = force > LACKS_FROM * largest and least * force < missing < most * force
-        alone = abs(other.missing) < LACKS_ELSE * force
-        self.lacking = self.lacking + 1 if is_missing and alone else 0
-        return self.lacking >= LACKS_IN_A_ROW
-
-    def answers(self, other: "Wheel", largest: float, proof: float) -> bool:
-        """Whether it does, or too little was asked of it to know; of `largest` [N] at most."""
-        excited = self.asked.variance > (proof * EXCITED * largest) ** 2
-        explained = max(self.acted.variance, other.unexplained.variance)
-        return not (excited and self.unexplained.variance > proof * UNANSWERED * explained)
-
-
 class Guard:
     """Watches a climber that follows."""
 
@@ -167,7 +116,7 @@ class Guard:
         self._rests_at: Motion | None = None
         self._followed = math.inf  # [s] since the last fault
         self.faults: deque[int] = deque()  # [ns] stamps
-        self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
+        self._actuators = ActuatorCheck()
         self.restart()
 
     def forgive(self) -> None:
@@ -181,21 +130,16 @@ class Guard:
         self._stalled = 0.0  # [s]
         self._swings = Swings(), Swings()
         self._since_rest = math.inf  # [s]
-        self._forget_wheels()
-
-    def _forget_wheels(self) -> None:
-        if self._moved:
-            self._wheels = Wheel(), Wheel()
-        self._moved = 0.0
+        self._actuators.restart()
 
     def watch(self, climber: Climber, observed: Observed, expected: Expected) -> Trouble | None:
         """What is wrong with what is observed; None if all is well."""
         torques = observed.torques
         self._followed += observed.time
-        self._add_to_wheels(climber, observed, torques)
+        self._actuators.add(climber, observed, self.options.response_time)
         too_fast = self._watch_rates(climber, observed, expected)
         return (
-            self._watch_wheels(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
+            self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
             or too_fast
             or self._watch_limit(climber, observed, expected, torques)
             or self._watch_swings(climber, observed, torques)
@@ -207,8 +151,11 @@ class Guard:
     ) -> Trouble | None:
         options, motion, allowed = self.options, observed.after, expected.allowed
         is_against = motion.speed * expected.speed < 0
-        most = min(allowed.speed, expected.against) if is_against else allowed.speed
-        fastest = most + options.speed_margin + self._let_go(climber, observed)
+        lets_go = self._let_go(climber, observed)  # the way that it is driven
+        most = allowed.speed + lets_go
+        if is_against:
+            most = min(allowed.speed, expected.against)
+        fastest = most + options.speed_margin
         fastest_yaw_rate = allowed.yaw_rate + options.yaw_rate_margin
         is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
         is_yawing = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_yaw_rate
@@ -232,6 +179,13 @@ class Guard:
         if self._since_rest > LETS_GO + answered or self._followed < self.options.memory:
             return 0.0
         return climber.seal_friction / climber.driven_mass * answered
+
+    def _watch_actuators(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
+        name = self._actuators.dead(climber, proof)
+        if not name:
+            return None
+        torque = torques.right if name == "right" else torques.left
+        return Mode.DEAD_WHEEL, f"the {name} one, at {torque:.2f} N m"
 
     def _watch_limit(
         self, climber: Climber, observed: Observed, expected: Expected, torques: Torques
@@ -279,43 +233,6 @@ class Guard:
             f"{disturbance.force:.0f} N, {disturbance.moment:.0f} N m; "
             f"explained are {most:.0f} N, {most_moment:.0f} N m"
         )
-
-    def _add_to_wheels(self, climber: Climber, observed: Observed, torques: Torques) -> None:
-        """See `Wheel`; (11) and (15) give the force that acted on each."""
-        before, after, time = observed.before, observed.after, observed.time
-        response_time = self.options.response_time
-        if response_time == 0 or min(abs(before.speed), abs(after.speed)) < SLIDES:
-            self._forget_wheels()
-            return
-        self._moved += time
-        mass, inertia, friction, weight = climber.inertial
-        drive = mass * (after.speed - before.speed) / time + weight * after.sine
-        drive += math.copysign(friction, after.speed)
-        yaw_force = inertia * (after.yaw_rate - before.yaw_rate) / time / climber.half_track
-        new = 1 - math.exp(-time / response_time)
-        push, turn = observed.disturbance
-        turn /= climber.half_track
-        acted = (drive + yaw_force) / 2, (drive - yaw_force) / 2
-        known = (push + turn) / 2, (push - turn) / 2
-        for wheel, torque, force, push in zip(self._wheels, torques, acted, known, strict=True):
-            wheel.add(torque / climber.wheel_radius, force, push, new)
-
-    def _watch_wheels(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
-        right, left = self._wheels
-        largest = climber.max_wheel_torque / climber.wheel_radius
-        for name, wheel, other, torque in (
-            ("right", right, left, torques.right),
-            ("left", left, right, torques.left),
-        ):
-            if self._moved and wheel.lacks(other, largest):
-                return Mode.DEAD_WHEEL, f"the {name} one, at {torque:.2f} N m"
-        if not 0 < self.options.response_time < self._moved:
-            return None
-        if not right.answers(left, largest, proof):
-            return Mode.DEAD_WHEEL, f"the right one, at {torques.right:.2f} N m"
-        if not left.answers(right, largest, proof):
-            return Mode.DEAD_WHEEL, f"the left one, at {torques.left:.2f} N m"
-        return None
 
     # Faults, and the way back
 

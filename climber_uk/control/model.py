@@ -30,6 +30,9 @@ EXPECTED_REST = 1e-3  # [m/s] of an expected speed that is none
 SLOW_TURN = 0.03  # [rad/s] of a measured yaw rate that may as well be none
 FORGETTING_TIME = 0.2  # [s] of what was learnt, once the observer is off
 TURNING_SHARE = 0.95  # of an unknown moment, put down to what resists turning
+SETTLES = 0.2  # [s] after a rest, in which friction that lets go is a step, and no ramp
+LETS_GO = 0.05  # [m/s] of what broke loose
+UNSTICKING_TIME = 0.02  # [s] of unlearning what only held it at rest
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 Shares = tuple[Any, Any]  # of an error, put down to the disturbance and to its change
 
@@ -98,11 +101,24 @@ class DisturbanceEstimate(NamedTuple):
     moment_rate: Any = 0.0  # [N m/s]
     friction: Any = 0.0  # [N] of the seal beyond the model's f; -f to f
     turning: Any = 0.0  # [N m] that resists turning: none in the model
+    settling: Any = 0.0  # [s] left after a rest: what was learnt there may hold there only
+    stuck: Any = 0.0  # [N] of force and friction that was learnt there, and is believed yet
 
     @property
     def without_rates(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
         return self._replace(force_rate=0.0, moment_rate=0.0)
+
+    def lets_go(self, unexpected: Any, speed: Any, time: float) -> Any:
+        """How much [N] of what was learnt at rest is taken back in `time` [s], soon after it.
+
+        An `unexpected` force [N] that is against it shows, at a `speed` [m/s], that friction is
+        less in motion: the observer is too slow for that.
+        """
+        most = abs(self.stuck)
+        lets_go = (self.stuck * unexpected < 0.0) & (abs(speed) > LETS_GO)
+        share = 1.0 - exp(-time / UNSTICKING_TIME)
+        return select(lets_go, share * clipped(unexpected, -most, most), 0.0)
 
     def changed(
         self, climber: Climber, change: Any, direction: float, speed: Any
@@ -189,22 +205,29 @@ class Observer:
             return self._from_pose(climber, learnt, expected, measured, time, direction, turn)
         if everywhere(self.bandwidth == 0):
             return measured, _faded(learnt, time)
-        _, _, force_rate, moment_rate, _, turning = learnt
+        _, _, force_rate, moment_rate, _, turning, settling, stuck = learnt
         mass, inertia, _, _ = climber.inertial
         new, newer = shares
         acceleration = (measured.speed - expected.speed) / time
         yaw_acceleration = (measured.yaw_rate - expected.yaw_rate) / time
-        change = time * force_rate + new * mass * acceleration
+        unexpected = mass * acceleration
+        unlearnt = learnt.lets_go(unexpected, measured.speed, time)
+        change = time * force_rate + unlearnt + new * (unexpected - unlearnt)
+        rests = settling == SETTLES
+        stuck = select(settling > 0.0, stuck + select(rests, change, unlearnt), 0.0)
         force, friction = learnt.changed(climber, change, direction, expected.speed)
         change = time * moment_rate + new * inertia * yaw_acceleration
         moment, turning = learnt.turned(climber, change, turn, expected.yaw_rate)
         # at rest stiction balances any force, so that no change of it shows
-        slides = abs(expected.speed) > EXPECTED_REST
-        force_rate = select(slides, force_rate + newer / time * mass * acceleration, 0.0)
+        slides = (abs(expected.speed) > EXPECTED_REST) & (settling == 0.0)
+        force_rate = select(slides, force_rate + newer / time * unexpected, 0.0)
         moment_rate = moment_rate + newer / time * inertia * yaw_acceleration
         held = (turning > 0.0) & (abs(expected.yaw_rate) < EXPECTED_REST)
         moment_rate = select(held, 0.0, moment_rate)
-        learnt = DisturbanceEstimate(force, moment, force_rate, moment_rate, friction, turning)
+        resisting = friction, turning
+        learnt = DisturbanceEstimate(
+            force, moment, force_rate, moment_rate, *resisting, settling, stuck
+        )
         return measured, learnt
 
     def shares(self, time: float, delay: float) -> Shares:
@@ -252,7 +275,7 @@ class Observer:
 
 def _faded(learnt: DisturbanceEstimate, time: float) -> DisturbanceEstimate:
     left = exp(-time / FORGETTING_TIME)
-    force, moment, _, _, friction, turning = learnt
+    force, moment, _, _, friction, turning, _, _ = learnt
     return DisturbanceEstimate(
         left * force, left * moment, friction=left * friction, turning=left * turning
     )

@@ -37,6 +37,7 @@ class Mode(Enum):
     NO_SOLUTION = "no torque can be computed"
     TWIST_WRONG = "twist and pose contradict each other"
     SIGN_WRONG = "twist and pose have opposite signs"
+    WHEELS_DIFFER = "the wheels turn otherwise than odometry says"
     TOO_FAR = "too far from the reference"
     OFF_PATH = "off the path"
     APPROACHING = "approaching the reference"
@@ -58,6 +59,7 @@ class Mode(Enum):
             Mode.NO_TWIST,
             Mode.TWIST_WRONG,
             Mode.SIGN_WRONG,
+            Mode.WHEELS_DIFFER,
         )
 
 

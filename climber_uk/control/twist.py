@@ -1,6 +1,7 @@
 """What an odometry's twist is worth: whether it is of its stamp, and whether the pose agrees."""
 
 import math
+from typing import NamedTuple
 
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
@@ -14,11 +15,15 @@ SHARE = 0.3  # by which they may differ: slip, scale
 # A twist that tells less than a half of the pose's way, as in another unit, is found over this
 # share of the largest error, where both go alike for some messages: else a pose is noisy or jumps
 TOO_LITTLE, TOO_LITTLE_DISTANCE, ALIKE, AT_LEAST = 0.5, 0.05, 0.9, 4
+# What tells less in each of some messages in a row is found at once, over as many times that
+# distance, if its square is as many times the squares by which the pose's steps have changed
+AT_ONCE, SMOOTH = 1.6, 2.0
+ROUGH = 1e-3  # [m²] of these at first, when nothing is known of a pose's noise
 # One that goes over this share of the largest error, while the other stays exactly as it is
 STILL_DISTANCE, STILL = 0.1, 0.02  # and [m/s] of a rim: less may be noise of what stands
 OPPOSED_DISTANCE = 0.1  # of the largest error: distance of both, to opposite sides
 OPPOSED_IN_A_ROW = 3  # odometry messages
-OPPOSED_IF_TOO_FAST = 0.02  # of the largest error: enough, once, where it is too fast as well
+OPPOSED_IF_TOO_FAST = 0.01  # of the largest error: enough, once, where it is too fast as well
 
 
 class TwistKind:
@@ -45,6 +50,30 @@ class TwistKind:
         self.is_mean = self._as_mean < SURELY * self._as_instant
 
 
+class Unlike(NamedTuple):
+    """Distances [m] in messages in a row, of each of which a twist tells less than half.
+
+    Noise of the pose may be the cause, unless they are more than its steps have changed of late.
+    """
+
+    pose: float = 0.0
+    twist: float = 0.0
+    step: float = 0.0  # [m] of the last message, by pose
+    roughness: float = ROUGH  # [m²] sum of squares of the changes of steps
+
+    def added(self, left: float, pose: float, twist: float, least: float) -> "Unlike":
+        """With a step [m] by pose, of `least` [m], and by twist; `left` of what is forgotten."""
+        roughness = left * self.roughness + (pose - self.step) ** 2
+        if abs(pose) < least or twist * pose >= TOO_LITTLE * pose * pose:
+            return Unlike(step=pose, roughness=roughness)
+        return Unlike(self.pose + pose, self.twist + twist, pose, roughness)
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether it may be."""
+        return self.pose * self.pose <= SMOOTH * self.roughness
+
+
 class TwistCheck:
     """Whether the twist is the rate of the pose: its sign may be wrong.
 
@@ -66,6 +95,7 @@ class TwistCheck:
         # of the same two: by pose while the twist is zero [m], the squares of its steps [m²], and
         # by twist while the pose stands [m]
         self._alone = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        self._unlike = Unlike(), Unlike()  # of the same two
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
         """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
@@ -88,6 +118,9 @@ class TwistCheck:
             _alone(on, forward, way, least, motion.speed == 0),
             _alone(round_, turned, rim, least, motion.yaw_rate == 0),
         )
+        at_once, yaw_at_once = self._unlike
+        at_once = at_once.added(left, forward, way, least)
+        self._unlike = at_once, yaw_at_once.added(left, turned, rim, least)
 
     def missing(self, largest: float) -> str:
         """Field of the twist that is zero while the pose goes; else ''."""
@@ -97,16 +130,27 @@ class TwistCheck:
                 return name
         return ""
 
-    def opposed(self, least: float) -> str:
-        """Field of the twist whose sign is not its pose's, over `least` [m] of both; else ''."""
+    def opposed(self, least: float, is_sure: bool = False) -> str:
+        """Field of the twist whose sign is not its pose's, over `least` [m] of both; else ''.
+
+        If something is wrong surely, what may be noise counts too.
+        """
         fields = zip(FIELDS, self._distances, self._products, strict=True)
         for name, (pose, twist), (alike, _, _) in fields:
             if alike < 0 and pose * twist < 0 and min(abs(pose), abs(twist)) > least:
+                return f"twist.{name}"
+        for name, it in zip(FIELDS, self._unlike, strict=True):
+            is_way = min(abs(it.pose), abs(it.twist)) > least and (is_sure or not it.is_noise)
+            if it.pose * it.twist < 0 and is_way:
                 return f"twist.{name}"
         return ""
 
     def too_little(self, least: float) -> str:
         """How little of the pose's way, over `least` [m] of it, a twist tells; '' if enough."""
+        for name, it in zip(FIELDS, self._unlike, strict=True):
+            is_way = abs(it.pose) > AT_ONCE * least and not it.is_noise
+            if it.pose * it.twist > 0 and is_way:
+                return f"{name} is {it.twist / it.pose:.2f} of it"
         for name, (pose, _), products in zip(FIELDS, self._distances, self._products, strict=True):
             alike, pose_2, twist_2 = products
             is_way = abs(pose) > least and pose * pose > AT_LEAST * pose_2

@@ -30,6 +30,7 @@ from climber_uk.messages.topics import (
     CONTROLLER,
     EMERGENCY_STOP,
     FORCE,
+    JOINTS,
     ODOMETRY,
     PARAMETERS,
     PRESSURE,
@@ -145,6 +146,8 @@ class UkTorqueController(ManagedNode):
         if stops.options.reads_battery:
             battery = self.subscription(BatteryState, BATTERY, self.on_battery, BEST_EFFORT)
             inputs.append(battery)
+        if self.controller.guard.options.encoder_distance > 0:
+            inputs.append(self.subscription(JointState, JOINTS, self.on_joints, BEST_EFFORT))
         return [
             *inputs,
             self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT, raw=True),
@@ -229,6 +232,19 @@ class UkTorqueController(ManagedNode):
         self.controller.stops.press(message.data, now)
         if message.data:
             self.publish(self.controller.look(now))
+
+    def on_joints(self, message: JointState) -> None:
+        """Compare odometry with the wheels' angles."""
+        names = self.names
+        try:
+            angles = reading_sensors.wheel_angles(
+                message, names.left_wheel_joint, names.right_wheel_joint
+            )
+        except ValueError as error:
+            self.report(JOINTS, "refused", str(error))
+            return
+        self.report(JOINTS, "")
+        self.controller.on_encoders(*angles)
 
     def on_battery(self, message: BatteryState) -> None:
         """Stop at a low charge or voltage."""

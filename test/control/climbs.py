@@ -51,6 +51,7 @@ class Climb:
         reference = self.trajectory.at(0.0)
         self.state = State(reference.pose + np.array(offset), reference.velocity)
         self.time, self.torques = 0.0, np.zeros(2)
+        self.angles = np.zeros(2)  # of the wheels [rad]
         self.times, self.states, self.modes, self.sent = [], [], [], []
         self.controller.on_reference(SECOND, sampled(self.trajectory, 60.0))
 
@@ -60,6 +61,8 @@ class Climb:
             now = SECOND + round(self.time * SECOND)
             told = odometry(self.time, self.state)
             answer = None
+            if self.controller.guard.options.encoder_distance > 0:
+                self.controller.on_encoders(*self.angles)
             if told is not None:
                 answer = self.controller.on_odometry(now, now - round(clock * SECOND), told.motion)
             answer = answer or self.controller.look(now)
@@ -71,6 +74,7 @@ class Climb:
             self.sent.append(self.torques)
             acting = motors(self.time, self.torques)
             self.state = self.plant.advance(self.state, acting, round(PERIOD / STEP), push)
+            self.angles = self.angles + PERIOD * self.plant.climber.wheel_rates(self.state)
             self.time += PERIOD
         return self
 

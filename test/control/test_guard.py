@@ -142,6 +142,14 @@ def test_friction_that_is_not_as_believed_is_no_runaway_however_late_the_loop_an
     link, share_of_friction, share_of_mass, breakaway
 ):
     climb = Climb()
+    run = assert_is_never_stopped(climb, link, share_of_friction, share_of_mass, breakaway, 4.0)
+    speed = np.hypot(run.velocity[:, 0], run.velocity[:, 1])
+    assert speed.max() < 2.4 * climb.reference_speed
+    assert run.distance[-1] < 5e-3
+
+
+def assert_is_never_stopped(climb, link, share_of_friction, share_of_mass, breakaway, seconds):
+    """Run of a climber that is other than believed."""
     controller, believed = climb.controller, climb.controller.law.climber
     true = replace(
         believed,
@@ -152,7 +160,7 @@ def test_friction_that_is_not_as_believed_is_no_runaway_however_late_the_loop_an
     run = simulate(
         climb.trajectory,
         climb.state,
-        4.0,
+        seconds,
         controller,
         true,
         link,
@@ -160,9 +168,40 @@ def test_friction_that_is_not_as_believed_is_no_runaway_however_late_the_loop_an
     )
     assert not controller.guard.faults
     assert controller.mode is Mode.FOLLOWING
-    speed = np.hypot(run.velocity[:, 0], run.velocity[:, 1])
-    assert speed.max() < 2.4 * climb.reference_speed
-    assert run.distance[-1] < 5e-3
+    return run
+
+
+TURNS_BACK = {
+    "shape": "sine_wave",
+    "sine_wave.length": 0.6,
+    "sine_wave.amplitude": 0.1,
+    "sine_wave.wavelength": 0.6,
+    "time_law": "rest_to_rest",
+    "rest_to_rest.rate": 0.25,
+    "rest_to_rest.ramp_time": 0.5,
+    "rest_to_rest.runs": 0,
+    "rest_to_rest.pause": 0.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("link", "share_of_friction", "share_of_mass", "breakaway"),
+    [
+        (late(4096, period=0.02, torque_lag=0.0177), 1.22, 1.08, 1.35),
+        (late(4096, period=0.01, torque_lag=0.0198, delay=0.0075), 0.67, 1.04, 1.53),
+        (late(4096, period=0.02, torque_lag=0.0190, delay=0.0075), 1.25, 1.11, 1.31),
+        (late(8192, period=0.02, torque_lag=0.0155, delay=0.0025), 1.41, 0.89, 1.45),
+        (late(4096, period=0.015, torque_lag=0.0169, delay=0.0025), 1.21, 1.13, 1.56),
+        (late(4096, period=0.02, torque_lag=0.0195, delay=0.0025), 1.40, 1.11, 1.53),
+        (late(4096, period=0.015, torque_lag=0.0188, delay=0.0025), 1.07, 0.85, 1.40),
+    ],
+)
+def test_a_seal_that_breaks_loose_at_each_reversal_is_no_fault(
+    link, share_of_friction, share_of_mass, breakaway
+):
+    """Odometry at 50 to 100 Hz, lazy motors, friction at rest up to 2.1 times the model's."""
+    climb = Climb(planner=TURNS_BACK)
+    assert_is_never_stopped(climb, link, share_of_friction, share_of_mass, breakaway, 8.0)
 
 
 def test_faults_count_for_a_while_only():

@@ -65,6 +65,11 @@ def swapped():
 
 LIES = {  # and the most [rad/s] it may turn at the end, where nothing resists that
     "yaw rate of the wrong sign": (told(yaw_rate=-1), 0.1),
+    "speed of the wrong sign": (told(speed=-1), 0.05),
+    "twist of the wrong sign": (told(speed=-1, yaw_rate=-1), 0.05),
+    "twist x 0.1": (told(speed=0.1, yaw_rate=0.1), 0.5),
+    "speed x 0.03": (told(speed=0.03), 0.15),
+    "yaw rate x 0.1": (told(yaw_rate=0.1), 0.1),
     "no twist": (told(speed=0, yaw_rate=0), 0.05),
     "no yaw rate": (told(yaw_rate=0), 0.05),
     "no speed": (told(speed=0), 0.05),

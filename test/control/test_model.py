@@ -5,7 +5,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from climber_uk.control.estimator import Estimator
 from climber_uk.control.model import SLOW, DisturbanceEstimate, Observer, predict
+from climber_uk.control.timing import Timing
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench
 from climber_uk.simulation.plant import Plant
@@ -155,6 +158,50 @@ def test_a_force_that_grew_is_not_expected_to_at_rest(speed, rate):
     assert (found.force_rate, found.moment_rate) == (rate, 2.0)
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("speed", "settling", "unexpected", "share_of"),
+    [
+        (0.2, 0.15, 30.0, 30.0),
+        (0.2, 0.15, 90.0, 40.0),  # no more than was learnt there
+        (0.2, 0.15, -30.0, 0.0),  # friction is no less
+        (0.04, 0.15, 30.0, 0.0),  # it has not broken loose
+        (0.2, 0.0, 30.0, 0.0),  # long ago
+    ],
+)
+def test_what_only_held_at_rest_is_unlearnt_as_soon_as_it_breaks_loose(
+    way, speed, settling, unexpected, share_of
+):
+    stuck = -40.0 if settling else 0.0
+    learnt = DisturbanceEstimate(-20.0 * way, friction=20.0, settling=settling, stuck=stuck * way)
+    expected = State.rolling(np.zeros(3), way * (speed - 0.005 * unexpected / 5), 0.0).motion
+    found = expected._replace(speed=way * speed)
+    _, then = Observer().corrected(CLIMBER, learnt, expected, found, 0.005, (0.0, 1.0), way)
+    before, after = (it.force - way * it.friction for it in (learnt, then))
+    unlearnt = way * share_of * (1 - np.exp(-0.25))
+    assert after - before == pytest.approx(unlearnt, abs=1e-9)
+    assert then.stuck == pytest.approx(stuck * way + unlearnt)
+    assert (then.force_rate == 0.0) == (settling > 0)
+
+
+def test_what_is_learnt_at_rest_is_remembered_until_it_has_slid_for_a_while():
+    def seen(estimator, tick, speed):
+        estimator.see(SECOND + tick * SECOND // 200, State.rolling(np.zeros(3), speed, 0.0).motion)
+        return estimator.learnt
+
+    estimator = Estimator(CLIMBER, Observer(), Timing())
+    for tick in range(10):
+        learnt = seen(estimator, tick, 0.0)
+        estimator.sent(estimator.begin(0.0), Torques(3.0, 3.0), True, 0.2)
+    assert learnt.stuck == pytest.approx(learnt.force - learnt.friction)
+    assert learnt.stuck < -10.0
+    for tick in range(10, 49):
+        assert seen(estimator, tick, 0.011).stuck < 0.0
+    for tick in range(49, 52):
+        learnt = seen(estimator, tick, 0.011)
+    assert learnt.stuck == 0.0
+
+
 def test_what_is_as_expected_changes_nothing_that_was_learnt():
     rolling = State.rolling(np.zeros(3), 1.0, 0.0).motion
     learnt = DisturbanceEstimate(9.0, 1.0, 0.0, 0.0, 3.0)
@@ -172,7 +219,8 @@ def test_an_observer_that_is_off_forgets_in_a_fifth_of_a_second(source):
     learnt = DisturbanceEstimate(9.0, 1.0, friction=3.0)
     _, found = observer.corrected(CLIMBER, learnt, rolling, rolling, 0.2, (0.0, 0.0))
     left = np.exp(-1)
-    assert found == pytest.approx((9.0 * left, left, 0.0, 0.0, 3.0 * left, 0.0))
+    forgotten = DisturbanceEstimate(9.0 * left, left, friction=3.0 * left)
+    assert found == pytest.approx(forgotten)
 
 
 def test_what_friction_holds_teaches_nothing():

@@ -341,6 +341,26 @@ def test_suction_that_is_lost_stops_the_climber_and_its_margins_tell(world):
     loop.follows()
 
 
+def test_wheels_that_stand_while_odometry_goes_are_told_and_stop_it(world):
+    loop = Loop(world, "odometry_timeout:=1.0", "guard.encoder_distance:=0.01")
+    joints, names = (
+        world.speak(JointState, "joint_states"),
+        ["left_wheel_joint", "right_wheel_joint"],
+    )
+    loop.plan()
+    loop.follows()
+    joints.publish(JointState(name=names, position=[1.0]))
+    world.wait(lambda: "joint_states: refused (1 positions of 2" in world.log(NAME), "a refusal")
+
+    def is_told():
+        joints.publish(JointState(name=names, position=[1.0, 2.0]))
+        loop.tell()
+        return "the wheels turn otherwise than odometry says (the " in world.log(NAME)
+
+    world.wait(is_told, "word of it")
+    loop.is_safe()
+
+
 def test_an_emergency_stop_lasts_until_it_is_enabled_and_a_low_battery_stops_it(world):
     stops = ["stops.emergency_stop:=true", "stops.least_charge:=0.2"]
     loop = Loop(world, "odometry_timeout:=1.0", *stops)

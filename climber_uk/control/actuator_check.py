@@ -1,0 +1,122 @@
+"""Whether each wheel answers its torque: detection of a dead motor, and of which one it is.
+
+The force that acted on each wheel is that of (11) and (15), from two odometry messages in a row; it
+is compared with the one that the torque should have caused.
+"""
+
+import math
+
+from climber_uk.control.estimator import Observed
+from climber_uk.mechanics.climber import Climber
+
+SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
+UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
+LACKS = 0.3, 1.3  # of a wheel's torque that is missing all at once, if nothing of the other one's
+LACKS_ELSE = 0.25  # of the same, is missing or too much there
+LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
+LACKS_IN_A_ROW = 3  # odometry messages
+EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
+
+
+class Variance:
+    """Mean and variance of what was added, each older value counting less."""
+
+    def __init__(self) -> None:
+        self.number, self.mean, self.variance = 0, 0.0, 0.0
+
+    def add(self, value: float, weight: float) -> None:
+        """Add a value that has `weight` (0 to 1), and all before it the rest."""
+        self.number += 1
+        if self.number == 1:
+            self.mean = value
+            return
+        off = value - self.mean
+        self.mean += weight * off
+        self.variance = (1 - weight) * (self.variance + weight * off * off)
+
+
+class Wheel:
+    """A wheel that answers its torque: the force that acted follows the one that was asked for.
+
+    Of a dead one the force stays what it was, and what is unexplained, the difference, varies.
+    What resists the climber as a whole makes that vary on both sides.
+    """
+
+    def __init__(self) -> None:
+        self.asked, self.acted, self.unexplained = Variance(), Variance(), Variance()
+        self.force = self.missing = 0.0  # [N] that was asked for last, and what of it did not act
+        self.lacking = 0  # odometry messages in a row, for which it was
+
+    def add(self, asked: float, acted: float, known: float, weight: float) -> None:
+        """Add the force [N] that a torque should cause, the one that acted, and a known one."""
+        self.asked.add(asked, weight)
+        self.acted.add(acted, weight)
+        self.unexplained.add(acted - asked, weight)
+        self.force, self.missing = asked, asked + known - acted
+
+    def lacks(self, other: "Wheel", largest: float) -> bool:
+        """Whether its force is missing all at once, of `largest` [N], and only its force."""
+        force = abs(self.force)
+        missing = math.copysign(1.0, self.force) * self.missing
+        least, most = LACKS
+        is_missing = force > LACKS_FROM * largest and least * force < missing < most * force
+        alone = abs(other.missing) < LACKS_ELSE * force
+        self.lacking = self.lacking + 1 if is_missing and alone else 0
+        return self.lacking >= LACKS_IN_A_ROW
+
+    def answers(self, other: "Wheel", largest: float, proof: float) -> bool:
+        """Whether it does, or too little was asked of it to know; of `largest` [N] at most."""
+        excited = self.asked.variance > (proof * EXCITED * largest) ** 2
+        explained = max(self.acted.variance, other.unexplained.variance)
+        return not (excited and self.unexplained.variance > proof * UNANSWERED * explained)
+
+
+class ActuatorCheck:
+    """Whether both wheels of a climber that slides answer their torques."""
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Compare from now on."""
+        self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
+        self._had_time = False  # to answer
+
+    def add(self, climber: Climber, observed: Observed, response_time: float) -> None:
+        """Take what an odometry tells of the time since the last: see `Wheel`.
+
+        They have a `response_time` [s] to answer; 0: nothing is compared.
+        """
+        before, after, time = observed.before, observed.after, observed.time
+        if response_time == 0 or min(abs(before.speed), abs(after.speed)) < SLIDES:
+            if self._moved:
+                self.restart()
+            return
+        self._moved += time
+        self._had_time = self._moved > response_time
+        mass, inertia, friction, weight = climber.inertial
+        drive = mass * (after.speed - before.speed) / time + weight * after.sine
+        drive += math.copysign(friction, after.speed)
+        yaw_force = inertia * (after.yaw_rate - before.yaw_rate) / time / climber.half_track
+        new = 1 - math.exp(-time / response_time)
+        push, turn = observed.disturbance
+        turn /= climber.half_track
+        acted = (drive + yaw_force) / 2, (drive - yaw_force) / 2
+        known = (push + turn) / 2, (push - turn) / 2
+        rows = zip(self._wheels, observed.torques, acted, known, strict=True)
+        for wheel, torque, force, push in rows:
+            wheel.add(torque / climber.wheel_radius, force, push, new)
+
+    def dead(self, climber: Climber, proof: float) -> str:
+        """Name of the wheel that does not answer, else ''; `proof` is the share that is enough."""
+        if not self._moved:
+            return ""
+        largest, (right, left) = climber.max_wheel_torque / climber.wheel_radius, self._wheels
+        wheels = ("right", right, left), ("left", left, right)
+        lacking = (name for name, wheel, other in wheels if wheel.lacks(other, largest))
+        if name := next(lacking, ""):
+            return name
+        if not self._had_time:
+            return ""
+        silent = (name for name, it, other in wheels if not it.answers(other, largest, proof))
+        return next(silent, "")
