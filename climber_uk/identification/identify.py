@@ -1,7 +1,7 @@
 """`identify BAG`: mass, inertia, friction and geometry of the climber that a bag was recorded of.
 
 `identify --plan FILE` writes a parameter file with a trajectory that shows them well. The status is
-1 if a parameter is not determined, or something went wrong.
+1 if a parameter is not determined, and 2 if the bag or an argument is no good.
 """
 
 import argparse
@@ -26,14 +26,17 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, given, read_sections
-from climber_uk.report.outputs import check_writable, printable
+from climber_uk.report.outputs import check_writable, failing_in_a_line
 from climber_uk.system.command_line import Parser, between
 
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
-def identify_bag(options: argparse.Namespace) -> None:
-    """Print and write the parameters; raises `ValueError` if one is not determined."""
+def identify_bag(options: argparse.Namespace, remarks_on_bag: list[str]) -> list[str]:
+    """Print and write the parameters; return a sentence on each that is not determined.
+
+    `remarks_on_bag` gets what of the bag could not be read. Raises `OSError` or `ValueError`.
+    """
     cut = Values(vars(options)).read(Cut)
     file, plant = parameters_of(CONTROLLER, options), plant_of(options)
     names = Topics({ODOMETRY: options.odometry})
@@ -45,8 +48,7 @@ def identify_bag(options: argparse.Namespace) -> None:
     then = {**file, **recorded}
     delay = then.get("transport_delay", 0.0) if options.delay is None else options.delay
     motion, unfit = read_motion(reader, climber, then, assumed.suction_pressure, delay)
-    for loss in reader.bag.losses:
-        print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
+    remarks_on_bag += [f"{options.bag}: {loss}" for loss in reader.bag.losses]
     found = identify(motion, assumed, cut, site)
     print(table(found, assumed), end="")
     print(*remarks(found), sep="\n")
@@ -61,8 +63,7 @@ def identify_bag(options: argparse.Namespace) -> None:
         identification_figure.draw(motion, assumed, found, options.figure)
     if options.output:
         write_changed(options.params, changes(found, assumed), options.output)
-    if sentences := list(missing(found)):
-        raise ValueError("\n".join(sentences))
+    return list(missing(found))
 
 
 def plan(options: argparse.Namespace) -> None:
@@ -129,13 +130,14 @@ def main() -> None:
     options = parser.arguments()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
-    try:
+    untold: list[str] = []
+    with failing_in_a_line("identify") as remarks_on_bag:
         for file in (options.output, options.json, options.figure, options.plan):
             if file:
                 check_writable(file.parent)
         if options.plan:
             plan(options)
         else:
-            identify_bag(options)
-    except (ValueError, OSError) as error:
-        sys.exit(f"identify: {error}")
+            untold = identify_bag(options, remarks_on_bag)
+    if untold:
+        sys.exit(f"identify: {'; '.join(untold)}")

@@ -23,6 +23,7 @@ from climber_uk.parameters.parameter_file import Values, read_argument, refuse_u
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import Demands, demands
 from climber_uk.path_check.fastest import fastest
+from climber_uk.report.outputs import failing_in_a_line, printable
 from climber_uk.system.command_line import Parser, between
 
 NAMES = {
@@ -121,7 +122,7 @@ def main() -> None:
     )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
-    try:
+    with failing_in_a_line("check_path"):
         trajectory, climber, attachment = read(options.params, dict(options.param))
         found = demands(trajectory, climber, attachment, options.margin)
         numbers = told(found, trajectory, climber.half_track)
@@ -135,8 +136,5 @@ def main() -> None:
 
             options.output.mkdir(parents=True, exist_ok=True)
             (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
-            print(draw(found, options.output / "check_path.png"))
-    except (ValueError, OSError) as error:
-        print(f"check_path: {error}", file=sys.stderr)
-        sys.exit(2)
+            print(printable(str(draw(found, options.output / "check_path.png"))))
     sys.exit(not numbers["feasible"])

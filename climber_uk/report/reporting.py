@@ -16,13 +16,13 @@ from climber_uk.parameters.parameter_file import Values
 from climber_uk.report import figures
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import Case
-from climber_uk.report.outputs import check_writable, output, printable
+from climber_uk.report.outputs import check_writable, failing_in_a_line, output, printable
 from climber_uk.report.page import page
 from climber_uk.report.tables import Column, to_csv, to_json
 from climber_uk.system.command_line import Parser, between
 
 OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
-FAILED, UNREADABLE = 1, 2
+FAILED = 1  # exit status
 OUTPUT_HELP = (
     "directory for report.html and metrics.* (default: a new one in the first bag, or beside it)"
 )
@@ -88,19 +88,17 @@ def report(
     text: Callable[[Sequence[Column]], str],
 ) -> int:
     """Print `text` of some bags and write their metrics; return the exit status."""
-    try:
-        with output(bags[0], OUTPUTS[command], options.output) as directory:
-            if options.figures:
-                check_writable(options.figures)
-            columns = _read(bags, options)
-            for loss in dict.fromkeys(f"{c.bag}: {loss}" for c in columns for loss in c.losses):
-                print(f"{command}: {printable(loss)}", file=sys.stderr)
-            print(printable(text(columns)))
-            for path in _write(title, columns, directory, options.figures):
-                print(path)
-    except (ValueError, OSError) as error:
-        print(f"{command}: {printable(str(error))}", file=sys.stderr)
-        return UNREADABLE
+    with (
+        failing_in_a_line(command) as remarks,
+        output(bags[0], OUTPUTS[command], options.output) as directory,
+    ):
+        if options.figures:
+            check_writable(options.figures)
+        columns = _read(bags, options)
+        remarks += dict.fromkeys(f"{c.bag}: {loss}" for c in columns for loss in c.losses)
+        print(printable(text(columns)))
+        for path in _write(title, columns, directory, options.figures):
+            print(printable(str(path)))
     failures = [condition.failure(c) for condition in options.fail_if for c in columns]
     for failure in filter(None, failures):
         print(f"{command}: failed: {printable(failure)}", file=sys.stderr)
