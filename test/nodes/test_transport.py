@@ -16,8 +16,8 @@ from climber_uk.ros.transport import (
     use_udp,
 )
 
-UDP, LOCAL = {TRANSPORTS: "UDPv4"}, {RANGE: "SUBNET", PROFILES: str(LOCALHOST)}
-SHARED_MEMORY = "/dev/shm/fastrtps"
+UDP, LOCAL = {TRANSPORTS: "UDPv4"}, {RANGE: "SUBNET", **dict.fromkeys(PROFILES, str(LOCALHOST))}
+SHARED_MEMORY = "/dev/shm/fastrtps", "/dev/shm/fastdds"  # up to Jazzy, and from Kilted on
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ SHARED_MEMORY = "/dev/shm/fastrtps"
         ({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", RANGE: "LOCALHOST"}, UDP | LOCAL),
         # whoever has chosen is left alone
         ({TRANSPORTS: "DEFAULT", RANGE: "LOCALHOST"}, None),
-        ({PROFILES: "mine.xml", RANGE: "LOCALHOST"}, None),
+        *(({variable: "mine.xml", RANGE: "LOCALHOST"}, None) for variable in PROFILES),
         ({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp", RANGE: "LOCALHOST"}, None),
     ],
 )
@@ -72,13 +72,14 @@ while not heard:
 
 def chooses(world, **chosen):
     """Make these all that is chosen of the middleware, for the processes started from now on."""
-    for name in (TRANSPORTS, PROFILES, RANGE):
+    for name in (TRANSPORTS, *PROFILES, RANGE):
         world.environment.pop(name, None)
     world.environment.update(chosen)
 
 
 def uses_shared_memory(process):
-    return "/dev/shm/fastrtps" in Path(f"/proc/{process.pid}/maps").read_text()
+    maps = Path(f"/proc/{process.pid}/maps").read_text()
+    return any(name in maps for name in SHARED_MEMORY)
 
 
 @pytest.mark.nodes
