@@ -39,18 +39,21 @@ PATHS = {  # parameters that are files
 }
 
 
-def read(file: Path, changes: dict[str, Any]) -> tuple[Trajectory, Climber, Attachment]:
+def read(
+    file: Path, changes: dict[str, Any], remarks: list[str]
+) -> tuple[Trajectory, Climber, Attachment]:
     """Path, climber and what holds it, by a parameter file and changes of the path's parameters.
 
-    Raises `ValueError`, also for a name that no part of the path has.
+    Raises `ValueError`, also for a name that no part of the path has. `remarks` gets a line on each
+    value that can hardly be meant.
     """
-    planner = {**read_parameters(file, f"/{PLANNER}"), **changes}
+    planner = {**read_parameters(file, f"/{PLANNER}", remarks), **changes}
     refuse_unknown(changes, NAMES, "a path")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
         planner[name] = located(planner[name], name, f"/{PLANNER}", words)
     trajectory = build_trajectory(Values(planner).read)
-    values = Values(read_parameters(file, f"/{CONTROLLER}"))
+    values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
     name = values.read(ControllerChoice).adhesion
     attachment = Attachment(
         adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)
@@ -122,8 +125,8 @@ def main() -> None:
     )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
-    with failing_in_a_line("check_path"):
-        trajectory, climber, attachment = read(options.params, dict(options.param))
+    with failing_in_a_line("check_path") as remarks:
+        trajectory, climber, attachment = read(options.params, dict(options.param), remarks)
         found = demands(trajectory, climber, attachment, options.margin)
         numbers = told(found, trajectory, climber.half_track)
         if options.fastest:

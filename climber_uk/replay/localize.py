@@ -12,7 +12,7 @@ from typing import Any
 
 from climber_uk.bags.bag import open_bag
 from climber_uk.bags.topics import Topics
-from climber_uk.closed_loop.node_parameters import NODES_ONLY
+from climber_uk.closed_loop.node_parameters import NODES_ONLY, doubts
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.sensor_frames import SensorFrames
 from climber_uk.messages.names import Names
@@ -28,12 +28,20 @@ from climber_uk.system.command_line import Parser
 MOST_REMARKS = 10  # that are printed
 
 
-def parameters_of(options: argparse.Namespace, namespace: str) -> dict[str, Any]:
-    """Parameters of the node by name; raises `ValueError` naming one that it does not have."""
+def parameters_of(
+    options: argparse.Namespace, namespace: str, remarks: list[str]
+) -> dict[str, Any]:
+    """Parameters of the node by name; raises `ValueError` naming one that it does not have.
+
+    `remarks` gets a line on each value of the file that can hardly be meant.
+    """
     name = Topics().full(LOCALIZATION, namespace)
     kinds = LocalizationOptions, SensorFrames, Names
-    known = {field.name for kind in kinds for field in fields(kind)}
-    parameters = read_file(options.params, name, known | NODES_ONLY) if options.params else {}
+    known = {field.name: field for kind in kinds for field in fields(kind)}
+    parameters = {}
+    if options.params:
+        parameters = read_file(options.params, name, known.keys() | NODES_ONLY)
+        remarks += doubts(options.params, parameters, known)
     changes = dict(map(read_argument, options.parameter))
     refuse_unknown(changes, known, LOCALIZATION)
     return {**parameters, **changes}
@@ -89,7 +97,7 @@ def main() -> None:
         failing_in_a_line("localize") as remarks,
         output(options.bag, "localization", options.output) as directory,
     ):
-        values = Values(parameters_of(options, namespace))
+        values = Values(parameters_of(options, namespace, remarks))
         sensors, found = localize(options.bag, namespace, values, remarks)
         print(printable(table(sensors, found)))
         for name, estimates in (("forward", found.forward), ("smoothed", found.smoothed)):

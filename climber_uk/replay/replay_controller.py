@@ -28,10 +28,12 @@ from climber_uk.system.command_line import Parser, between
 def replayed(options: argparse.Namespace, remarks: list[str]) -> Comparison:
     """Replay a bag; raises `OSError` or `ValueError`, of one line, if that cannot be.
 
-    `remarks` gets what of the bag could not be read, or is not in it.
+    `remarks` gets what of the bag could not be read, or is not in it, and doubtful parameters.
     """
     namespace = "/" + options.namespace.strip("/") if options.namespace.strip("/") else ""
-    file = read_parameters(options.params, f"{namespace}/{CONTROLLER}") if options.params else None
+    file = None
+    if options.params:
+        file = read_parameters(options.params, f"{namespace}/{CONTROLLER}", remarks)
     given = dict(read_argument(argument) for argument in options.parameter)
     refuse_unknown(given, DEFAULTS, "the control law")
 

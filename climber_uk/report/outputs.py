@@ -20,17 +20,17 @@ UNREADABLE = 2  # exit status: a bag or a parameter file that is not to be read,
 def failing_in_a_line(tool: str) -> Iterator[list[str]]:
     """Have a tool end with one line and status 2 where it raises `OSError` or `ValueError`.
 
-    Yields a list for remarks, such as what of a bag could not be read: a line each where all goes
-    well, and else in brackets behind the reason.
+    Yields a list for remarks, on what of a bag could not be read, or can hardly be meant in a
+    parameter file: a line each where all goes well, and else in brackets behind the reason.
     """
     remarks: list[str] = []
     try:
         yield remarks
     except (ValueError, OSError) as error:
-        behind = f" ({'; '.join(remarks)})" if remarks else ""
+        behind = f" ({'; '.join(dict.fromkeys(remarks))})" if remarks else ""
         print(f"{tool}: {one_line(f'{error}{behind}')}", file=sys.stderr)
         sys.exit(UNREADABLE)
-    for remark in remarks:
+    for remark in dict.fromkeys(remarks):
         print(f"{tool}: {one_line(remark)}", file=sys.stderr)
 
 

@@ -94,7 +94,7 @@ def report(
     ):
         if options.figures:
             check_writable(options.figures)
-        columns = _read(bags, options)
+        columns = _read(bags, options, remarks)
         remarks += dict.fromkeys(f"{c.bag}: {loss}" for c in columns for loss in c.losses)
         print(printable(text(columns)))
         for path in _write(title, columns, directory, options.figures):
@@ -105,7 +105,7 @@ def report(
     return FAILED if any(failures) else 0
 
 
-def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
+def _read(bags: Sequence[Path], options: Namespace, remarks: list[str]) -> list[Column]:
     names = Topics.parse(options.remap)
     columns: list[Column] = []
     for bag, label in zip(bags, _labels(bags), strict=True):
@@ -113,7 +113,7 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
             bag,
             names,
             options.namespace,
-            parameters=partial(_parameters, options.params) if options.params else None,
+            parameters=partial(_parameters, options.params, remarks) if options.params else None,
             all_of_them=bool(options.fail_if),
         )
         for run in runs:
@@ -124,8 +124,8 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
     return columns
 
 
-def _parameters(file: Path, namespace: str) -> dict[str, Any]:
-    found = read_parameters(file, f"/{namespace}/{CONTROLLER}".replace("//", "/"))
+def _parameters(file: Path, remarks: list[str], namespace: str) -> dict[str, Any]:
+    found = read_parameters(file, f"/{namespace}/{CONTROLLER}".replace("//", "/"), remarks)
     Values(found).read(Climber)  # which says what is wrong with them
     return found
 

@@ -10,8 +10,10 @@ from pathlib import Path
 
 LOCALHOST = Path(__file__).with_name("localhost.xml")
 TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
-# up to Jazzy, and from Kilted on: each takes no heed of the other's
-PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"
+# up to Jazzy, which is what the wheels are, and from Kilted on, which warns of the first;
+# distributions go by the alphabet
+BOTH_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"
+PROFILES = BOTH_PROFILES[os.environ.get("ROS_DISTRO", "jazzy") > "jazzy"]
 # ports of domain 0, of which each domain has 250: one that DDS leaves free, and its first
 MARK, FIRST_PARTICIPANT = 7405, 7410
 RANGE, ONLY_LOCAL = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
@@ -24,12 +26,12 @@ def use_udp(environment: MutableMapping[str, str] = os.environ) -> None:
     case, so there a profile takes the place of that range.
     """
     middleware = environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
-    if environment.keys() & {TRANSPORTS, *PROFILES} or "fastrtps" not in middleware:
+    if environment.keys() & {TRANSPORTS, *BOTH_PROFILES} or "fastrtps" not in middleware:
         return
     environment[TRANSPORTS] = "UDPv4"
     # the older variable goes before the range
     if environment.pop(ONLY_LOCAL, "0") == "1" or environment.get(RANGE) == "LOCALHOST":
-        environment.update({RANGE: "SUBNET", **dict.fromkeys(PROFILES, str(LOCALHOST))})
+        environment.update({RANGE: "SUBNET", PROFILES: str(LOCALHOST)})
 
 
 def free_domain() -> tuple[int, socket.socket | None]:

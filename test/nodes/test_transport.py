@@ -16,7 +16,7 @@ from climber_uk.ros.transport import (
     use_udp,
 )
 
-UDP, LOCAL = {TRANSPORTS: "UDPv4"}, {RANGE: "SUBNET", **dict.fromkeys(PROFILES, str(LOCALHOST))}
+UDP, LOCAL = {TRANSPORTS: "UDPv4"}, {RANGE: "SUBNET", PROFILES: str(LOCALHOST)}
 SHARED_MEMORY = "/dev/shm/fastrtps", "/dev/shm/fastdds"  # up to Jazzy, and from Kilted on
 
 
@@ -32,7 +32,7 @@ SHARED_MEMORY = "/dev/shm/fastrtps", "/dev/shm/fastdds"  # up to Jazzy, and from
         ({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", RANGE: "LOCALHOST"}, UDP | LOCAL),
         # whoever has chosen is left alone
         ({TRANSPORTS: "DEFAULT", RANGE: "LOCALHOST"}, None),
-        *(({variable: "mine.xml", RANGE: "LOCALHOST"}, None) for variable in PROFILES),
+        ({PROFILES: "mine.xml", RANGE: "LOCALHOST"}, None),
         ({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp", RANGE: "LOCALHOST"}, None),
     ],
 )
@@ -72,7 +72,7 @@ while not heard:
 
 def chooses(world, **chosen):
     """Make these all that is chosen of the middleware, for the processes started from now on."""
-    for name in (TRANSPORTS, *PROFILES, RANGE):
+    for name in (TRANSPORTS, PROFILES, RANGE):
         world.environment.pop(name, None)
     world.environment.update(chosen)
 
