@@ -42,10 +42,12 @@ def _cards(column: Column) -> Iterator[tuple[str, Card]]:
     level = OK if is_settled else WARNING
     yield "rms_distance", Card("Tracking", main, f"{note}; {settled}", level)
     saturated = values["saturation"] > 0
-    note = (
-        f"saturated {shown('saturation')} of the time; {shown('energy_per_metre')}; changes by "
-        f"{shown('rms_torque_change')} a period"
-    )
+    told = {
+        "saturation": f"saturated {shown('saturation')} of the time",
+        "energy_per_metre": shown("energy_per_metre"),
+        "rms_torque_change": f"changes by {shown('rms_torque_change')} a period",
+    }
+    note = "; ".join(said for name, said in told.items() if math.isfinite(values[name]))
     level = WARNING if saturated else OK
     yield "peak_torque", Card("Motors", f"{shown('peak_torque')} peak", note, level)
     note = (
@@ -78,7 +80,9 @@ def verdict(column: Column) -> str:
     of = "truth_" if math.isfinite(values["truth_max_distance"]) else ""
     far = f"at most {shown(f'{of}max_distance')} off"
     stops = values["safety_stops"]
-    if stops > 0:
+    if math.isnan(values["max_distance"]) and not stops > 0:
+        said = "There is no reference in it, so that nothing can be said of its path"
+    elif stops > 0:
         said = f"It stopped for safety ({STOPS.get(stops, f'{stops:.0f} stops')})"
     elif values["following"] == 0:
         said = "It did not follow its reference"

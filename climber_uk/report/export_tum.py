@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from climber_uk.bags.run_reader import NoRunError, RunReader
-from climber_uk.bags.topics import Topics
+from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
 from climber_uk.report.outputs import failing_in_a_line, output, printable
@@ -28,7 +28,8 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
     reader, found = RunReader.read(bag, Topics(), namespace)
     topic = reader.topic(ODOMETRY)
     if not found.samples[ODOMETRY]:
-        raise ValueError("; ".join([f"{bag} has no message on {topic}", *reader.bag.losses]))
+        lacking = reader.bag.lacks(topic, TYPES[ODOMETRY])
+        raise ValueError("; ".join([f"{bag} has {lacking}", *reader.bag.losses]))
     runs = []
     for part in reader.split(found):
         try:
