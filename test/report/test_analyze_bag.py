@@ -206,7 +206,7 @@ def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_pat
     tracking = rows.index(["Tracking"])
     assert rows[tracking + 1] == ["truth_rms_distance", "300", "mm"]
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "<b>300 mm RMS, truly</b>" in page
+    assert "<b>300 mm RMS (true)</b>" in page
     assert "by the odometry" in page
     told = json.loads((tmp_path / "out" / "metrics.json").read_text())["runs"][0]["metrics"]
     assert told["truth_max_distance"] == pytest.approx(0.3)
