@@ -94,7 +94,7 @@ $(KILTED)/set-up: requirements.txt setup.py
 	$(PYTHON) -m venv $(KILTED)
 	grep -v '^ros-' requirements.txt > $(KILTED)/requirements.txt
 	$(KILTED)/bin/pip install --quiet --requirement $(KILTED)/requirements.txt \
-		'ros-kilted-rclpy[fastrtps]' ros-kilted-common-interfaces
+		'ros-kilted-rclpy[fastrtps]==9.1.2' ros-kilted-common-interfaces==5.5.1
 	$(KILTED)/bin/pip install --quiet --no-deps --no-build-isolation evo==1.38.1 --editable .
 	touch $@
 
