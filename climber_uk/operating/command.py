@@ -11,6 +11,7 @@
 The status is 0 if it is done, 1 if it is refused, 3 if nobody answers.
 """
 
+import os
 import sys
 import time
 from argparse import ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
@@ -58,7 +59,8 @@ class Operator:
         while not condition():
             rclpy.spin_once(self.node, timeout_sec=PERIOD)
             if time.monotonic() > until:
-                raise NoAnswerError(f"nobody answers: {what} (within {self.timeout:g} s)")
+                where = f"in ROS domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
+                raise NoAnswerError(f"nobody answers: {what} ({where}, within {self.timeout:g} s)")
 
     def call(self, kind: Any, name: str, request: Any) -> Any:
         """Response of a service."""
