@@ -12,13 +12,14 @@ CAMPAIGN ?= config/campaign.yaml
 CAMPAIGN_OUTPUT ?= demo_output/$(basename $(notdir $(CAMPAIGN)))
 VENV := .venv
 KILTED := .venv-kilted
+SBOM := .venv-sbom
 BIN := $(VENV)/bin
 # What has been installed: for nodes, recorder and analysis; for tests, campaigns and benches too
 SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean test-kilted
+.PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean test-kilted sbom
 
 ## run the nodes, and tell how well; CONFIG=config/climber.yaml, CLOCK=wall, CLIMBERS=4
 demo: $(SET_UP)
@@ -93,8 +94,18 @@ $(KILTED)/set-up: requirements.txt setup.py
 	$(PYTHON) -m venv $(KILTED)
 	grep -v '^ros-' requirements.txt > $(KILTED)/requirements.txt
 	$(KILTED)/bin/pip install --quiet --requirement $(KILTED)/requirements.txt \
-		'ros-kilted-rclpy[fastrtps]' ros-kilted-common-interfaces
+		'ros-kilted-rclpy[fastrtps]==9.1.2' ros-kilted-common-interfaces==5.5.1
 	$(KILTED)/bin/pip install --quiet --no-deps --no-build-isolation evo==1.38.1 --editable .
+	touch $@
+
+## sbom.json: all that .venv has, with versions and licences, in CycloneDX's form
+sbom: $(SET_UP) $(SBOM)/set-up
+	$(SBOM)/bin/cyclonedx-py environment --output-reproducible --output-file sbom.json \
+		$(BIN)/python
+
+$(SBOM)/set-up:
+	$(PYTHON) -m venv $(SBOM)
+	$(SBOM)/bin/pip install --quiet --disable-pip-version-check cyclonedx-bom==7.5.0
 	touch $@
 
 ## longer tests than CI has time for
@@ -131,4 +142,4 @@ $(TOOLS): requirements.txt setup.py
 
 ## remove what the others made
 clean:
-	rm -rf $(VENV) $(KILTED) build install log demo_output
+	rm -rf $(VENV) $(KILTED) $(SBOM) sbom.json build install log demo_output

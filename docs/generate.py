@@ -94,7 +94,7 @@ CONTENTS = {
     "~/disturbance": "force [N], moment [N m] that the model did not expect, in `base_link`; 20 Hz",
     topics.private(
         topics.MARGINS[1]
-    ): "lowest slip, tip margin (below 1 it slips, tips), load on the wheels [N]; 20 Hz",
+    ): "lowest slip, tip margin (below 1 it slips, or tips over), load on the wheels [N]; 20 Hz",
     topics.private(
         topics.PARAMETERS
     ): "all parameters as they are, at the start and whenever one changes",

@@ -15,7 +15,7 @@ from climber_uk.messages.topics import CONTROLLER, LOCALIZATION, PLANNER, PLANT
 from climber_uk.system.command_line import Parser
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 OURS = {
     script.name: script.module
     for script in entry_points(group="console_scripts")

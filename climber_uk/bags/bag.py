@@ -17,7 +17,7 @@ from typing import Any
 from rosbags.typesys.store import Typestore
 
 from climber_uk.bags.bag_files import open_file, other_files, storage_files
-from climber_uk.bags.connection import Connection, Logged, StorageFile, one_line
+from climber_uk.bags.connection import Connection, Logged, StorageFile, listed, one_line
 from climber_uk.bags.definitions import LONGEST, defined, known
 from climber_uk.bags.unpacking import LARGEST_MESSAGE, ZSTD_MAGIC, Allowance, unpack
 
@@ -47,6 +47,15 @@ class Bag:
         """Type by topic; of two types of a topic, the one with more messages."""
         by_count = sorted(self.connections, key=attrgetter("msgcount"))
         return {connection.topic: connection.msgtype for connection in by_count}
+
+    def lacks(self, topic: str, type_name: str) -> str:
+        """Words on a topic that has no message: its other type, or which topics have that type."""
+        types = self.types
+        others = sorted(name for name, kind in types.items() if kind == type_name)
+        if types.get(topic, type_name) != type_name:
+            return f"no message on {topic} (it is {types[topic]}, not {type_name})"
+        there = f" ({type_name} is on {listed(others)})" if others and topic not in others else ""
+        return f"no message on {topic}{there}"
 
     def count(self, topics: Collection[str]) -> int:
         """Return the number of messages of some topics, as the files state it."""

@@ -95,7 +95,8 @@ def open_file(path: Path, scratch: Path, lose: Lose) -> StorageFile:
     try:
         return kind(path, scratch, lose)
     except ValueError as error:
-        what = f"; it is {description(path)}" if _kind(path) is None else ""
+        is_other = _kind(path) is None and path.stat().st_size
+        what = f"; it is {description(path)}" if is_other else ""
         raise ValueError(f"{error}{what}") from None
 
 

@@ -1,5 +1,6 @@
 """Types of messages as a bag defines them, within the sizes that messages have."""
 
+from functools import lru_cache
 from typing import Any
 
 from rosbags.interfaces import Nodetype
@@ -8,6 +9,7 @@ from rosbags.typesys.store import Typestore
 
 from climber_uk.bags.storage import TYPESTORE
 
+MOST_KEPT = 50  # definitions that the next bag needs not be read anew for
 LONGEST = 2**16  # [characters] of a definition that is read
 MOST_FIELDS = 10_000  # of a message, with those of the types it contains
 LONGEST_ARRAY = 2**20  # numbers, of a length that a type fixes
@@ -18,6 +20,7 @@ def known(name: str) -> Typestore | None:
     return TYPESTORE if name in TYPESTORE.fielddefs else None
 
 
+@lru_cache(MOST_KEPT)
 def defined(name: str, definition: str) -> Typestore:
     """Return a store with the type of a definition; raises `ValueError` if it is not sound."""
     try:

@@ -7,7 +7,7 @@ from climber_uk.bags.bag import open_bag
 from climber_uk.bags.collecting import collect
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.run_reader import NoRunError, Parameters, RunReader
-from climber_uk.bags.topics import Topics
+from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.messages import topics
 
 
@@ -48,6 +48,7 @@ def read_runs(
                     raise ValueError(f"{path}: {'; '.join(bag.losses)}") from None
         if not runs:
             if not collected:
-                bag.lose(f"no odometry on a topic {topics.ODOMETRY}")
+                name = names.remapped.get(topics.ODOMETRY, topics.ODOMETRY)
+                bag.lose(f"no odometry: {bag.lacks(name, TYPES[topics.ODOMETRY])}")
             raise ValueError(f"{path}: {'; '.join(bag.losses)}")
         return runs, bag.losses

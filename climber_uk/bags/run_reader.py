@@ -20,7 +20,7 @@ from climber_uk.bags.joints import Joints, commanded_torques, rates_and_torques
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.time_series import TimeSeries
-from climber_uk.bags.topics import KNOWN, Topics
+from climber_uk.bags.topics import KNOWN, TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages import topics
@@ -62,7 +62,8 @@ class RunReader:
     def runs(self, collected: Collected, reported: Collection[Event]) -> list[RecordedRun]:
         """All runs, with those of the `reported` events that are theirs; raises `NoRunError`."""
         if not collected.samples[topics.ODOMETRY]:
-            raise NoRunError(f"no odometry on {self.topic(topics.ODOMETRY)}")
+            lacking = self.bag.lacks(self.topic(topics.ODOMETRY), TYPES[topics.ODOMETRY])
+            raise NoRunError(f"no odometry: {lacking}")
         if collected.lost_previews:
             topic = self.topic(topics.REFERENCE)
             self.bag.lose(f"{topic}: {collected.lost_previews} messages left out: a point is unfit")

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from climber_uk.campaign.campaign import Campaign, read
+from climber_uk.report.outputs import failing_in_a_line
 from climber_uk.system.command_line import Parser
 
 EXTRA = ["pyarrow", "matplotlib", "tqdm"]  # packages that no node needs
@@ -22,19 +23,19 @@ def main() -> None:
     _check_installed(EXTRA + ["distributed"] * bool(options.scheduler))
     output = options.output or Path("campaign_output") / options.file.stem
     try:
-        campaign = read(options.file, options.runs)
-        if options.rerun is None:
-            _run(campaign, options, output)
-        else:
-            from climber_uk.campaign.rerun import rerun
+        with failing_in_a_line("campaign"):
+            campaign = read(options.file, options.runs)
+            if options.rerun is None:
+                _run(campaign, options, output)
+            else:
+                from climber_uk.campaign.rerun import rerun
 
-            sys.exit(rerun(campaign, options.rerun, options.output or Path(f"run_{options.rerun}")))
+                place = options.output or Path(f"run_{options.rerun}")
+                sys.exit(rerun(campaign, options.rerun, place))
     except KeyboardInterrupt:
         sys.exit(f"\ncampaign: interrupted; what was finished is kept in {output}")
     except (BrokenExecutor, CancelledError) as error:
         sys.exit(f"\ncampaign: lost its workers ({error}); what was finished is kept in {output}")
-    except (ValueError, OSError) as error:
-        sys.exit(f"campaign: {error}")
 
 
 def _options() -> argparse.Namespace:

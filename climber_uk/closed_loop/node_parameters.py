@@ -4,7 +4,7 @@ A name is that of a node and of its parameter, as in `plant_simulator.mass`.
 """
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.parameters.parameter_file import read_file
+from climber_uk.parameters.plausibility import doubt
 from climber_uk.simulation.field_sensors import FIELD_SENSORS
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.options import SimulationOptions
@@ -52,12 +53,35 @@ NODES_ONLY = {
 }
 
 
-def read_parameters(path: Path, node: str) -> dict[str, Any]:
+def read_parameters(path: Path, node: str, remarks: list[str] | None = None) -> dict[str, Any]:
     """Values of a parameter file for one of the three nodes, by its full name.
 
-    Raises as `read_file` does, also for a name that the node does not have.
+    Raises as `read_file` does, also for a name that the node does not have. `remarks` gets a line
+    on each value that can hardly be meant.
     """
-    return read_file(path, node, names_of(node.rpartition("/")[2]))
+    own = node.rpartition("/")[2]
+    values = read_file(path, node, names_of(own))
+    if remarks is not None:
+        remarks += doubts(path, values, PARAMETERS, f"{own}.")
+    return values
+
+
+def doubts(
+    path: Path,
+    values: Mapping[str, Any],
+    fields: "Mapping[str, dataclasses.Field[Any]]",
+    own: str = "",
+) -> list[str]:
+    """A line on each value that can hardly be meant, as the nodes say it in their logs.
+
+    `fields` are by name, with `own` before it.
+    """
+    numbers = {name: of for name, of in values.items() if isinstance(of, int | float)}
+    return [
+        f"{path}: {name.removesuffix(field.name)}{said}"
+        for name, value in numbers.items()
+        if (field := fields.get(own + name)) and (said := doubt(field, value))
+    ]
 
 
 def names_of(node: str) -> set[str]:

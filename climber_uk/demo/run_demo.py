@@ -4,6 +4,7 @@ They run on this computer, in a ROS domain of their own unless ROS_DOMAIN_ID is 
 """
 
 import argparse
+import math
 import os
 import re
 import shlex
@@ -22,6 +23,8 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
+from climber_uk.closed_loop.node_parameters import PARAMETERS as NODE_PARAMETERS
+from climber_uk.closed_loop.node_parameters import doubts
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 from climber_uk.messages.topics import (
@@ -33,6 +36,7 @@ from climber_uk.messages.topics import (
     PARAMETERS,
     PLANNER,
     PLANT,
+    PROGRESS,
     REFERENCE_PATH,
 )
 from climber_uk.parameters.declaration import parameter, parameters
@@ -90,8 +94,12 @@ class Demo(ClimberNode):
         self.duration = self.parameters.read(DemoOptions).duration
         self.time: float | None = None  # [s] of the plant
         self.fall = ""  # diagnostics of a fall
+        self.left: dict[str, float] = {}  # [s] of each climber's path, as its planner tells
         self.subscription(FluidPressure, f"{climbers[0]}/suction_pressure", self.on_pressure)
         self.subscription(DiagnosticArray, DIAGNOSTICS, self.on_diagnostics)
+        for climber in climbers:
+            hear = partial(self.on_progress, climber)
+            self.subscription(DiagnosticArray, f"{climber}/{PROGRESS}", hear)
         self.starters = [
             self.create_client(Trigger, f"{climber}/trajectory_publisher/start")
             for climber in climbers
@@ -106,6 +114,11 @@ class Demo(ClimberNode):
         for status in message.status:
             if FELL in status.message:
                 self.fall = status.message
+
+    def on_progress(self, climber: str, message: DiagnosticArray) -> None:
+        """Keep how long the path of a climber still takes: infinitely, if it has no end."""
+        values = {pair.key: pair.value for pair in message.status[0].values}
+        self.left[climber] = float(values["time_left"])
 
     def records_all(self, bag: Path) -> bool:
         """Whether messages of every node are recorded, and the services to start are there."""
@@ -156,6 +169,12 @@ class Demo(ClimberNode):
         print(f"\r{self.progress(passed, time.monotonic() - begin)}")
         if self.fall:
             print(self.fall)
+        left = max((left for left in self.left.values() if math.isfinite(left)), default=0.0)
+        if left > 0.0 and not self.fall:
+            print(
+                f"The path was not finished: {left:.0f} s of it are left after {self.duration:g} s "
+                "(--duration, or `duration` of run_demo in the parameter file)"
+            )
 
     def progress(self, passed: float, wall_time: float) -> str:
         """Line of progress, by the plant's time [s] and the wall clock's [s]."""
@@ -286,9 +305,13 @@ def main() -> None:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:
+        said: list[str] = []  # of what can hardly be meant, once for all nodes
         for node in NODES:
             for climber in climbers:
-                read_file(options.config, f"{climber}/{node}")
+                values = read_file(options.config, f"{climber}/{node}")
+                said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
+        for line in dict.fromkeys(said):
+            print(f"run_demo: {line}", file=sys.stderr)
         options.output.mkdir(parents=True)
     except ValueError as error:
         sys.exit(f"run_demo: {error}")

@@ -1,7 +1,7 @@
 """`identify BAG`: mass, inertia, friction and geometry of the climber that a bag was recorded of.
 
 `identify --plan FILE` writes a parameter file with a trajectory that shows them well. The status is
-1 if a parameter is not determined, or something went wrong.
+1 if a parameter is not determined, and 2 if the bag or an argument is no good.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from typing import Any
 
 from climber_uk.bags.run_reader import RunReader
 from climber_uk.bags.topics import Topics
-from climber_uk.closed_loop.node_parameters import read_parameters
+from climber_uk.closed_loop.node_parameters import names_of, read_parameters
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
@@ -26,16 +26,21 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, given, read_sections
-from climber_uk.report.outputs import check_writable, printable
+from climber_uk.report.outputs import check_writable, failing_in_a_line
 from climber_uk.system.command_line import Parser, between
 
 AT_REST = {"initial_speed": 0.0, "initial_yaw_rate": 0.0}
 
 
-def identify_bag(options: argparse.Namespace) -> None:
-    """Print and write the parameters; raises `ValueError` if one is not determined."""
+def identify_bag(options: argparse.Namespace, doubtful: list[str]) -> list[str]:
+    """Print and write the parameters; return a sentence on each that is not determined.
+
+    `doubtful` gets what of the bag could not be read, and what can hardly be meant in the file.
+    Raises `OSError` or `ValueError`.
+    """
     cut = Values(vars(options)).read(Cut)
-    file, plant = parameters_of(CONTROLLER, options), plant_of(options)
+    file = parameters_of(CONTROLLER, options, doubtful)
+    plant = plant_of(options, doubtful)
     names = Topics({ODOMETRY: options.odometry})
     reader, climber = RunReader.read(options.bag, names, options.namespace.strip("/"), TOPICS)
     recorded = climber.first_parameters
@@ -45,8 +50,7 @@ def identify_bag(options: argparse.Namespace) -> None:
     then = {**file, **recorded}
     delay = then.get("transport_delay", 0.0) if options.delay is None else options.delay
     motion, unfit = read_motion(reader, climber, then, assumed.suction_pressure, delay)
-    for loss in reader.bag.losses:
-        print(printable(f"identify: {options.bag}: {loss}"), file=sys.stderr)
+    doubtful += [f"{options.bag}: {loss}" for loss in reader.bag.losses]
     found = identify(motion, assumed, cut, site)
     print(table(found, assumed), end="")
     print(*remarks(found), sep="\n")
@@ -61,16 +65,16 @@ def identify_bag(options: argparse.Namespace) -> None:
         identification_figure.draw(motion, assumed, found, options.figure)
     if options.output:
         write_changed(options.params, changes(found, assumed), options.output)
-    if sentences := list(missing(found)):
-        raise ValueError("\n".join(sentences))
+    return list(missing(found))
 
 
-def plan(options: argparse.Namespace) -> None:
+def plan(options: argparse.Namespace, doubtful: list[str]) -> None:
     """Write a trajectory, with all that is in the parameter file; raises `ValueError`."""
-    parameters = parameters_of(PLANNER, options)
+    parameters = parameters_of(PLANNER, options, doubtful)
     origin = parameters.get("origin_x", 0.0), parameters.get("origin_y", 0.0)
-    controller = parameters_of(CONTROLLER, options)
-    site, assumed = site_of(controller, plant_of(options)), Values(controller).read(Climber)
+    controller = parameters_of(CONTROLLER, options, doubtful)
+    site = site_of(controller, plant_of(options, doubtful))
+    assumed = Values(controller).read(Climber)
     if not site.has_seal:
         assumed = replace(assumed, seal_friction_coefficient=0.0)
     limits = Values(vars(options)).read(excitation.ExcitationLimits)
@@ -92,17 +96,17 @@ def plan(options: argparse.Namespace) -> None:
             print(f"{label_of(name, site)[0]} ± {share:.2%}")
 
 
-def parameters_of(node: str, options: argparse.Namespace) -> dict[str, Any]:
+def parameters_of(node: str, options: argparse.Namespace, doubtful: list[str]) -> dict[str, Any]:
     """Parameters of a node in the parameter file, by name; empty without a file."""
     name = Topics().full(node, options.namespace.strip("/"))
-    return read_parameters(options.params, name) if options.params else {}
+    return read_parameters(options.params, name, doubtful) if options.params else {}
 
 
-def plant_of(options: argparse.Namespace) -> dict[str, Any]:
+def plant_of(options: argparse.Namespace, doubtful: list[str]) -> dict[str, Any]:
     """Parameters of the simulator in the parameter file, by name; empty if it has none."""
     name = Topics().full(PLANT, options.namespace.strip("/"))
-    is_there = options.params and given(read_sections(options.params), name)
-    return parameters_of(PLANT, options) if is_there else {}
+    its = given(read_sections(options.params), name) if options.params else {}
+    return parameters_of(PLANT, options, doubtful) if its.keys() & names_of(PLANT) else {}
 
 
 def main() -> None:
@@ -129,13 +133,14 @@ def main() -> None:
     options = parser.arguments()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
-    try:
+    untold: list[str] = []
+    with failing_in_a_line("identify") as doubtful:
         for file in (options.output, options.json, options.figure, options.plan):
             if file:
                 check_writable(file.parent)
         if options.plan:
-            plan(options)
+            plan(options, doubtful)
         else:
-            identify_bag(options)
-    except (ValueError, OSError) as error:
-        sys.exit(f"identify: {error}")
+            untold = identify_bag(options, doubtful)
+    if untold:
+        sys.exit(f"identify: {'; '.join(untold)}")

@@ -12,6 +12,7 @@ from climber_uk.bags.joints import torques_and_angles
 from climber_uk.bags.restarts import are_strays
 from climber_uk.bags.run_reader import Parameters, RunReader
 from climber_uk.bags.time_series import TimeSeries
+from climber_uk.bags.topics import TYPES
 from climber_uk.identification.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import across, along
@@ -131,10 +132,8 @@ def read_motion(
     time = _seconds(odometry)
     kept = fit & (first <= time) & (time <= last)
     if np.sum(kept) < 2:
-        topic = reader.topic(ODOMETRY)
-        because = "".join(f"; {loss}" for loss in reader.bag.losses)
         raise ValueError(
-            f"{reader.bag.path} has no odometry on {topic} at times that torques are known{because}"
+            "; ".join([_lacking(reader, len(odometry), len(begins)), *reader.bag.losses])
         )
     time, values = time[kept], odometry.values[kept]
     rates = values[:, [3, 5]]
@@ -164,6 +163,16 @@ def _wheels(found: Collected, parameters: Parameters) -> TimeSeries:
     with suppress(ValueError):
         return torques_and_angles(found.joints[JOINTS], parameters)
     return TimeSeries.of([])
+
+
+def _lacking(reader: RunReader, odometries: int, torques: int) -> str:
+    """What a bag does not have, by the numbers of messages that it has."""
+    path = reader.bag.path
+    for name, count in ((ODOMETRY, odometries), (TORQUES, torques)):
+        if not count:
+            return f"{path} has {reader.bag.lacks(reader.topic(name), TYPES[name])}"
+    topic = reader.topic(ODOMETRY)
+    return f"{path} has no odometry on {topic} at times that torques are known"
 
 
 def _at_wheels(wheels: TimeSeries) -> Torques | None:

@@ -5,12 +5,13 @@
   climber enable | disable                            the controller
   climber push 20 0                                   the simulated climber, by forces x, y [N]
   climber status                                      how far it is, once
-  climber watch                                       the same until it is done, or Ctrl-C
+  climber watch                                       that, speed, errors, margins and torques,
+                                                      until it is done, or Ctrl-C
 
 The status is 0 if it is done, 1 if it is refused, 3 if nobody answers.
 """
 
-import math
+import os
 import sys
 import time
 from argparse import ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
@@ -31,12 +32,14 @@ from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.messages import writing
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PROGRESS, PUSH
+from climber_uk.operating import watching
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser, between
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
 REFUSED, SILENT = 1, 3  # exit statuses
 PERIOD = 0.05  # [s] in which it is looked for what is waited for
+REDRAWN = 0.1  # [s] after which what is watched is shown anew
 PUSHES = 10  # messages, over half a second: a simulated push lasts as long as it is told
 
 
@@ -56,7 +59,8 @@ class Operator:
         while not condition():
             rclpy.spin_once(self.node, timeout_sec=PERIOD)
             if time.monotonic() > until:
-                raise NoAnswerError(f"nobody answers: {what} (within {self.timeout:g} s)")
+                where = f"in ROS domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
+                raise NoAnswerError(f"nobody answers: {what} ({where}, within {self.timeout:g} s)")
 
     def call(self, kind: Any, name: str, request: Any) -> Any:
         """Response of a service."""
@@ -94,36 +98,26 @@ class Operator:
                 rclpy.spin_once(self.node, timeout_sec=PERIOD)
         return True, f"pushed by ({x:g}, {y:g}) N"
 
-    def watch(self, is_once: bool) -> tuple[bool, str]:
-        """Print how far it is: once, or until it is done."""
+    def status(self) -> tuple[bool, str]:
+        """How far it is."""
         heard: list[DiagnosticArray] = []
         subscription = self.node.create_subscription(DiagnosticArray, PROGRESS, heard.append, 10)
-        state = ""
-        while state != "done":
-            heard.clear()
-            self.wait(lambda: heard, f"topic {subscription.topic_name}")
-            state, line = told(heard[-1])
-            if is_once:
-                return True, line
-            print(f"\r{line:78}", end="", flush=True)
-        return True, ""
+        self.wait(lambda: heard, f"topic {subscription.topic_name}")
+        return True, watching.progress(heard[-1])[1]
 
-
-def told(message: DiagnosticArray) -> tuple[str, str]:
-    """State of a progress, and a line of all of it."""
-    (status,) = message.status
-    text = {pair.key: pair.value for pair in status.values}
-    mode = text.pop("mode", "").replace("_", " ")
-    value = {key: float(number) for key, number in text.items()}
-    state = status.message
-    if state == "waiting" and mode:
-        state += f" (the controller: {mode}; its log says why, 'climber enable' forgives it)"
-    said = [state, f"{value['done']:.2f} m done"]
-    if math.isfinite(value["left"]):
-        said += [f"{value['left']:.2f} m left", f"{value['time_left']:.0f} s"]
-    if value["lap"]:
-        said += [f"lap {value['lap']:.0f}", f"segment {value['segment']:.0f}"]
-    return status.message, ", ".join(said)
+    def watch(self) -> tuple[bool, str]:
+        """Show what it does until its path is done."""
+        watched, screen = watching.Watched(self.node), watching.Screen()
+        topic = self.node.resolve_topic_name(PROGRESS)
+        while True:
+            self.wait(lambda: PROGRESS in watched.now(), f"topic {topic}")
+            heard = watched.now()
+            screen.show(watching.lines(heard))
+            if PROGRESS in heard and watching.progress(heard[PROGRESS])[0] == "done":
+                return True, ""
+            time.sleep(REDRAWN)  # the last message of each topic is kept meanwhile
+            for _ in watching.HEARD:
+                rclpy.spin_once(self.node, timeout_sec=0.0)
 
 
 DO: dict[str, Callable[[Operator, list[float]], tuple[bool, str]]] = {
@@ -136,8 +130,8 @@ DO: dict[str, Callable[[Operator, list[float]], tuple[bool, str]]] = {
     "disable": lambda operator, _: operator.switch(f"{CONTROLLER}/enable", False),
     "speed": lambda operator, values: operator.set_speed(*values),
     "push": lambda operator, values: operator.push(*values),
-    "status": lambda operator, _: operator.watch(is_once=True),
-    "watch": lambda operator, _: operator.watch(is_once=False),
+    "status": lambda operator, _: operator.status(),
+    "watch": lambda operator, _: operator.watch(),
 }
 NUMBERS = {"speed": 1, "push": 2}  # that a verb takes; others take none
 

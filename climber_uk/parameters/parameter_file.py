@@ -105,14 +105,16 @@ def read_sections(path: Path) -> list[Section]:
 def read_file(path: Path, node: str, known: Collection[str] = ()) -> dict[str, Any]:
     """Values of a parameter file for a node, by name; of two entries the later one counts.
 
-    `node` is the full name. Raises `ValueError` if the file has none for it, or has one that is
-    not `known`, if anything is: it is misspelt. Values that name a file are relative to the
-    working directory, not to the parameter file.
+    `node` is the full name. Raises `ValueError` if the file has none for it, or, where any are
+    `known`, none of those, or another: it is misspelt. Values that name a file are relative to
+    the working directory, not to the parameter file.
     """
     sections = read_sections(path)
     found = given(sections, node)
     if not found:
         raise ValueError(nothing_for(node, path, sections))
+    if known and not found.keys() & set(known) and all(of.is_shared for of in found.values()):
+        raise ValueError(f"{path} has no parameters for {node} but {', '.join(found)}")
     own = (name for name, (_, is_shared) in found.items() if not is_shared)
     refuse_unknown(own if known else (), known, node)
     return {name: value for name, (value, _) in found.items()}
@@ -201,17 +203,29 @@ def _value(text: str, style: str | None) -> bool | int | float | str:
 
 def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Keys and value of each entry of a file, in its order."""
-    tables, line = _Tables(), 1
+    tables, line, text = _Tables(), 1, ""
     try:
-        for event in yaml.parse(_text(path), PARSER):
+        text = _text(path)
+        for event in yaml.parse(text, PARSER):
             line = event.start_mark.line + 1  # type: ignore[union-attr]
             for value in tables.take(event):
                 yield tuple(tables.keys), value
                 tables.keys[-1] = ""
     except yaml.YAMLError as error:
-        raise ValueError(f"{path} is no parameter file: {' '.join(str(error).split())}") from None
+        raise ValueError(f"{path} is no parameter file: {_in_words(error, text)}") from None
     except ValueError as error:
         raise ValueError(f"{path} is no parameter file: line {line}: {error}") from None
+
+
+def _in_words(error: yaml.YAMLError, text: str) -> str:
+    """What is wrong with a YAML text, and where; of tabs in plain words."""
+    if not isinstance(error, yaml.MarkedYAMLError) or (mark := error.problem_mark) is None:
+        return " ".join(str(error).split())
+    said = " ".join(f"{error.context or ''} {error.problem or ''}".split())
+    before = text.split("\n")[mark.line : mark.line + 1]
+    if before and "\t" in before[0][: mark.column + 1]:
+        said = "a tab, where YAML takes blanks only"
+    return f"line {mark.line + 1}, column {mark.column + 1}: {said}"
 
 
 def _text(path: Path) -> str:

@@ -23,6 +23,7 @@ from climber_uk.parameters.parameter_file import Values, read_argument, refuse_u
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import Demands, demands
 from climber_uk.path_check.fastest import fastest
+from climber_uk.report.outputs import failing_in_a_line, printable
 from climber_uk.system.command_line import Parser, between
 
 NAMES = {
@@ -38,18 +39,21 @@ PATHS = {  # parameters that are files
 }
 
 
-def read(file: Path, changes: dict[str, Any]) -> tuple[Trajectory, Climber, Attachment]:
+def read(
+    file: Path, changes: dict[str, Any], remarks: list[str]
+) -> tuple[Trajectory, Climber, Attachment]:
     """Path, climber and what holds it, by a parameter file and changes of the path's parameters.
 
-    Raises `ValueError`, also for a name that no part of the path has.
+    Raises `ValueError`, also for a name that no part of the path has. `remarks` gets a line on each
+    value that can hardly be meant.
     """
-    planner = {**read_parameters(file, f"/{PLANNER}"), **changes}
+    planner = {**read_parameters(file, f"/{PLANNER}", remarks), **changes}
     refuse_unknown(changes, NAMES, "a path")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
         planner[name] = located(planner[name], name, f"/{PLANNER}", words)
     trajectory = build_trajectory(Values(planner).read)
-    values = Values(read_parameters(file, f"/{CONTROLLER}"))
+    values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
     name = values.read(ControllerChoice).adhesion
     attachment = Attachment(
         adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)
@@ -121,8 +125,8 @@ def main() -> None:
     )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
-    try:
-        trajectory, climber, attachment = read(options.params, dict(options.param))
+    with failing_in_a_line("check_path") as remarks:
+        trajectory, climber, attachment = read(options.params, dict(options.param), remarks)
         found = demands(trajectory, climber, attachment, options.margin)
         numbers = told(found, trajectory, climber.half_track)
         if options.fastest:
@@ -135,8 +139,5 @@ def main() -> None:
 
             options.output.mkdir(parents=True, exist_ok=True)
             (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
-            print(draw(found, options.output / "check_path.png"))
-    except (ValueError, OSError) as error:
-        print(f"check_path: {error}", file=sys.stderr)
-        sys.exit(2)
+            print(printable(str(draw(found, options.output / "check_path.png"))))
     sys.exit(not numbers["feasible"])

@@ -16,8 +16,11 @@ def draw(found: Demands, path: Path) -> Path:
     least = np.min([*found.reserves.values()], axis=0).clip(0.0, ENOUGH)
     drawn = above.scatter(*found.pose[:, :2].T, c=least, s=6, cmap="RdYlGn", vmin=0.0, vmax=ENOUGH)
     figure.colorbar(drawn, ax=above, label="least reserve: allowed by asked for")
+    named: dict[tuple[float, float], list[str]] = {}
     for at in found.least():
-        above.annotate(at.name, at.place, fontsize=8)
+        named.setdefault(at.place, []).append(at.name)
+    for place, names in named.items():
+        above.annotate("; ".join(names), place, fontsize=8)
     above.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     for name, reserve in found.reserves.items():
         below.plot(found.distance, reserve.clip(0.0, ENOUGH), label=name)

@@ -6,14 +6,13 @@ backwards, by all that the bag has. Writes two trajectories, numbers and a pictu
 
 import argparse
 import json
-import sys
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from climber_uk.bags.bag import open_bag
 from climber_uk.bags.topics import Topics
-from climber_uk.closed_loop.node_parameters import NODES_ONLY
+from climber_uk.closed_loop.node_parameters import NODES_ONLY, doubts
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.sensor_frames import SensorFrames
 from climber_uk.messages.names import Names
@@ -23,30 +22,42 @@ from climber_uk.replay import localization_figure
 from climber_uk.replay.localized import Localized, localized
 from climber_uk.replay.recorded_sensors import RecordedSensors, read_sensors
 from climber_uk.report.export_tum import lines
-from climber_uk.report.outputs import output, printable
+from climber_uk.report.outputs import failing_in_a_line, output, printable
 from climber_uk.system.command_line import Parser
 
 MOST_REMARKS = 10  # that are printed
 
 
-def parameters_of(options: argparse.Namespace, namespace: str) -> dict[str, Any]:
-    """Parameters of the node by name; raises `ValueError` naming one that it does not have."""
+def parameters_of(
+    options: argparse.Namespace, namespace: str, remarks: list[str]
+) -> dict[str, Any]:
+    """Parameters of the node by name; raises `ValueError` naming one that it does not have.
+
+    `remarks` gets a line on each value of the file that can hardly be meant.
+    """
     name = Topics().full(LOCALIZATION, namespace)
     kinds = LocalizationOptions, SensorFrames, Names
-    known = {field.name for kind in kinds for field in fields(kind)}
-    parameters = read_file(options.params, name, known | NODES_ONLY) if options.params else {}
+    known = {field.name: field for kind in kinds for field in fields(kind)}
+    parameters = {}
+    if options.params:
+        parameters = read_file(options.params, name, known.keys() | NODES_ONLY)
+        remarks += doubts(options.params, parameters, known)
     changes = dict(map(read_argument, options.parameter))
     refuse_unknown(changes, known, LOCALIZATION)
     return {**parameters, **changes}
 
 
-def localize(bag: Path, namespace: str, values: Values) -> tuple[RecordedSensors, Localized]:
-    """Sensors of a bag, and what comes of them; raises as the parts do."""
+def localize(
+    bag: Path, namespace: str, values: Values, remarks: list[str]
+) -> tuple[RecordedSensors, Localized]:
+    """Sensors of a bag, and what comes of them; raises as the parts do.
+
+    `remarks` gets what of the bag could not be read.
+    """
     names, frames = values.read(Names), values.read(SensorFrames)
     with open_bag(bag) as opened:
         sensors = read_sensors(opened, namespace, names, frames)
-        for loss in opened.losses:
-            print(printable(f"localize: {bag}: {loss}"), file=sys.stderr)
+        remarks += [f"{bag}: {loss}" for loss in opened.losses]
     return sensors, localized(sensors, values.read(LocalizationOptions))
 
 
@@ -82,20 +93,20 @@ def main() -> None:
     )
     options = parser.arguments()
     namespace = options.namespace.strip("/")
-    try:
-        with output(options.bag, "localization", options.output) as directory:
-            values = Values(parameters_of(options, namespace))
-            sensors, found = localize(options.bag, namespace, values)
-            print(printable(table(sensors, found)))
-            for name, estimates in (("forward", found.forward), ("smoothed", found.smoothed)):
-                (directory / f"{name}.tum").write_text(lines((found.stamps, estimates.mean[:, :3])))
-            text = json.dumps(
-                {"numbers": found.numbers(), "refused": sensors.refused, "remarks": found.remarks},
-                indent=1,
-                ensure_ascii=False,
-            )
-            (directory / "localization.json").write_text(text + "\n", encoding="utf-8")
-            localization_figure.draw(sensors, found, directory / "localization.png")
-            print(directory)
-    except (ValueError, OSError) as error:
-        sys.exit(f"localize: {printable(str(error))}")
+    with (
+        failing_in_a_line("localize") as remarks,
+        output(options.bag, "localization", options.output) as directory,
+    ):
+        values = Values(parameters_of(options, namespace, remarks))
+        sensors, found = localize(options.bag, namespace, values, remarks)
+        print(printable(table(sensors, found)))
+        for name, estimates in (("forward", found.forward), ("smoothed", found.smoothed)):
+            (directory / f"{name}.tum").write_text(lines((found.stamps, estimates.mean[:, :3])))
+        text = json.dumps(
+            {"numbers": found.numbers(), "refused": sensors.refused, "remarks": found.remarks},
+            indent=1,
+            ensure_ascii=False,
+        )
+        (directory / "localization.json").write_text(text + "\n", encoding="utf-8")
+        localization_figure.draw(sensors, found, directory / "localization.png")
+        print(printable(str(directory)))

@@ -108,7 +108,10 @@ def localized(sensors: RecordedSensors, options: LocalizationOptions) -> Localiz
     if True not in known:
         missing = [] if localizer.knows_heading else ["heading"]
         missing += [] if localizer.knows_position else ["position"]
-        raise ValueError(f"{' and '.join(missing) or 'place'} never known: see initial_*")
+        untold = " and ".join(missing) or "place"
+        raise ValueError(
+            f"{untold} never known: no fix tells it, and no initial_* parameter (-p NAME:=VALUE)"
+        )
     entries = entries[known.index(True) :]
     stamps = np.array([entry.stamp for entry in entries], dtype=np.int64)
     return Localized(

@@ -53,7 +53,7 @@ class RecordedController:
         collected, events = collect(bag, Topics(), [namespace], TOPICS, by_publishing)
         found = collected[namespace]
         if not (efforts := found.joints[TORQUES]):
-            raise ValueError(f"{bag.path} has no message on {topic}")
+            raise ValueError(f"{bag.path} has {bag.lacks(topic, TYPES[TORQUES])}")
         RunReader(bag, Topics(), namespace).check_one_run(found)
         # those published first
         self.parameters: Mapping[str, Any] | None = found.first_parameters or None

@@ -70,7 +70,8 @@ def read_sensors(bag: Bag, namespace: str, names: Names, frames: SensorFrames) -
             found.refused[f"{name}: {error}"] += 1
     if not found.counts[JOINTS]:
         topic = Topics().full(JOINTS, namespace)
-        raise ValueError("; ".join([f"{bag.path} has no message on {topic}", *bag.losses]))
+        lacking = bag.lacks(topic, "sensor_msgs/msg/JointState")
+        raise ValueError("; ".join([f"{bag.path} has {lacking}", *bag.losses]))
     if not any(order == ORDER[JOINTS] for _, order, _ in found.events):
         raise ValueError(f"{bag.path}: {found.refused.most_common(1)[0][0]}")
     return found

@@ -85,7 +85,8 @@ class Replay:
             self.pass_time(at)
             callbacks[names[topic]](at, message)
         if missing:
-            raise ValueError(f"{bag.path} has no message on {' and '.join(sorted(missing))}")
+            said = " and ".join(bag.lacks(topic, types[topic]) for topic in sorted(missing))
+            raise ValueError(f"{bag.path} has {said}")
 
     def pass_time(self, now: int) -> None:
         """Set the node's clock to a time of the wall clock, unless time is simulated or later."""

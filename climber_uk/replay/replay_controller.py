@@ -20,15 +20,20 @@ from climber_uk.parameters.parameter_file import read_argument, refuse_unknown
 from climber_uk.replay.recorded_controller import TOPICS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
 from climber_uk.replay.torque_comparison import Comparison, compare, summary, table, write_csv
-from climber_uk.report.outputs import output, printable
+from climber_uk.report.outputs import failing_in_a_line, output, printable
 from climber_uk.report.plotting import plt, saved
 from climber_uk.system.command_line import Parser, between
 
 
-def replayed(options: argparse.Namespace) -> Comparison:
-    """Replay a bag; raises `OSError` or `ValueError`, of one line, if that cannot be."""
+def replayed(options: argparse.Namespace, remarks: list[str]) -> Comparison:
+    """Replay a bag; raises `OSError` or `ValueError`, of one line, if that cannot be.
+
+    `remarks` gets what of the bag could not be read, or is not in it, and doubtful parameters.
+    """
     namespace = "/" + options.namespace.strip("/") if options.namespace.strip("/") else ""
-    file = read_parameters(options.params, f"{namespace}/{CONTROLLER}") if options.params else None
+    file = None
+    if options.params:
+        file = read_parameters(options.params, f"{namespace}/{CONTROLLER}", remarks)
     given = dict(read_argument(argument) for argument in options.parameter)
     refuse_unknown(given, DEFAULTS, "the control law")
 
@@ -43,13 +48,11 @@ def replayed(options: argparse.Namespace) -> Comparison:
             raise ValueError(
                 f"{options.bag} has no message on {namespace}/{PARAMETERS}: give --params FILE"
             )
-        for loss in bag.losses:
-            print(printable(f"replay_controller: {options.bag}: {loss}"), file=sys.stderr)
+        remarks += [f"{options.bag}: {loss}" for loss in bag.losses]
         if not by_publishing:
-            print(
-                f"replay_controller: {options.bag} does not tell when messages were published: "
-                "they are taken in the order of their arrival at the recorder",
-                file=sys.stderr,
+            remarks.append(
+                f"{options.bag} does not tell when messages were published: "
+                "they are taken in the order of their arrival at the recorder"
             )
         replay = Replay(recorded, namespace, choose)
         replay.run(bag, namespace, by_publishing)
@@ -97,16 +100,16 @@ def main() -> None:
         help="status 1 if a torque differs more [N m]",
     )
     options = parser.arguments()
-    try:
-        with output(options.bag, "replay", options.output) as directory:
-            found = replayed(options)
-            numbers = summary(found)
-            (directory / "replay.json").write_text(json.dumps(numbers, indent=2) + "\n")
-            write_csv(found, directory / "torques.csv")
-            draw(found, directory / "torques.png")
-    except (ValueError, OSError) as error:
-        sys.exit(f"replay_controller: {printable(str(error))}")
+    with (
+        failing_in_a_line("replay_controller") as remarks,
+        output(options.bag, "replay", options.output) as directory,
+    ):
+        found = replayed(options, remarks)
+        numbers = summary(found)
+        (directory / "replay.json").write_text(json.dumps(numbers, indent=2) + "\n")
+        write_csv(found, directory / "torques.csv")
+        draw(found, directory / "torques.png")
     print(table(numbers))
-    print(f"written: {directory}/replay.json, torques.csv, torques.png")
+    print(printable(f"written: {directory}/replay.json, torques.csv, torques.png"))
     if options.fail_above is not None and found.largest > options.fail_above:
         sys.exit(f"replay_controller: differs by {found.largest:.6g} N m > {options.fail_above:g}")

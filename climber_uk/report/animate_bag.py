@@ -1,7 +1,6 @@
 """`animate_bag BAG`: the climber moving on its wall, with torques, margins and errors."""
 
 import math
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics import Array
 from climber_uk.report.figures import STYLE, thinned
-from climber_uk.report.outputs import output, printable
+from climber_uk.report.outputs import failing_in_a_line, output, printable
 from climber_uk.report.plotting import plt
 from climber_uk.system.command_line import Parser, between
 
@@ -130,18 +129,17 @@ def main() -> None:
         help="pictures a second (default: %(default)s)",
     )
     options = parser.arguments()
-    try:
-        with output(options.bag, "film", options.output) as directory:
-            runs, losses = read_runs(options.bag, Topics(), [options.namespace])
-            for loss in losses:
-                print(printable(f"animate_bag: {loss}"), file=sys.stderr)
-            for number, run in enumerate(runs, start=1):
-                name = f"film_{number}" if len(runs) > 1 else "film"
-                path = directory / f"{name}.{options.format}"
-                count = write(run, path, options.seconds, options.rate)
-                print(f"{path}: {count} pictures")
-    except (ValueError, OSError) as error:
-        sys.exit(f"animate_bag: {printable(str(error))}")
+    with (
+        failing_in_a_line("animate_bag") as remarks,
+        output(options.bag, "film", options.output) as directory,
+    ):
+        runs, losses = read_runs(options.bag, Topics(), [options.namespace])
+        remarks += [f"{options.bag}: {loss}" for loss in losses]
+        for number, run in enumerate(runs, start=1):
+            name = f"film_{number}" if len(runs) > 1 else "film"
+            path = directory / f"{name}.{options.format}"
+            count = write(run, path, options.seconds, options.rate)
+            print(printable(f"{path}: {count} pictures"))
 
 
 if __name__ == "__main__":

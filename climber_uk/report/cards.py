@@ -37,32 +37,34 @@ def _cards(column: Column) -> Iterator[tuple[str, Card]]:
     by_odometry = f"{shown('rms_distance')} RMS", f"at most {shown('max_distance')}"
     main, note = by_odometry
     if math.isfinite(values["truth_rms_distance"]):
-        main = f"{shown('truth_rms_distance')} RMS, truly"
+        main = f"{shown('truth_rms_distance')} RMS (true)"
         note = f"at most {shown('truth_max_distance')}; by the odometry {', '.join(by_odometry)}"
     level = OK if is_settled else WARNING
     yield "rms_distance", Card("Tracking", main, f"{note}; {settled}", level)
     saturated = values["saturation"] > 0
-    note = (
-        f"saturated {shown('saturation')} of the time; {shown('energy_per_metre')}; changes by "
-        f"{shown('rms_torque_change')} a period"
-    )
+    told = {
+        "saturation": f"saturated {shown('saturation')} of the time",
+        "energy_per_metre": shown("energy_per_metre"),
+        "rms_torque_change": f"changes by {shown('rms_torque_change')} a period",
+    }
+    note = "; ".join(said for name, said in told.items() if math.isfinite(values[name]))
     level = WARNING if saturated else OK
     yield "peak_torque", Card("Motors", f"{shown('peak_torque')} peak", note, level)
     note = (
-        f"{shown('lowest_tip_margin')} tip margin; below 1 it slips, it tips: it slipped "
-        f"{shown('slip_share')} of the time"
+        f"{shown('lowest_tip_margin')} tip margin; below 1 its wheels slip, or it tips over: they "
+        f"slipped {shown('slip_share')} of the time"
     )
     main, level = f"{shown('lowest_slip_margin')} slip margin", _hold(column)
     yield "lowest_slip_margin", Card("Hold on the wall", main, note, level)
     stops, errors = values["safety_stops"], values["errors"]
     main = STOPS.get(stops, f"{shown('safety_stops')} stops")
-    note = f"followed {shown('following')} of the time; {shown('errors')} errors of nodes"
+    note = f"followed {shown('following')} of the time; {shown('errors')} errors reported by nodes"
     level = ERROR if stops > 0 or errors > 0 else OK
     yield "safety_stops", Card("Safety", main, note, level)
     lost = values["odometry_lost"] + values["odometry_unfit"]
-    note = f"99 %: {shown('latency_p99')}; {lost:.0f} odometry messages lost or unfit"
+    note = f"99 % within {shown('latency_p99')}; {lost:.0f} odometry messages lost or unfit"
     level = WARNING if lost > 0 else OK
-    yield "latency_p50", Card("Timing", f"{shown('latency_p50')} latency", note, level)
+    yield "latency_p50", Card("Timing", f"{shown('latency_p50')} median latency", note, level)
 
 
 def _hold(column: Column) -> int:
@@ -78,7 +80,9 @@ def verdict(column: Column) -> str:
     of = "truth_" if math.isfinite(values["truth_max_distance"]) else ""
     far = f"at most {shown(f'{of}max_distance')} off"
     stops = values["safety_stops"]
-    if stops > 0:
+    if math.isnan(values["max_distance"]) and not stops > 0:
+        said = "There is no reference in it, so that nothing can be said of its path"
+    elif stops > 0:
         said = f"It stopped for safety ({STOPS.get(stops, f'{stops:.0f} stops')})"
     elif values["following"] == 0:
         said = "It did not follow its reference"

@@ -6,16 +6,15 @@ again in the bag, each run has a directory of its own, run_1, run_2, ….
 """
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from climber_uk.bags.run_reader import NoRunError, RunReader
-from climber_uk.bags.topics import Topics
+from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
-from climber_uk.report.outputs import output, printable
+from climber_uk.report.outputs import failing_in_a_line, output, printable
 from climber_uk.system.command_line import Parser
 
 Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
@@ -29,7 +28,8 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
     reader, found = RunReader.read(bag, Topics(), namespace)
     topic = reader.topic(ODOMETRY)
     if not found.samples[ODOMETRY]:
-        raise ValueError("; ".join([f"{bag} has no message on {topic}", *reader.bag.losses]))
+        lacking = reader.bag.lacks(topic, TYPES[ODOMETRY])
+        raise ValueError("; ".join([f"{bag} has {lacking}", *reader.bag.losses]))
     runs = []
     for part in reader.split(found):
         try:
@@ -70,16 +70,15 @@ def main() -> None:
         help="directory (default: a new one, tum, in the bag or beside it)",
     )
     options = parser.arguments()
-    try:
-        with output(options.bag, "tum", options.output) as directory:
-            runs, losses = read_poses(options.bag, options.namespace.strip("/"))
-            for loss in losses:
-                print(printable(f"export_tum: {options.bag}: {loss}"), file=sys.stderr)
-            for number, found in enumerate(runs, start=1):
-                place = directory / f"run_{number}" if len(runs) > 1 else directory
-                place.mkdir(exist_ok=True)
-                for name, poses in found.items():
-                    (place / f"{name}.tum").write_text(lines(poses))
-                    print(f"{place / name}.tum: {len(poses[0])} poses")
-    except (ValueError, OSError) as error:
-        sys.exit(f"export_tum: {printable(str(error))}")
+    with (
+        failing_in_a_line("export_tum") as remarks,
+        output(options.bag, "tum", options.output) as directory,
+    ):
+        runs, losses = read_poses(options.bag, options.namespace.strip("/"))
+        remarks += [f"{options.bag}: {loss}" for loss in losses]
+        for number, found in enumerate(runs, start=1):
+            place = directory / f"run_{number}" if len(runs) > 1 else directory
+            place.mkdir(exist_ok=True)
+            for name, poses in found.items():
+                (place / f"{name}.tum").write_text(lines(poses))
+                print(printable(f"{place / name}.tum: {len(poses[0])} poses"))

@@ -181,7 +181,7 @@ CURVES: dict[str, tuple[str, Sequence[str], Callable[[RecordedRun], Curves]]] = 
         lambda run: _all_of(run, run.recorded[topics.FORCE]),
     ),
     "margins": (
-        "Margins: below 1 it slips, it tips",
+        "Margins: below 1 its wheels slip, or it tips over",
         ("slip margin", "tip margin"),
         lambda run: (run.seconds(run.margins), run.margins.values[:, :2]),
     ),

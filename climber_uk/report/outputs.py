@@ -1,9 +1,10 @@
-"""Where the tools that read a bag write, and how they print the text of files safely.
+"""Where the tools that read a bag write, how they fail, and how they print text of files safely.
 
 One rule for all: into the directory that `--output` names; else into a new one in the bag, or
 beside it if it is a single file. Nothing that was there before is overwritten then.
 """
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
@@ -11,6 +12,26 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from climber_uk.bags.connection import one_line
+
+UNREADABLE = 2  # exit status: a bag or a parameter file that is not to be read, a wrong argument
+
+
+@contextmanager
+def failing_in_a_line(tool: str) -> Iterator[list[str]]:
+    """Have a tool end with one line and status 2 where it raises `OSError` or `ValueError`.
+
+    Yields a list for remarks, on what of a bag could not be read, or can hardly be meant in a
+    parameter file: a line each where all goes well, and else in brackets behind the reason.
+    """
+    remarks: list[str] = []
+    try:
+        yield remarks
+    except (ValueError, OSError) as error:
+        behind = f" ({'; '.join(dict.fromkeys(remarks))})" if remarks else ""
+        print(f"{tool}: {one_line(f'{error}{behind}')}", file=sys.stderr)
+        sys.exit(UNREADABLE)
+    for remark in dict.fromkeys(remarks):
+        print(f"{tool}: {one_line(remark)}", file=sys.stderr)
 
 
 @contextmanager

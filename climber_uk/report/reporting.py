@@ -16,13 +16,13 @@ from climber_uk.parameters.parameter_file import Values
 from climber_uk.report import figures
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import Case
-from climber_uk.report.outputs import check_writable, output, printable
+from climber_uk.report.outputs import check_writable, failing_in_a_line, output, printable
 from climber_uk.report.page import page
 from climber_uk.report.tables import Column, to_csv, to_json
 from climber_uk.system.command_line import Parser, between
 
 OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
-FAILED, UNREADABLE = 1, 2
+FAILED = 1  # exit status
 OUTPUT_HELP = (
     "directory for report.html and metrics.* (default: a new one in the first bag, or beside it)"
 )
@@ -88,26 +88,24 @@ def report(
     text: Callable[[Sequence[Column]], str],
 ) -> int:
     """Print `text` of some bags and write their metrics; return the exit status."""
-    try:
-        with output(bags[0], OUTPUTS[command], options.output) as directory:
-            if options.figures:
-                check_writable(options.figures)
-            columns = _read(bags, options)
-            for loss in dict.fromkeys(f"{c.bag}: {loss}" for c in columns for loss in c.losses):
-                print(f"{command}: {printable(loss)}", file=sys.stderr)
-            print(printable(text(columns)))
-            for path in _write(title, columns, directory, options.figures):
-                print(path)
-    except (ValueError, OSError) as error:
-        print(f"{command}: {printable(str(error))}", file=sys.stderr)
-        return UNREADABLE
+    with (
+        failing_in_a_line(command) as remarks,
+        output(bags[0], OUTPUTS[command], options.output) as directory,
+    ):
+        if options.figures:
+            check_writable(options.figures)
+        columns = _read(bags, options, remarks)
+        remarks += dict.fromkeys(f"{c.bag}: {loss}" for c in columns for loss in c.losses)
+        print(printable(text(columns)))
+        for path in _write(title, columns, directory, options.figures):
+            print(printable(str(path)))
     failures = [condition.failure(c) for condition in options.fail_if for c in columns]
     for failure in filter(None, failures):
         print(f"{command}: failed: {printable(failure)}", file=sys.stderr)
     return FAILED if any(failures) else 0
 
 
-def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
+def _read(bags: Sequence[Path], options: Namespace, remarks: list[str]) -> list[Column]:
     names = Topics.parse(options.remap)
     columns: list[Column] = []
     for bag, label in zip(bags, _labels(bags), strict=True):
@@ -115,7 +113,7 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
             bag,
             names,
             options.namespace,
-            parameters=partial(_parameters, options.params) if options.params else None,
+            parameters=partial(_parameters, options.params, remarks) if options.params else None,
             all_of_them=bool(options.fail_if),
         )
         for run in runs:
@@ -126,8 +124,8 @@ def _read(bags: Sequence[Path], options: Namespace) -> list[Column]:
     return columns
 
 
-def _parameters(file: Path, namespace: str) -> dict[str, Any]:
-    found = read_parameters(file, f"/{namespace}/{CONTROLLER}".replace("//", "/"))
+def _parameters(file: Path, remarks: list[str], namespace: str) -> dict[str, Any]:
+    found = read_parameters(file, f"/{namespace}/{CONTROLLER}".replace("//", "/"), remarks)
     Values(found).read(Climber)  # which says what is wrong with them
     return found
 

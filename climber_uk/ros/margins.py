@@ -38,6 +38,7 @@ class Margins:
         """Publish a status of the lowest margins since the last one."""
         slip, tip = self.lowest
         self.level, self.lowest = self.alarm.level(min(slip, tip)), self.last
-        said = f"lowest: slip margin {slip:.2f} (below 1 it slips), tip margin {tip:.2f} (tips)"
+        down_to = f"slip margin down to {slip:.2f}, tip margin to {tip:.2f}"
+        said = f"{down_to}; below 1 it slips, or tips over"
         values = {"slip margin": slip, "tip margin": tip}
         self.node.publish_status("margins", STATUS_LEVELS[self.level], said, values)

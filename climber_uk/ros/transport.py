@@ -10,7 +10,8 @@ from pathlib import Path
 
 LOCALHOST = Path(__file__).with_name("localhost.xml")
 TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
-# up to Jazzy, which is what the wheels are, and from Kilted on; distributions go by the alphabet
+# up to Jazzy, which is what the wheels are, and from Kilted on, which warns of the first;
+# distributions go by the alphabet
 BOTH_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"
 PROFILES = BOTH_PROFILES[os.environ.get("ROS_DISTRO", "jazzy") > "jazzy"]
 # ports of domain 0, of which each domain has 250: one that DDS leaves free, and its first

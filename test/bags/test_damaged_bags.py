@@ -117,7 +117,7 @@ def test_a_file_that_is_not_there_is_said(tmp_path):
 @pytest.mark.parametrize("storage", STORAGES)
 def test_an_empty_bag_is_one_line(tmp_path, storage):
     write(tmp_path / "bag", [], storage)
-    with pytest.raises(ValueError, match=r"/bag: no odometry on a topic odom$"):
+    with pytest.raises(ValueError, match=r"/bag: no odometry: no message on odom$"):
         read(tmp_path / "bag")
 
 
@@ -128,7 +128,7 @@ def test_a_topic_without_a_message_is_one_line(tmp_path):
         [("/other", "std_msgs/msg/Int64", 5, blank("std_msgs/msg/Int64"))],
         topics={odometry: kind},
     )
-    with pytest.raises(ValueError, match=r"/bag: no odometry on /odom$"):
+    with pytest.raises(ValueError, match=r"/bag: no odometry: no message on /odom$"):
         read(tmp_path / "bag")
 
 

@@ -19,7 +19,10 @@ from hostile_bags import HEAVY, KINDS, damage, victims
 
 BAGS = int(os.environ.get("HOSTILE_BAGS", "2000"))
 # the tools in turn; to draw takes most of the time
-TURNS = "export_tum", "analyze_bag", "export_tum", "identify", "export_tum", "replay_controller"
+SLOW = "analyze_bag", "compare_bags", "animate_bag"
+QUICK = "export_tum", "identify", "localize", "replay_controller"
+TURNS = [tool for slow in SLOW for tool in (slow, *QUICK)]
+MORE = {"identify": [], "animate_bag": ["--output", "output", "--seconds", "0.5", "--rate", "4"]}
 MOST_SECONDS = 90  # on a busy machine
 MOST_MEMORY = 2**30  # [bytes] beyond the bag's size
 MOST_LINES = 25  # what could not be read, and is told
@@ -53,7 +56,8 @@ class Watch:
             KINDS[name](place / "bag", rng)
             if spoil:
                 damage(place / "bag", rng)
-            arguments = ["bag", *([] if tool == "identify" else ["--output", "output"])]
+            bags = ["bag", "bag"] if tool == "compare_bags" else ["bag"]
+            arguments = [*bags, *MORE.get(tool, ["--output", "output"])]
             before = snapshot(place)
             job = {"tool": tool, "arguments": arguments, "directory": str(place)}
             print(json.dumps(job), file=self.server.stdin, flush=True)

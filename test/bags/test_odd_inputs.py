@@ -1,9 +1,12 @@
 """Odd bags and odd words on the command lines: the right result, or a line that says why not."""
 
+import re
 import sqlite3
 import subprocess
 import sys
+from collections import Counter
 from contextlib import closing
+from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +17,10 @@ from made_bag import BEGAN, SECOND, STORE, Made, a_run, blank, message, write
 from climber_uk.bags.bag import open_bag
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.topics import Topics
-from climber_uk.identification import identify
+from climber_uk.identification import figure, identify
 from climber_uk.parameters.parameter_file import read_sections
-from climber_uk.replay import replay_controller
-from climber_uk.report import analyze_bag, export_tum, figures
+from climber_uk.replay import localization_figure, localize, replay_controller
+from climber_uk.report import analyze_bag, animate_bag, compare_bags, export_tum, figures
 
 TOOLS = {
     "analyze_bag": analyze_bag,
@@ -25,24 +28,37 @@ TOOLS = {
     "replay_controller": replay_controller,
     "identify": identify,
 }
+ALL_TOOLS = {
+    **TOOLS,
+    "animate_bag": animate_bag,
+    "compare_bags": compare_bags,
+    "localize": localize,
+}
 POSE, STRING = "geometry_msgs/msg/PoseStamped", "std_msgs/msg/String"
 
 
 @pytest.fixture
 def run(monkeypatch, capsys, tmp_path):
-    """Run a tool without its figures; return its exit status and what it said of what is wrong."""
+    """Run a tool without its figures; return whether it failed and what it said of that."""
     monkeypatch.setattr(figures, "draw", lambda *_: {})
     monkeypatch.setattr(replay_controller, "draw", lambda *_: None)
+    monkeypatch.setattr(localization_figure, "draw", lambda *_: None)
+    monkeypatch.setattr(figure, "draw", lambda *_: None)
+    monkeypatch.setattr(animate_bag, "write", lambda *_: 0)
     monkeypatch.chdir(tmp_path)
 
     def run(tool, *arguments):
         monkeypatch.setattr(sys, "argv", [tool, *map(str, arguments)])
         status = None
         try:
-            TOOLS[tool].main()
+            ALL_TOOLS[tool].main()
         except SystemExit as ended:
             status = ended.code
-        said = capsys.readouterr().err + (status if isinstance(status, str) else "")
+        out, said = capsys.readouterr()
+        said += status if isinstance(status, str) else ""
+        assert status in (None, 0, 1, 2) or isinstance(status, str)
+        assert not status or len(said.strip().splitlines()) == 1
+        assert all(line.isprintable() for line in (out + said).split("\n"))
         assert "Warning" not in said
         return bool(status), said
 
@@ -125,6 +141,135 @@ def in_utf_16(bag):
     sqlite(bag, raw(a_whole_run()))
 
 
+def spoilt_bytes(change):
+    """The file of a run, changed."""
+
+    def make(bag):
+        file = mcap(bag, raw(a_whole_run())) / "bag_0.mcap"
+        file.write_bytes(change(file.read_bytes()))
+
+    return make
+
+
+def spoilt_messages(change):
+    """A run whose messages are changed: topic, type, log time and message of each."""
+
+    def make(bag):
+        write(bag, [change(number, *m) for number, m in enumerate(a_whole_run().messages)])
+
+    return make
+
+
+def only(*topics, most=10**9):
+    """Some topics of a run, the first messages of each."""
+
+    def make(bag):
+        kept = [m for m in a_whole_run().messages if not topics or m[0] in topics]
+        count = Counter()
+        few = []
+        for m in kept:
+            count[m[0]] += 1
+            few += [m] * (count[m[0]] <= most)
+        write(bag, few)
+
+    return make
+
+
+def numbers(value):
+    """In every message every number that is a float is another."""
+
+    def spoil(made):
+        for name, of in vars(made).items():
+            if isinstance(of, float):
+                setattr(made, name, value)
+            elif isinstance(of, np.ndarray) and of.dtype.kind == "f":
+                of[:] = value
+            elif hasattr(of, "__dict__"):
+                spoil(of)
+
+    def change(_, topic, kind, log, sent):
+        spoil(sent := deepcopy(sent))
+        return topic, kind, log, sent
+
+    return spoilt_messages(change)
+
+
+def times(stamp_of):
+    """Stamps of a run are others: `stamp_of` a message's number and its stamp [ns]."""
+
+    def change(number, topic, kind, log, sent):
+        if header := getattr(sent := deepcopy(sent), "header", None):
+            stamp = header.stamp.sec * SECOND + header.stamp.nanosec
+            header.stamp.sec, header.stamp.nanosec = divmod(stamp_of(number, stamp), SECOND)
+        return topic, kind, log, sent
+
+    return spoilt_messages(change)
+
+
+def names(text):
+    """All texts of a run, in messages, are another."""
+
+    def change(_, topic, kind, log, sent):
+        sent = deepcopy(sent)
+        for holder, name in ((sent, "child_frame_id"), (getattr(sent, "header", 0), "frame_id")):
+            if hasattr(holder, name):
+                setattr(holder, name, text)
+        if hasattr(sent, "name"):
+            sent.name = [text] * len(sent.name)
+        return topic, kind, log, sent
+
+    return spoilt_messages(change)
+
+
+def without_metadata(bag):
+    a_whole_run().write(bag)
+    (bag / "metadata.yaml").unlink()
+
+
+def not_to_be_read(bag):
+    """A file of somebody else; who is root reads it all the same."""
+    mcap(bag, raw(a_whole_run()))
+    (bag / "bag_0.mcap").chmod(0)
+
+
+SPOILT = {
+    "cut in the middle": spoilt_bytes(lambda data: data[: len(data) // 2]),
+    "cut in its head": spoilt_bytes(lambda data: data[:20]),
+    "empty": spoilt_bytes(lambda data: b""),
+    "zeros": spoilt_bytes(lambda data: bytes(5000)),
+    "zeros at the end": spoilt_bytes(lambda data: data[: len(data) // 2] + bytes(5000)),
+    "a text": spoilt_bytes(lambda data: b"t,x,y\n0,1,2\n" * 100),
+    "a page": spoilt_bytes(lambda data: b"<!DOCTYPE html><html>404</html>"),
+    "the file twice": spoilt_bytes(lambda data: data * 2),
+    "without metadata": without_metadata,
+    "not to be read": not_to_be_read,
+    "a directory in the place of the file": lambda bag: (bag / "bag_0.mcap").mkdir(parents=True),
+    "a directory without anything": lambda bag: bag.mkdir(),
+    "without odometry": only("/reference", "/wheel_torques", "/joint_states"),
+    "odometry only": only("/odom"),
+    "torques only": only("/wheel_torques"),
+    "one message of each": only(most=1),
+    "two messages of each": only(most=2),
+    "no message": only("/nothing"),
+    "no number": numbers(np.nan),
+    "infinite numbers": numbers(np.inf),
+    "huge numbers": numbers(1e300),
+    "tiny numbers": numbers(5e-324),
+    "zeros for numbers": numbers(0.0),
+    "one stamp": times(lambda number, stamp: 5 * SECOND),
+    "stamps of zero": times(lambda number, stamp: 0),
+    "stamps that go back": times(lambda number, stamp: 10 * SECOND - stamp),
+    "stamps to and fro": times(lambda number, stamp: stamp + (-1) ** number * 3 * SECOND),
+    "stamps before 1970": times(lambda number, stamp: stamp - 10 * SECOND),
+    "the last stamps": times(lambda number, stamp: (2**31 - 1) * SECOND + stamp % SECOND),
+    "names with quotes": names("a'b\"c`d $(e)"),
+    "names that command terminals": names("\x1b[2J\x1b]0;x\x07\r\n\x9b"),
+    "names that markup is made of": names("<script>alert(1)</script>&amp;"),
+    "no names": names(""),
+    "long names": names("x" * 5000),
+}
+
+
 GOOD = ""
 BAGS = {
     "a second type, string": (with_others_on_every_topic(STRING), GOOD),
@@ -138,10 +283,10 @@ BAGS = {
         GOOD,
     ),
     "UTF-16": (in_utf_16, GOOD),
-    "wrong types": (of_wrong_types, "no odometry on|no message on|are not what they should be"),
+    "wrong types": (of_wrong_types, "no message on|are not what they should be"),
     "the clock set by years": (after_years, GOOD),
     "two frames": (of_two_frames, "frame_id='map', others have 'odom'"),
-    "a topic without a name": (without_a_topic, "no odometry on|has no message on /odom"),
+    "a topic without a name": (without_a_topic, "no message on"),
     "negative rows": (with_negative_rows, "with numbers below 1 are left out|has no message on"),
 }
 
@@ -163,7 +308,47 @@ def test_an_odd_bag_is_read_or_refused_in_words(tmp_path, run, tool, make, said)
         assert not failed or "windows of 1.0 s in motion must be >= 5" in err
 
 
-@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize("make", SPOILT.values(), ids=SPOILT)
+def test_a_spoilt_bag_is_read_or_refused_in_one_line_by_every_tool(tmp_path, run, make):
+    """What `run` looks at: status, one line where it failed, and nothing that is not printable."""
+    make(tmp_path / "bag")
+    for tool in ALL_TOOLS:
+        bags = ["bag", "bag"] if tool == "compare_bags" else ["bag"]
+        failed, said = run(tool, *bags)
+        assert not failed or said.startswith(f"{tool}: "), said
+
+
+def test_a_topic_of_another_type_is_said_with_it(tmp_path, run):
+    of_wrong_types(tmp_path / "bag")
+    for tool in "export_tum", "replay_controller", "identify":
+        assert f"(it is {POSE}, not " in run(tool, "bag")[1]
+
+
+@pytest.mark.parametrize("name", ["a'b\"c $(d)`e`", "a\x1b[2Jb\r\nc", "a\udcffb", "<b>&amp;"])
+def test_a_bag_of_any_name_is_read_by_every_tool(tmp_path, run, name):
+    mcap(tmp_path / name, raw(a_whole_run()))
+    for tool in ALL_TOOLS:
+        bags = [name, name] if tool == "compare_bags" else [name]
+        failed, said = run(tool, *bags)
+        assert failed == (tool in ("identify", "localize")), said
+        assert not failed or "windows of 1.0 s" in said or "has no message on" in said, said
+
+
+def test_of_a_bag_of_another_robot_every_tool_tells_which_topics_there_are(tmp_path, run):
+    others = {"/odom": "/robot/filtered", "/wheel_torques": "/motors"}
+    write(tmp_path / "bag", [(others.get(m[0], m[0]), *m[1:]) for m in a_whole_run().messages])
+    for tool in ALL_TOOLS:
+        bags = ["bag", "bag"] if tool == "compare_bags" else ["bag"]
+        _, said = run(tool, *bags)
+        of_joints = "no message on /.* (sensor_msgs/msg/JointState is on /motors)"
+        of_odometry = "no message on /?odom (nav_msgs/msg/Odometry is on /robot/filtered)"
+        wanted = of_joints if tool in ("localize", "replay_controller") else of_odometry
+        assert re.search(wanted.replace("(", r"\(").replace(")", r"\)"), said), said
+    remapped = [f"--remap={name[1:]}:={other}" for name, other in others.items()]
+    assert run("analyze_bag", "bag", *remapped) == (False, "")
+
+
+@pytest.mark.parametrize("tool", ALL_TOOLS)
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -182,7 +367,7 @@ def test_odd_paths_are_told_in_one_line(tmp_path, run, monkeypatch, tool, words,
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "file").write_text("kept")
     (tmp_path / "bag").mkdir()
-    failed, err = run(tool, *words)
+    failed, err = run(tool, *words, *["bag"] * (tool == "compare_bags"))
     assert failed
     assert any(part.format(home=tmp_path / "home") in err for part in said.split("|")), err
     assert len(err.strip().splitlines()) == 1
@@ -206,7 +391,10 @@ def test_odd_paths_are_told_in_one_line(tmp_path, run, monkeypatch, tool, words,
         ),
         (["identify", "--plan", "p", "--duration", "1e300"], "duration=1e+300 must be <= 3600"),
         (["identify", "--plan", "/proc/x"], "cannot write into /proc"),
-        (["identify", "bag", "--odometry", "joint_states"], "has no odometry on /joint_states"),
+        (
+            ["identify", "bag", "--odometry", "joint_states"],
+            "has no message on /joint_states",
+        ),
     ],
 )
 def test_odd_values_are_refused_in_one_line(tmp_path, run, words, said):

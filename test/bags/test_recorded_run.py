@@ -66,7 +66,7 @@ def test_every_climber_is_found_by_its_odometry(tmp_path):
     assert [run.name for run in runs] == ["a", "b/c"]
     assert [len(run.torques) for run in runs] == [N, N]
     assert read_run(bag, "/b/c").name == "b/c"
-    with pytest.raises(ValueError, match="no odometry on /d/odom"):
+    with pytest.raises(ValueError, match="no odometry: no message on /d/odom"):
         read_run(bag, "d")
 
 

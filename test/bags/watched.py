@@ -19,8 +19,11 @@ PATIENCE = 120  # [s]
 MEMORY = 8 * 2**30  # [bytes] of addresses
 TOOLS = {
     "analyze_bag": "report",
+    "animate_bag": "report",
+    "compare_bags": "report",
     "identify": "identification",
     "export_tum": "report",
+    "localize": "replay",
     "replay_controller": "replay",
 }  # and the rooms that they are in
 

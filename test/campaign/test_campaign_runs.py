@@ -199,7 +199,7 @@ def test_the_command_tells_what_came_out_and_how_to_run_the_worst_again(campaign
 def test_what_cannot_be_run_is_said_in_one_line(campaign_file, tmp_path):
     file = campaign_file(seed=-1)
     told = subprocess.run([COMMAND, file], capture_output=True, text=True, cwd=tmp_path)
-    assert told.returncode == 1
+    assert told.returncode == 2
     assert told.stderr == f"campaign: {file}: seed=-1 must be >= 0\n"
     assert not (tmp_path / "campaign_output").exists()
 

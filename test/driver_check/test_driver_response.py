@@ -244,3 +244,19 @@ def test_a_torque_that_does_not_end_fails():
     found = reacting.watchdog(silence(0.5, until=9.0))
     assert found.verdict is Verdict.FAIL
     assert found.values["acceleration"] == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("trouble", "hint"),
+    [
+        ("odometry came late in 20 of 20 pulses", "too busy"),
+        ("it moves already, with 0.20 m/s and 0.00 rad/s", "hold it"),
+        ("/uk_torque_controller publishes wheel_torques", "stop all that commands it"),
+        ("it turned 0.700 rad, more than max_turn", "look what has moved it"),
+    ],
+)
+def test_the_hint_is_for_what_has_stopped_the_trial(trouble, hint):
+    seen = tried(RIGHT, bounds=Bounds(max_turn=0.05))
+    found = reacting.trial(replace(seen, trial=replace(seen.trial, trouble=trouble)))
+    assert (found.verdict, found.said) == (Verdict.FAIL, f"stopped: {trouble}")
+    assert hint in found.hint

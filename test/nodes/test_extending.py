@@ -83,6 +83,7 @@ def test_a_controller_of_somebody_else_s_takes_ours_place(world, tmp_path):
     words = [*options, "--duration", "2", "--controller", own]
     demo = world.run("run_demo", executable("run_demo"), *words)
     assert demo.wait(TIMEOUT) == 0, world.log("run_demo")
+    assert "The path was not finished: 5" in world.log("run_demo")  # of 55 s
     run = read_run(tmp_path / "run" / "bag")
     assert run.travelled > 0.02
     assert run.distance.max() < 0.01

@@ -157,6 +157,15 @@ def test_a_demo_that_cannot_start_says_why_and_leaves_nothing(start, tmp_path, w
     assert not (tmp_path / "run").exists()
 
 
+def test_a_demo_doubts_before_it_starts_what_its_nodes_would_doubt_in_their_logs(start, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text((CONFIG / "paper.yaml").read_text().replace("mass: 5.0", "mass: 5000.0"))
+    process = start(executable("run_demo"), "--config", file, "-o", "/dev/null/run")
+    doubt, _ = process.communicate(timeout=TIMEOUT)[0].splitlines()  # once for all nodes
+    assert doubt.startswith(f"run_demo: {file}: mass=5000 [kg] is hardly meant")
+    assert doubt.endswith("if it is in g, write 5")
+
+
 @pytest.mark.parametrize("place", ["/dev/null/run", "/proc/run"])
 def test_where_nothing_can_be_written_a_demo_says_so(start, place):
     process = start(executable("run_demo"), *DEMO, place)

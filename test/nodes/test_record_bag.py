@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import closing
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -523,7 +524,8 @@ def test_log_times_go_on_though_the_system_clock_is_set_back(graph, tmp_path, mo
 
 @pytest.mark.nodes
 def test_the_distribution_in_the_metadata_is_the_one_that_runs(graph, monkeypatch):
-    installed = "jazzy"  # whose rclpy these tests have, if no set-up says otherwise
+    major = version("rclpy").split(".")[0]
+    installed = {"7": "jazzy", "9": "kilted"}[major]  # by which these tests run
     for name in (None, "kilted"):
         monkeypatch.delenv("ROS_DISTRO", raising=False)
         if name:

@@ -17,7 +17,7 @@ from climber_uk.ros.transport import (
 )
 
 UDP, LOCAL = {TRANSPORTS: "UDPv4"}, {RANGE: "SUBNET", PROFILES: str(LOCALHOST)}
-SHARED_MEMORY = "/dev/shm/fastrtps"
+SHARED_MEMORY = "/dev/shm/fastrtps", "/dev/shm/fastdds"  # up to Jazzy, and from Kilted on
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,8 @@ def chooses(world, **chosen):
 
 
 def uses_shared_memory(process):
-    return "/dev/shm/fastrtps" in Path(f"/proc/{process.pid}/maps").read_text()
+    maps = Path(f"/proc/{process.pid}/maps").read_text()
+    return any(name in maps for name in SHARED_MEMORY)
 
 
 @pytest.mark.nodes

@@ -47,7 +47,7 @@ def sweep(domain):
 
     Who finds such a port of shared memory waits a third of a second for its owner, again and again.
     """
-    for file in Path("/dev/shm").glob("*fastrtps_port*"):
+    for file in Path("/dev/shm").glob("*fast*_port*"):
         port = int("".join(filter(str.isdigit, file.name)))
         if 0 <= port - 7400 - 250 * domain < 250:
             file.unlink(missing_ok=True)

@@ -1,11 +1,18 @@
 """What the command line of `climber` takes."""
 
+import math
 from dataclasses import replace
 
 import pytest
+from geometry_msgs.msg import Vector3, Vector3Stamped
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterEvent, ParameterValue
+from sensor_msgs.msg import JointState
 
 from climber_uk.messages import writing
-from climber_uk.operating.command import parse, told
+from climber_uk.operating import watching
+from climber_uk.operating.command import parse
 from climber_uk.planning.progress import Progress
 
 
@@ -43,7 +50,50 @@ def test_a_climber_that_waits_tells_for_what():
         ("", "waiting, 1.00 m"),
     ):
         message = writing.progress("planner", vars(replace(how_far, mode=mode)), 0)
-        state, line = told(message)
+        state, line = watching.progress(message)
         assert state == "waiting"
         assert line.startswith(said)
         assert line.endswith("1.00 m done, 2.00 m left, 3 s, lap 1, segment 1")
+
+
+def heard():
+    """Messages of a climber that drives, by topic."""
+    how_far = Progress("following", done=1.0, left=2.0, time_left=3.0, lap=0, segment=1)
+    odometry = Odometry()
+    odometry.twist.twist.linear.x, odometry.twist.twist.angular.z = 0.25, -0.1
+    limit = ParameterMessage(name="max_wheel_torque", value=ParameterValue(double_value=4.0))
+    return {
+        watching.PROGRESS: writing.progress("planner", vars(how_far), 0),
+        watching.ODOMETRY: odometry,
+        watching.ERROR: Vector3Stamped(vector=Vector3(x=1e-3, y=-2e-3, z=0.01)),
+        watching.MARGINS[1]: Vector3Stamped(vector=Vector3(x=2.5, y=24.0, z=384.0)),
+        watching.TORQUES: JointState(name=["left", "right"], effort=[2.0, -4.0]),
+        watching.PARAMETERS: ParameterEvent(new_parameters=[limit]),
+    }
+
+
+def test_what_is_watched_is_told_in_numbers_and_bars():
+    told = watching.lines(heard())
+    assert told == [
+        "following, 1.00 m done, 2.00 m left, 3 s",
+        "speed      0.250 m/s, turning  -0.100 rad/s",
+        "error        1.00 mm along the path,    -2.00 mm across, 0.0100 rad",
+        "margins  slip   2.50, tip  24.00 (below 1 it slips, or tips over); load 384 N",
+        f"torque   {' ' * 20}|{'█' * 10}{' ' * 10}   2.000 N m  left",
+        f"torque   {'█' * 20}|{' ' * 20}  -4.000 N m  right",
+    ]
+
+
+@pytest.mark.parametrize("missing", list(watching.HEARD))
+def test_what_nobody_tells_is_a_dash_and_bars_go_without_a_limit(missing):
+    some = heard()
+    del some[missing]
+    told = watching.lines(some)
+    assert sum(line.endswith("–") for line in told) == (missing != watching.PARAMETERS)
+    if missing == watching.PARAMETERS:
+        assert told[-2].count("█") == 10
+
+
+@pytest.mark.parametrize("share", [-math.inf, -2.0, -1.0, -0.01, 0.0, 0.5, 1.0, 9.0, math.nan])
+def test_a_bar_is_as_wide_whatever_it_shows(share):
+    assert len(watching.bar(share)) == 2 * watching.HALF + 1

@@ -70,6 +70,12 @@ def test_what_is_no_parameter_file_is_said_in_one_line(file, text):
     assert len(str(error.value).splitlines()) == 1
 
 
+def test_a_tab_in_a_parameter_file_is_said_in_plain_words(file):
+    text = "x:\n  ros__parameters:\n    mass: 5.0\n\thalf_track: 0.3\n"
+    with pytest.raises(ValueError, match="line 4, column 1: a tab, where YAML takes blanks only"):
+        read_file(file(text), NODE)
+
+
 @pytest.mark.parametrize(
     "text",
     [

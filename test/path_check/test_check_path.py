@@ -144,7 +144,7 @@ def test_what_is_wrong_is_said_in_one_line(monkeypatch, capsys, tmp_path, text, 
 
 def test_margins_are_those_that_the_nodes_tell():
     """The paper's: 0.54 to 0.53, as the controller publishes them."""
-    trajectory, climber, attachment = check_path.read(CONFIG / "paper.yaml", {})
+    trajectory, climber, attachment = check_path.read(CONFIG / "paper.yaml", {}, [])
     found = demands(trajectory, climber, attachment, 1.0)
     slip = next(iter(found.reserves.values()))
     assert np.min(slip) == pytest.approx(0.53, abs=0.02)

@@ -130,7 +130,7 @@ def test_a_condition_that_holds_sets_the_exit_status(bags, run):
         (["--fail-if", "rms_distance>much"], "much must be a finite number"),
         (["--remap", "x:=y"], "remapping 'x:=y': x is none of"),
         (["--params", "nowhere.yaml"], "nowhere.yaml"),
-        (["--namespace", "robot"], "no odometry on /robot/odom"),
+        (["--namespace", "robot"], "no odometry: no message on /robot/odom"),
     ],
 )
 def test_a_wrong_argument_is_one_line(bags, run, arguments, said):
@@ -206,7 +206,7 @@ def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_pat
     tracking = rows.index(["Tracking"])
     assert rows[tracking + 1] == ["truth_rms_distance", "300", "mm"]
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "<b>300 mm RMS, truly</b>" in page
+    assert "<b>300 mm RMS (true)</b>" in page
     assert "by the odometry" in page
     told = json.loads((tmp_path / "out" / "metrics.json").read_text())["runs"][0]["metrics"]
     assert told["truth_max_distance"] == pytest.approx(0.3)
@@ -222,6 +222,7 @@ def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_pat
         ({"truth_max_distance": 0.3}, "It followed its path, at most 300 mm off."),
         ({"settling_time": np.nan}, "It did not settle on its path, at most 4 mm off."),
         ({"following": 0.0}, "It did not follow its reference."),
+        ({"max_distance": np.nan}, "There is no reference in it"),
         ({"safety_stops": 1.0}, "It stopped for safety (1 stop)."),
         ({"safety_stops": 2.0}, "It stopped for safety (2 stops)."),
         ({"lowest_slip_margin": 0.5}, "on a real wall its wheels would slip"),

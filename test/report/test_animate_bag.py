@@ -50,6 +50,8 @@ def test_without_a_directory_it_is_a_new_one_in_the_bag(bag, run):
     assert said == "".join(f"{bag}/{name}/film.webp: 2 pictures\n" for name in ("film", "film_2"))
 
 
-def test_a_bag_without_a_run_is_one_line(run, tmp_path):
-    with pytest.raises(SystemExit, match="nowhere"):
+def test_a_bag_without_a_run_is_one_line(run, tmp_path, capsys):
+    with pytest.raises(SystemExit, match="2"):
         run(tmp_path / "nowhere", "--output", tmp_path)
+    said = capsys.readouterr().err
+    assert said == f"animate_bag: there is no bag {tmp_path}/nowhere\n"
