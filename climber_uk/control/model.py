@@ -212,15 +212,16 @@ class Observer:
         yaw_acceleration = (measured.yaw_rate - expected.yaw_rate) / time
         unexpected = mass * acceleration
         unlearnt = learnt.lets_go(unexpected, measured.speed, time)
+        rests, slides = settling == SETTLES, settling == 0.0
+        force_rate = select(rests | slides, force_rate, 0.0)  # what lets go is a step, no ramp
         change = time * force_rate + unlearnt + new * (unexpected - unlearnt)
-        rests = settling == SETTLES
-        stuck = select(settling > 0.0, stuck + select(rests, change, unlearnt), 0.0)
+        stuck = select(slides, 0.0, stuck + select(rests, change, unlearnt))
         force, friction = learnt.changed(climber, change, direction, expected.speed)
         change = time * moment_rate + new * inertia * yaw_acceleration
         moment, turning = learnt.turned(climber, change, turn, expected.yaw_rate)
         # at rest stiction balances any force, so that no change of it shows
-        slides = (abs(expected.speed) > EXPECTED_REST) & (settling == 0.0)
-        force_rate = select(slides, force_rate + newer / time * unexpected, 0.0)
+        ramps = (abs(expected.speed) > EXPECTED_REST) & (rests | slides)
+        force_rate = select(ramps, force_rate + newer / time * unexpected, 0.0)
         moment_rate = moment_rate + newer / time * inertia * yaw_acceleration
         held = (turning > 0.0) & (abs(expected.yaw_rate) < EXPECTED_REST)
         moment_rate = select(held, 0.0, moment_rate)
