@@ -160,13 +160,15 @@ class Demo(ClimberNode):
         self.wait(lambda: self.time is not None, "the plant")
         first = self.time or 0.0
         begin = shown = time.monotonic()
+        in_place, due = sys.stdout.isatty(), 0.0  # where it is no terminal, ten lines in all
         while (passed := (self.time or 0.0) - first) < self.duration and not self.fall:
             self.wait(lambda: (self.time or 0.0) - first > passed or bool(self.fall), "the plant")
             now = time.monotonic()
-            if now > shown + 0.5:
-                shown = now
-                print(f"\r{self.progress(passed, now - begin)}", end="", flush=True)
-        print(f"\r{self.progress(passed, time.monotonic() - begin)}")
+            if now > shown + 0.5 and (in_place or passed >= due):
+                shown, due = now, passed + self.duration / 10
+                end_of_line = "\r" if in_place else "\n"
+                print(self.progress(passed, now - begin), end=end_of_line, flush=True)
+        print(self.progress(passed, time.monotonic() - begin))
         if self.fall:
             print(self.fall)
         left = max((left for left in self.left.values() if math.isfinite(left)), default=0.0)

@@ -40,7 +40,8 @@ def test_a_tool_of_the_table_does_what_it_is_there_for(run, command, tmp_path):
     words = [str(run / "bag") if word == "BAG" else word for word in shlex.split(words)]
     done = given(words, cwd=tmp_path)
     assert "Traceback" not in done.stderr
-    assert done.returncode == 0, done.stdout + done.stderr
+    # identify's answer may be that something cannot be told of this run
+    assert done.returncode in (0, words[0] == "identify"), done.stdout + done.stderr
     assert done.stdout
 
 
