@@ -19,6 +19,7 @@ from climber_uk.identification.identified import (
     NAMES,
     NOTHING,
     OF_TURNING,
+    ROTORS,
     WAY,
     YAW,
     Choice,
@@ -66,7 +67,7 @@ def parameters(
         ]
         coefficients[chosen[kind]] = fit.coefficients[: len(chosen[kind])]
         sought[chosen[kind]] = True
-    if not sought[NAMES.index("rotor_inertia")]:
+    if not sought[NAMES.index(ROTORS)]:
         given = given._replace(rotors=climber.rotor_inertia)
     values, slopes = _parameters(coefficients, given), _slopes(coefficients, given)
     squares, white, bias = [], np.zeros(len(NAMES)), np.zeros(len(NAMES))

@@ -25,6 +25,7 @@ UNITS = {
     "half_track": "m",
 }
 NAMES = tuple(UNITS)
+ROTORS = "rotor_inertia"
 OF_TURNING = ("yaw_inertia", "turning_friction", "turning_resistance")
 DRIVE, YAW, WAY, HEADING = "drive", "yaw", "way", "heading"  # kinds of equations
 IN_TIME = (0.0, 0.0)

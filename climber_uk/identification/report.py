@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from climber_uk.identification.identified import IN_TIME, NAMES, UNITS, Identified
+from climber_uk.identification.identified import IN_TIME, NAMES, ROTORS, UNITS, Identified
 from climber_uk.identification.integral_equations import Site
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, PLANT
@@ -17,7 +17,7 @@ ADVICE = {
     (
         "mass",
         COULOMB,
-        "rotor_inertia",
+        ROTORS,
     ): "drive up, down and across the wall; on a floor, change speed",
     ("yaw_inertia",): "drive bends to both sides",
     ("wheel_radius", "half_track"): "drive further, and turn",
@@ -31,8 +31,14 @@ def label_of(name: str, site: Site) -> tuple[str, str]:
 
 
 def rows(found: Identified, assumed: Climber) -> Iterator[dict[str, Any]]:
-    """Row of each parameter, as in the JSON file; a reason in place of an undetermined value."""
-    for name, value, half_width in zip(NAMES, found.values, found.half_widths, strict=True):
+    """Row of each parameter, as in the JSON file; a reason in place of an undetermined value.
+
+    Rotors have one only where some show.
+    """
+    columns = zip(NAMES, found.values, found.half_widths, found.sought, strict=True)
+    for name, value, half_width, sought in columns:
+        if name == ROTORS and not sought:
+            continue
         label, unit = label_of(name, found.site)
         reason = found.reasons.get(name)
         row = {

@@ -16,6 +16,7 @@ from climber_uk.identification.identified import (
     KNOWN,
     NAMES,
     OF_TURNING,
+    ROTORS,
     UNITS,
     WAY,
     WEIGHT,
@@ -35,7 +36,6 @@ SAME = 1e-5  # [m], [rad] and of a value: odometry that agrees so well is made o
 MUCH = 0.05  # share of the drive that is unexplained, above which no parameter is determined
 OFF = 0.2  # difference of the torques at the wheels from those commanded, above which none is
 OF_DRIVING = ("mass", "seal_friction_coefficient", "viscous_friction")
-ROTORS = "rotor_inertia"
 OF_WHEELS = ("wheel_radius", "half_track")
 OF_TORQUES = (*OF_DRIVING, ROTORS, *OF_TURNING)
 OF_KIND = {
