@@ -11,6 +11,7 @@ pytestmark = pytest.mark.slow
 BENCH = Path(__file__).parents[1] / "bench"
 
 
+@pytest.mark.soak
 def test_a_row_has_a_figure_for_every_controller():
     row = "the same noise, no twist"  # the shortest
     command = [sys.executable, BENCH / "robustness.py", "--only", row]

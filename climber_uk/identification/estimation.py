@@ -69,16 +69,12 @@ def identify(
     if (count := len(task.windows[DRIVE])) < LEAST_WINDOWS:
         raise ValueError(f"{count} windows of {cut.window} s in motion must be >= {LEAST_WINDOWS}")
     columns = _columns(task.extent)
-    first = {kind: (*columns[kind], LATE) for kind in task.kinds if kind in (DRIVE, YAW)}
+    first = task.with_delay(columns)
     usual, fits = task.fitted(first)
-    rotors = (*columns[DRIVE], WEIGHTLESS)
-    of_rotors, more = task.fitted({DRIVE: (*rotors, LATE)})
-    if _shows_rotors(more[DRIVE], len(rotors) - 1, fits[DRIVE], climber.rotor_inertia > 0):
-        columns, fits = {**columns, DRIVE: rotors}, {**fits, **more}
-        first[DRIVE], usual = (
-            (*rotors, LATE),
-            replace(usual, windows={**usual.windows, **of_rotors.windows}),
-        )
+    if task.shows_rotors(columns[DRIVE], fits[DRIVE]):
+        columns = {**columns, DRIVE: (*columns[DRIVE], WEIGHTLESS)}
+        first = task.with_delay(columns)
+        usual, fits = task.fitted(first)
     late = lateness(fits, columns, lambda delay, lag: usual.acting(delay, lag).equations)
     if late != IN_TIME:  # and the coefficient by which that may still be wrong
         task, columns = task.acting(*late), {**columns, **first}
@@ -161,6 +157,25 @@ class Task:
             windows[kind] = [self.windows[kind][number] for number in kept]
         return replace(self, windows=windows), fits
 
+    def with_delay(self, columns: Columns) -> Columns:
+        """The columns of what torques drive, and that of a delay."""
+        return {kind: (*columns[kind], LATE) for kind in self.kinds if kind in (DRIVE, YAW)}
+
+    def shows_rotors(self, columns: tuple[int, ...], without: WindowFit) -> bool:
+        """Whether (11) shows rotors: inertia that has no weight.
+
+        Where none are assumed, they must explain what the fit `without` them does not.
+        """
+        assumed, (lacking, *_) = self.climber.rotor_inertia > 0, without.misfit.excess
+        if not (assumed or lacking > 0):
+            return False
+        fit = self.fitted({DRIVE: (*columns, WEIGHTLESS, LATE)})[1][DRIVE]
+        share, error = -float(fit.coefficients[-2]), SURE * fit.deviation(-2)
+        if assumed:
+            return error < 1.0
+        is_all = bool(fit.misfit.excess[0] < EXPLAINED * lacking)
+        return is_all and max(LEAST_ROTORS, error) < share < 1.0
+
     def _changes(self, kind: str) -> Array:
         """Time [s], impulse [N s], angular impulse [N m s], way [m], angle [rad] (5, n windows)."""
         motion = self.motion
@@ -188,18 +203,6 @@ def _columns(extent: Extent) -> dict[str, tuple[int, ...]]:
     }
     both = {kind: (0, 1, VISCOUS) if differs else (0, 1) for kind, differs in spreads.items()}
     return {**both, WAY: (0,), HEADING: (0,)}
-
-
-def _shows_rotors(fit: WindowFit, number: int, without: WindowFit, expected: bool) -> bool:
-    """Whether a coefficient of the fit shows rotors: inertia that has no weight.
-
-    Where they are not `expected`, they must explain what the fit `without` them does not.
-    """
-    share, error = -float(fit.coefficients[number]), SURE * fit.deviation(number)
-    if expected:
-        return error < 1.0
-    (left, *_), (lacking, *_) = fit.misfit.excess, without.misfit.excess
-    return max(LEAST_ROTORS, error) < share < 1.0 and bool(left < EXPLAINED * lacking)
 
 
 def _fitted(

@@ -127,6 +127,7 @@ def test_a_campaign_in_which_nothing_is_drawn_but_noise_has_its_histograms(fille
     assert [path.name for path in paths] == ["histograms.png"]
 
 
+@pytest.mark.soak
 def test_memory_does_not_grow_with_the_number_of_runs(campaign, tmp_path):
     """Of what is told, without what matplotlib holds of figures that do not grow either."""
     peaks = []

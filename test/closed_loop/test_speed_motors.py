@@ -113,10 +113,10 @@ def test_a_dead_band_costs_millimetres_and_makes_no_servo_hunt(path):
 @pytest.mark.parametrize(
     ("servo", "link"),
     [
-        (replace(SERVO, servo_time_constant=0.0), INNER),
-        (replace(SERVO, servo_time_constant=0.01), INNER),
+        pytest.param(replace(SERVO, servo_time_constant=0.0), INNER, marks=pytest.mark.soak),
+        pytest.param(replace(SERVO, servo_time_constant=0.01), INNER, marks=pytest.mark.soak),
         (replace(SERVO, servo_time_constant=0.04), INNER),
-        (SERVO, replace(INNER, delay=0.02)),
+        pytest.param(SERVO, replace(INNER, delay=0.02), marks=pytest.mark.soak),
         (SERVO, replace(INNER, period=0.02)),
         (DEAD_BAND, replace(INNER, delay=0.005, sensors=ENCODERS)),
     ],

@@ -110,7 +110,7 @@ def test_a_start_3_m_off_is_refused_with_the_distance():
 
 
 @slow
-@pytest.mark.parametrize("turned", [0.0, 2.0, -3.0])
+@pytest.mark.parametrize("turned", [0.0, pytest.param(2.0, marks=pytest.mark.soak), -3.0])
 def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned):
     climb = Climb(offset=(2.4, -1.8, turned), max_start_distance=5.0, approach_speed=0.4)
     climb.run(5.0)

@@ -51,8 +51,10 @@ def test_the_wheel_is_named_and_both_ways_are_told():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [0.5, 1.0, 1.5])
-@pytest.mark.parametrize("scrubs", [False, True], ids=["wheels", "tracks"])
+@pytest.mark.parametrize("friction", [0.5, pytest.param(1.0, marks=pytest.mark.soak), 1.5])
+@pytest.mark.parametrize(
+    "scrubs", [False, pytest.param(True, marks=pytest.mark.soak)], ids=["wheels", "tracks"]
+)
 def test_odometry_that_is_stuck_from_the_start_lets_nothing_run_away(friction, scrubs):
     def truth(it):
         coefficient = friction * it.seal_friction_coefficient
@@ -67,11 +69,11 @@ def test_odometry_that_is_stuck_from_the_start_lets_nothing_run_away(friction, s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [1.0, 1.5])
+@pytest.mark.parametrize("friction", [pytest.param(1.0, marks=pytest.mark.soak), 1.5])
 def test_a_healthy_climber_has_no_trouble_with_its_encoders(friction):
     def truth(it):
         coefficient = friction * it.seal_friction_coefficient
         return replace(it, seal_friction_coefficient=coefficient)
 
-    climb = Climb(scrubs=True, truth=truth, **ON).run(8.0)
+    climb = Climb(scrubs=True, truth=truth, **ON).run(4.0)
     assert not any(mode.is_fault for mode in climb.modes)

@@ -82,7 +82,11 @@ def test_motors_that_are_too_weak_stall_safely_and_give_up_after_some_attempts()
     assert climb.fastest(7.0) < climb.reference_speed
 
 
-@pytest.mark.parametrize("turned", [0.0, 3.1, 1.6], ids=["ahead", "back", "around"])
+@pytest.mark.parametrize(
+    "turned",
+    [pytest.param(0.0, marks=pytest.mark.soak), 3.1, pytest.param(1.6, marks=pytest.mark.soak)],
+    ids=["ahead", "back", "around"],
+)
 def test_a_push_is_ridden_out_and_the_path_goes_on_where_it_was_left(turned):
     climb = deepcopy(healthy(False, 7.0))
     active = climb.state.heading + turned

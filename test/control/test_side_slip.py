@@ -90,8 +90,17 @@ def drive(trajectory, duration, constraints=GAINS, observer=None, **slip):
     return np.linalg.norm(distances, axis=1), controller, modes
 
 
-@pytest.mark.parametrize("creep", [-0.03, 0.0, 0.03])
-@pytest.mark.parametrize("resistance", [0.0, 30.0])
+@pytest.mark.parametrize(
+    ("creep", "resistance"),
+    [
+        (-0.03, 0.0),
+        (0.03, 30.0),
+        *(
+            pytest.param(*it, marks=pytest.mark.soak)
+            for it in [(0.0, 0.0), (0.03, 0.0), (-0.03, 30.0), (0.0, 30.0)]
+        ),
+    ],
+)
 def test_a_climber_that_sags_while_it_turns_stays_on_its_circle(creep, resistance):
     slip = {"creep": creep, "scrub": 0.08, "resistance": resistance}
     distance, controller, modes = drive(CIRCLE, 19.0, **slip)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from driven import CLIMBER, arrived, evidence, odometry
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from climber_uk.driver_check import checks, sensing
@@ -126,6 +126,7 @@ def test_a_good_imu_and_good_fixes_pass(inclination):
     assert {name: found[name].verdict for name in ROWS} == dict.fromkeys(ROWS, PASS)
 
 
+@settings(max_examples=30)
 @given(first=st.floats(-3, 3), inclination=st.floats(0, 180))
 def test_no_heading_and_no_wall_makes_a_good_one_fail(first, inclination):
     seen = circling(inclination, first)

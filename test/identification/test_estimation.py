@@ -366,7 +366,15 @@ def test_a_wall_that_is_known_to_be_round_is_not_taken_for_another_mass():
     assert "mass" in identify(motion, BELIEVED).reasons
 
 
-@pytest.mark.parametrize(("delay", "lag"), [(0.015, 0.0), (0.08, 0.0), (0.0, 0.035), (0.03, 0.05)])
+@pytest.mark.parametrize(
+    ("delay", "lag"),
+    [
+        (0.015, 0.0),
+        pytest.param(0.08, 0.0, marks=pytest.mark.soak),
+        pytest.param(0.0, 0.035, marks=pytest.mark.soak),
+        (0.03, 0.05),
+    ],
+)
 def test_torques_that_act_later_than_assumed_make_no_inertia_wrong(delay, lag):
     true, random = replace(TRUE, wheel_radius=0.027), np.random.default_rng(3)
     rough = since_start(np.repeat(random.normal(size=(400, 2)), 10, axis=0))  # held for 50 ms

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from climber_uk.localization.encoders import LARGEST_SPEED, Rolled
@@ -71,6 +71,7 @@ class Told:
         return wrapped(self.located[-1].motion.heading - self.heading)
 
 
+@settings(max_examples=40)
 @given(seed=SEEDS, heading=ANGLES, inclination=st.floats(20, 160), bias=st.floats(-0.02, 0.02))
 def test_at_rest_any_heading_is_found_within_a_second(seed, heading, inclination, bias):
     told = Told(seed, heading, bias=bias, inclination=inclination).go_on(1.0)
@@ -219,6 +220,7 @@ def test_without_an_imu_the_wheels_tell_the_turn():
     assert told.localizer.estimate.deviation(HEADING) > 0.05
 
 
+@settings(max_examples=40)
 @given(seed=SEEDS)
 def test_deviations_are_those_of_the_errors(seed):
     """At rest and rolling; 5 deviations are missed once in a million."""

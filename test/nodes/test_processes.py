@@ -89,7 +89,12 @@ def gone(world, pids):
 
 @pytest.mark.parametrize(
     ("end", "by_another"),
-    [(kill, False), (kill, True), (interrupt_twice, True), (close_the_terminal, False)],
+    [
+        pytest.param(kill, False, marks=pytest.mark.soak),
+        (kill, True),
+        (interrupt_twice, True),
+        (close_the_terminal, False),
+    ],
     ids=["kill-alone", "kill-under make", "interrupt_twice-under make", "close_the_terminal-alone"],
 )
 def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(

@@ -77,7 +77,7 @@ def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(w
     assert min(taken_back) > 0.3 * SECOND
 
 
-@pytest.mark.parametrize("seconds", [0, 5])
+@pytest.mark.parametrize("seconds", [pytest.param(0, marks=pytest.mark.soak), 5])
 def test_where_the_clock_goes_back_the_trajectory_starts_again_and_goes_on(world, seconds):
     references = start(world, "use_sim_time:=true")
     clock, odometry = world.speak(Clock, "/clock"), world.speak(Odometry, "odom")

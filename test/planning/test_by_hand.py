@@ -45,7 +45,7 @@ def driven(by_hand, asked, after=4.0):
     return [points[key] for key in sorted(points)], last
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(ASKED)
 def test_it_is_smooth_within_its_limits_and_ends_at_rest(asked):
     references, last = driven(begun(), asked)

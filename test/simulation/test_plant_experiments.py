@@ -23,6 +23,7 @@ def test_the_block_rubs_with_one_newton():
     assert BLOCK.seal_friction == 1.0
 
 
+@pytest.mark.soak
 def test_stribecks_stick_slip_comes_to_the_period_by_hand_as_its_edge_sharpens():
     found = [found_period(pulled(Stribeck(1.5, v), spring(), 25.0, 2e-3)) for v in (1e-3, 1e-4)]
     far, near = (abs(period - stick_slip_period()) for period in found)
