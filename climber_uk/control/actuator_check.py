@@ -15,6 +15,8 @@ LACKS = 0.3, 1.3  # of a wheel's torque that is missing all at once, if nothing 
 LACKS_ELSE = 0.25  # of the same, is missing or too much there
 LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
 LACKS_IN_A_ROW = 3  # odometry messages
+GOES, STANDS = 0.05, 1e-3  # [m/s] of a rim
+STANDS_IN_A_ROW = 3  # odometry messages
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 
 
@@ -71,6 +73,25 @@ class Wheel:
         return not (excited and self.unexplained.variance > proof * UNANSWERED * explained)
 
 
+class RimStop:
+    """A rim that stands all at once while the other one goes on: no motor does that.
+
+    Its encoder is stuck, of which odometry is made, or the wheel is.
+    """
+
+    def __init__(self) -> None:
+        self._seen = 0.0, 0.0  # [m/s] in the last two messages
+        self._stands = 0  # messages in a row
+
+    def add(self, rim: float, other: float) -> bool:
+        """Add speeds [m/s] of this rim and of the other; whether it has stopped like this."""
+        stopped = self._stands > 0 or max(map(abs, self._seen)) > GOES
+        stands = stopped and abs(rim) < STANDS and abs(other) > GOES
+        self._stands = self._stands + 1 if stands else 0
+        self._seen = self._seen[1], rim
+        return self._stands >= STANDS_IN_A_ROW
+
+
 class ActuatorCheck:
     """Whether both wheels of a climber that slides answer their torques."""
 
@@ -81,6 +102,7 @@ class ActuatorCheck:
         """Compare from now on."""
         self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
         self._had_time = False  # to answer
+        self._stops, self._stopped = (RimStop(), RimStop()), (False, False)
 
     def add(self, climber: Climber, observed: Observed, response_time: float) -> None:
         """Take what an odometry tells of the time since the last: see `Wheel`.
@@ -88,9 +110,14 @@ class ActuatorCheck:
         They have a `response_time` [s] to answer; 0: nothing is compared.
         """
         before, after, time = observed.before, observed.after, observed.time
+        if response_time > 0:
+            turn = climber.half_track * after.yaw_rate
+            right, left = after.speed + turn, after.speed - turn
+            of_right, of_left = self._stops
+            self._stopped = of_right.add(right, left), of_left.add(left, right)
         if response_time == 0 or min(abs(before.speed), abs(after.speed)) < SLIDES:
             if self._moved:
-                self.restart()
+                self._wheels, self._moved, self._had_time = (Wheel(), Wheel()), 0.0, False
             return
         self._moved += time
         self._had_time = self._moved > response_time
@@ -109,6 +136,9 @@ class ActuatorCheck:
 
     def dead(self, climber: Climber, proof: float) -> str:
         """Name of the wheel that does not answer, else ''; `proof` is the share that is enough."""
+        for name, stopped in zip(("right", "left"), self._stopped, strict=True):
+            if stopped:
+                return name
         if not self._moved:
             return ""
         largest, (right, left) = climber.max_wheel_torque / climber.wheel_radius, self._wheels

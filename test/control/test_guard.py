@@ -5,7 +5,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
-from climbs import LIMIT, Climb
+from climbs import LIMIT, PERIOD, Climb
 
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.guard import Guard, GuardOptions
@@ -219,3 +219,31 @@ def test_torques_stay_within_the_limit_whatever_is_wrong():
     climb = deepcopy(healthy(False, 7.0))
     climb.run(3.0, motors=dead(1, 7.0))
     assert max(np.abs(torques).max() for torques in climb.sent) <= LIMIT
+
+
+def by_encoders(stuck):
+    """Odometry by dead reckoning of wheels of which one's encoder, 0 right or 1 left, is stuck."""
+    places = []
+
+    def lie(_, state):
+        d = 0.3
+        rims = [state.forward_speed + d * state.yaw_rate, state.forward_speed - d * state.yaw_rate]
+        rims[stuck] = 0.0
+        v, omega = sum(rims) / 2, (rims[0] - rims[1]) / (2 * d)
+        x, y, heading = places[-1] if places else state.pose
+        middle = heading + omega * PERIOD / 2
+        moved = PERIOD * v * np.array([np.cos(middle), np.sin(middle)])
+        places.append(np.array([x + moved[0], y + moved[1], heading + PERIOD * omega]))
+        return State.rolling(places[-1], v, omega)
+
+    return lie
+
+
+@pytest.mark.parametrize("stuck", [0, 1], ids=["right", "left"])
+@pytest.mark.parametrize("scrubs", [False, True], ids=["wheels", "tracks"])
+def test_an_encoder_that_is_stuck_is_found_where_odometry_is_made_of_it(stuck, scrubs):
+    climb = deepcopy(healthy(scrubs, 7.0)).run(1.5, odometry=by_encoders(stuck))
+    assert climb.faulty_after(7.0) < 0.05
+    assert climb.controller.detail.startswith(("the right one", "the left one")[stuck])
+    assert climb.fastest(7.0) < 1.1 * climb.reference_speed
+    assert climb.fastest(8.0) < 0.01
