@@ -178,7 +178,10 @@ def test_a_start_3_m_off_is_refused_in_words(world):
 def test_a_start_that_is_allowed_to_be_far_off_is_approached_at_its_speed(world):
     allowed = ["max_start_distance:=2.0", "approach_speed:=0.8"]
     climb = Waiting(world, {PLANT: ["initial_y:=1.5"], CONTROLLER: allowed})
-    climb.is_in("approaching")
+    said = (
+        "approaching the reference (1.50 m away)"  # its modes come before they are heard, perhaps
+    )
+    world.wait(lambda: said in world.log(CONTROLLER), said)
     climb.is_in("following")
     assert climb.fastest() < 0.84
     begin = climb.now
