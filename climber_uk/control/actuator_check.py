@@ -1,7 +1,8 @@
 """Whether each wheel answers its torque: detection of a dead motor, and of which one it is.
 
 The force that acted on each wheel is that of (11) and (15), from two odometry messages in a row; it
-is compared with the one that the torque should have caused.
+is compared with the one that the torque should have caused. Where odometry is made of encoders, one
+that is stuck shows as a wheel that stands while the other one goes.
 """
 
 import math
@@ -15,8 +16,10 @@ LACKS = 0.3, 1.3  # of a wheel's torque that is missing all at once, if nothing 
 LACKS_ELSE = 0.25  # of the same, is missing or too much there
 LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
 LACKS_IN_A_ROW = 3  # odometry messages
-GOES, STANDS = 0.05, 1e-3  # [m/s] of a rim
-STANDS_IN_A_ROW = 3  # odometry messages
+WENT, GOES, STANDS = 0.05, 0.01, 1e-3  # [m/s] of a rim: before, of the other one, of this one
+ASKED = 0.01  # [m/s] of both rims by the reference: neither is to stand
+# odometry messages for which a rim stands that went before; that never went, or slowly
+STANDS_AT_ONCE, STANDS_ON = 3, 10
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 
 
@@ -74,22 +77,27 @@ class Wheel:
 
 
 class RimStop:
-    """A rim that stands all at once while the other one goes on: no motor does that.
+    """A rim that stands while the other one goes on, as no motor makes it.
 
     Its encoder is stuck, of which odometry is made, or the wheel is.
     """
 
     def __init__(self) -> None:
         self._seen = 0.0, 0.0  # [m/s] in the last two messages
-        self._stands = 0  # messages in a row
+        self._stands, self._at_once = 0, False  # messages in a row; whether it went before them
+        self.is_stuck = False
 
-    def add(self, rim: float, other: float) -> bool:
-        """Add speeds [m/s] of this rim and of the other; whether it has stopped like this."""
-        stopped = self._stands > 0 or max(map(abs, self._seen)) > GOES
-        stands = stopped and abs(rim) < STANDS and abs(other) > GOES
-        self._stands = self._stands + 1 if stands else 0
+    def add(self, rim: float, other: float, asked: float) -> None:
+        """Add speeds [m/s] of this rim, of the other, and what the reference asks of the slower."""
+        if abs(rim) >= STANDS or abs(other) <= GOES:
+            self._stands = 0
+        else:
+            if self._stands == 0:
+                self._at_once = max(map(abs, self._seen)) > WENT
+            self._stands += 1
         self._seen = self._seen[1], rim
-        return self._stands >= STANDS_IN_A_ROW
+        long_since = self._stands >= STANDS_ON and asked > ASKED
+        self.is_stuck = long_since or (self._at_once and self._stands >= STANDS_AT_ONCE)
 
 
 class ActuatorCheck:
@@ -100,24 +108,31 @@ class ActuatorCheck:
 
     def restart(self) -> None:
         """Compare from now on."""
+        self._rims = RimStop(), RimStop()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Compare torques from now on."""
         self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
         self._had_time = False  # to answer
-        self._stops, self._stopped = (RimStop(), RimStop()), (False, False)
 
-    def add(self, climber: Climber, observed: Observed, response_time: float) -> None:
-        """Take what an odometry tells of the time since the last: see `Wheel`.
+    def add(self, climber: Climber, observed: Observed, response_time: float, asked: float) -> None:
+        """Take what an odometry tells of the time since the last: see `Wheel` and `RimStop`.
 
-        They have a `response_time` [s] to answer; 0: nothing is compared.
+        They have a `response_time` [s] to answer; 0: nothing is compared. `asked` [m/s] is what
+        the reference asks of the slower rim.
         """
+        if response_time == 0:
+            self.restart()
+            return
         before, after, time = observed.before, observed.after, observed.time
-        if response_time > 0:
-            turn = climber.half_track * after.yaw_rate
-            right, left = after.speed + turn, after.speed - turn
-            of_right, of_left = self._stops
-            self._stopped = of_right.add(right, left), of_left.add(left, right)
-        if response_time == 0 or min(abs(before.speed), abs(after.speed)) < SLIDES:
+        d, (right, left) = climber.half_track, self._rims
+        speeds = after.speed + d * after.yaw_rate, after.speed - d * after.yaw_rate
+        right.add(*speeds, asked)
+        left.add(*speeds[::-1], asked)
+        if min(abs(before.speed), abs(after.speed)) < SLIDES:
             if self._moved:
-                self._wheels, self._moved, self._had_time = (Wheel(), Wheel()), 0.0, False
+                self._begin()
             return
         self._moved += time
         self._had_time = self._moved > response_time
@@ -134,11 +149,14 @@ class ActuatorCheck:
         for wheel, torque, force, push in rows:
             wheel.add(torque / climber.wheel_radius, force, push, new)
 
+    @property
+    def stuck(self) -> str:
+        """Name of the wheel that stands while the other goes, else ''."""
+        right, left = self._rims
+        return "right" if right.is_stuck else "left" if left.is_stuck else ""
+
     def dead(self, climber: Climber, proof: float) -> str:
         """Name of the wheel that does not answer, else ''; `proof` is the share that is enough."""
-        for name, stopped in zip(("right", "left"), self._stopped, strict=True):
-            if stopped:
-                return name
         if not self._moved:
             return ""
         largest, (right, left) = climber.max_wheel_torque / climber.wheel_radius, self._wheels

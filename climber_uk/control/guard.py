@@ -136,7 +136,8 @@ class Guard:
         """What is wrong with what is observed; None if all is well."""
         torques = observed.torques
         self._followed += observed.time
-        self._actuators.add(climber, observed, self.options.response_time)
+        asked = expected.wanted.speed - climber.half_track * expected.wanted.yaw_rate
+        self._actuators.add(climber, observed, self.options.response_time, asked)
         too_fast = self._watch_rates(climber, observed, expected)
         return (
             self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
@@ -181,6 +182,8 @@ class Guard:
         return climber.seal_friction / climber.driven_mass * answered
 
     def _watch_actuators(self, climber: Climber, torques: Torques, proof: float) -> Trouble | None:
+        if name := self._actuators.stuck:
+            return Mode.DEAD_WHEEL, f"the {name} one stands while the other goes"
         name = self._actuators.dead(climber, proof)
         if not name:
             return None
