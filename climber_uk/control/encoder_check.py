@@ -20,6 +20,7 @@ class EncoderCheck:
 
     def __init__(self) -> None:
         self._angles: Ways | None = None  # [rad] of the wheels
+        self._unheard = 0.0  # [s] of odometry since they were heard, or since the start
         self.restart()
 
     def restart(self) -> None:
@@ -38,11 +39,17 @@ class EncoderCheck:
             r = climber.wheel_radius
             turned_right, turned_left = (way + r * (now - then) for way, now, then in steps)
             self._turned = turned_right, turned_left
-        self._silent = 0.0
+        self._silent = self._unheard = 0.0
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether encoders are there, or may yet come: else odometry has no witness."""
+        return self._unheard <= LONGEST_SILENCE
 
     def go(self, climber: Climber, motion: Motion, time: float) -> None:
         """Take an odometry, `time` [s] after the last one."""
         self._silent += time
+        self._unheard += time
         left = math.exp(-time / MEMORY)
         turn = climber.half_track * motion.yaw_rate
         (right_gone, left_gone), (right, left_turned) = self._gone, self._turned

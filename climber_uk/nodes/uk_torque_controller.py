@@ -281,6 +281,8 @@ class UkTorqueController(ManagedNode):
             self.publish_torques(answer)
         self.publish_position()
         self.report_clock(controller.clock_offset)
+        unheard = "" if controller.encoders.is_heard else "not heard: odometry has no witness"
+        self.report("encoders", unheard, f"on {JOINTS}")
         if answer is not None and controller.motion is not None:
             if answer.command is not None:
                 self.publish_causes(answer.stamp, answer.command, controller.motion)

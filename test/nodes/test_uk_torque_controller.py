@@ -348,7 +348,7 @@ def test_wheels_that_stand_while_odometry_goes_are_told_and_stop_it(world):
         ["left_wheel_joint", "right_wheel_joint"],
     )
     loop.plan()
-    loop.follows()
+    loop.until(lambda _: "encoders: not heard" in world.log(NAME), "word of it")
     joints.publish(JointState(name=names, position=[1.0]))
     world.wait(lambda: "joint_states: refused (1 positions of 2" in world.log(NAME), "a refusal")
 
