@@ -32,7 +32,9 @@ def demo(world, output, config, *arguments, **how):
 def finished(world):
     """What a demonstration has said, once it has ended well."""
     process = world.processes["run_demo"]
-    assert process.wait(300) == 0, world.log("run_demo")
+    if process.wait(300):
+        logs = sorted(world.directory.rglob("*.log"))
+        raise AssertionError("\n".join(f"{log}:\n{log.read_text()}" for log in logs))
     return world.log("run_demo")
 
 
