@@ -36,7 +36,9 @@ ALL_ON = [  # what a node publishes and subscribes only if it is asked to
     "trajectory_publisher:by_hand.input:=twist_stamped",
     "uk_torque_controller:stops.emergency_stop:=true",
     "uk_torque_controller:stops.least_charge:=0.2",
+    "uk_torque_controller:least_suction.enabled:=true",
     "plant_simulator:simulated_time:=true",
+    "plant_simulator:setpoint_timeout:=0.5",
     "plant_simulator:imu.enabled:=true",
     "plant_simulator:fixes.period:=0.1",
 ]
@@ -67,6 +69,8 @@ CONTENTS = {
     topics.STICK: "of the controller: the speeds again, if `publish_cmd_vel`: forward, about z; of "
     "the planner: a stick's, by `by_hand.input`",
     topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
+    topics.SETPOINT: "least pressure difference [Pa] that margins need, for the pump, 20 Hz; with "
+    "`least_suction.enabled` of the controller, `setpoint_timeout` of the plant",
     topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels; the controller reads "
     "them with `guard.encoder_distance`",
     topics.IMU: "yaw rate [rad/s] and specific force [m/s²], gravity in it: on a vertical "

@@ -14,6 +14,7 @@ PROGRESS = f"{PLANNER}/progress"  # how far along its path a climber is
 EVENTS = f"{PLANNER}/events"  # tags of its path that it reaches
 TRUTH = "ground_truth"  # of a simulation, or of what watches from outside
 JOINTS, PRESSURE, PUSH = "joint_states", "suction_pressure", "push"
+SETPOINT = "suction_setpoint"  # of the pump
 EMERGENCY_STOP, BATTERY = "emergency_stop", "battery_state"
 IMU, POSE = "imu", "pose"  # of robots without an odometry of their own
 LOCALIZATION = "wall_odometry"  # the node that makes one of them

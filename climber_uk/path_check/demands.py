@@ -1,9 +1,7 @@
 """What a trajectory asks of a climber that is exactly on it, and how much of each limit is left.
 
-    F = m v̇ + f sgn v + m g_t sinθ     N = J θ̈     τR,L = r (F ± N/d) / 2     L = m v θ̇ + m g_t cosθ
-
-(docs/theory.md, §2 and §4): at each time the drive, the moment, the torques and the lateral
-reaction, and of them the margins of slipping and tipping, as the nodes tell them.
+At each time the torques and the lateral reaction (`mechanics.demand`), and of them the margins of
+slipping and tipping, as the nodes tell them.
 """
 
 from collections.abc import Iterator
@@ -14,12 +12,11 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import cos, sin
+from climber_uk.mechanics.demand import demanded
 from climber_uk.mechanics.trajectory import Trajectory
 
 PERIOD = 0.02  # [s] between two times that are looked at
 MOST_TIMES = 50_000
-STANDS = 1e-4  # [m/s] below which friction holds, and asks for no torque
 
 
 @dataclass(frozen=True)
@@ -61,18 +58,10 @@ def demands(
     last = min(duration, horizon) if np.isfinite(horizon) else duration
     time = np.linspace(0.0, last, min(int(last / PERIOD) + 2, MOST_TIMES))
     reference = trajectory.at(time)
-    speed, heading = reference.speed, reference.heading
-    weight = climber.weight_along_wall
-    rubbing = attachment.seal_friction(climber) * np.sign(
-        np.where(np.abs(speed) > STANDS, speed, 0)
-    )
-    force = climber.driven_mass * reference.forward_acceleration + rubbing + weight * sin(heading)
-    moment = climber.driven_inertia * reference.acceleration[:, 2]
-    right, left = climber.torques(force, moment)
-    radius = climber.wheel_radius
-    across = -weight * cos(heading)
-    lateral = climber.mass * speed * reference.yaw_rate - across
-    into_wall, along_wall = climber.gravity_into_wall, weight / climber.mass
+    speed, radius = reference.speed, climber.wheel_radius
+    friction = attachment.seal_friction(climber)
+    (right, left), lateral, across, _ = demanded(climber, friction, reference)
+    into_wall, along_wall = climber.gravity_into_wall, climber.weight_along_wall / climber.mass
     slip = attachment.slip_margin(
         climber, into_wall, (right / radius, left / radius), lateral, across
     )
