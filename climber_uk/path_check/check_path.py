@@ -1,10 +1,12 @@
 """Tell whether a climber can drive a path, before it does: where what limits it, and what it takes.
 
 The path is that of trajectory_publisher's parameters in a file, the climber that of
-uk_torque_controller's. The status is 1 if the path asks for more than there is,
-and 2 if that cannot be told.
+uk_torque_controller's. With `--posterior` it tells as well how probable it is that a climber falls
+or slips that is known only as well as a bag told (`identify BAG --json FILE`). The status is 1 if
+the path asks for more than there is, and 2 if that cannot be told.
 """
 
+import argparse
 import json
 import sys
 from dataclasses import fields
@@ -23,6 +25,7 @@ from climber_uk.parameters.parameter_file import Values, read_argument, refuse_u
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import Demands, demands
 from climber_uk.path_check.fastest import fastest
+from climber_uk.path_check.posterior import Chance, Posterior, chances, read_posterior
 from climber_uk.report.outputs import failing_in_a_line, printable
 from climber_uk.system.command_line import Parser, between
 
@@ -37,6 +40,8 @@ PATHS = {  # parameters that are files
     for field in fields(kind)  # type: ignore[arg-type]
     if field.metadata.get("is_path")
 }
+
+MOST_CLIMBERS = 1_000_000
 
 
 def read(
@@ -99,7 +104,39 @@ def lines(numbers: dict[str, Any], is_whole: bool) -> list[str]:
             if rate
             else "highest rate: none is slow enough"
         )
+    said += _probable(numbers.get("posterior", {}))
     return [*said, "feasible" if numbers["feasible"] else "NOT feasible"]
+
+
+def _count(text: str) -> int:
+    """A number of climbers; `ValueError` if it is none."""
+    if not (text.isdecimal() and 1 <= int(text) <= MOST_CLIMBERS):
+        raise argparse.ArgumentTypeError(f"{text!r} must be an integer from 1 to {MOST_CLIMBERS}")
+    return int(text)
+
+
+def _probable(posterior: dict[str, Any]) -> list[str]:
+    """What is drawn, and the probability of each event."""
+    if not posterior:
+        return []
+    drawn = ", ".join(f"{name} {of}" for name, of in posterior["drawn"].items())
+    said = [f"{posterior['climbers']} climbers drawn: {drawn}"]
+    if posterior["not told"]:
+        said.append(f"not told by the bag, so as in the parameter file: {posterior['not told']}")
+    for event, of in posterior["events"].items():
+        low, high = of["95 %"]
+        said.append(f"{event}: {of['probability']:.2%} (95 %: {low:.2%} to {high:.2%})")
+    return said
+
+
+def _told(posterior: Posterior, events: dict[str, Chance], runs: int) -> dict[str, Any]:
+    """What the posterior makes probable, as numbers by name."""
+    return {
+        "climbers": runs,
+        "drawn": {name: str(of) for name, of in posterior.items() if of},
+        "not told": ", ".join(name for name, of in posterior.items() if not of),
+        "events": {event: chance.numbers for event, chance in events.items()},
+    }
 
 
 def main() -> None:
@@ -123,16 +160,32 @@ def main() -> None:
     parser.add_argument(
         "--fastest", action="store_true", help="tell the highest rate at which all limits hold, too"
     )
+    parser.add_argument(
+        "--posterior",
+        type=Path,
+        help="what `identify --json` wrote: tell how probable it is that such a climber falls",
+    )
+    parser.add_argument(
+        "--climbers",
+        type=_count,
+        default=1000,
+        help="that are drawn of the posterior (default: 1000)",
+    )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
     with failing_in_a_line("check_path") as remarks:
         trajectory, climber, attachment = read(options.params, dict(options.param), remarks)
+        posterior = read_posterior(options.posterior) if options.posterior else None
         found = demands(trajectory, climber, attachment, options.margin)
         numbers = told(found, trajectory, climber.half_track)
         if options.fastest:
             best = fastest(trajectory, climber, attachment, options.margin)
             numbers["fastest rate"] = best and best.law.rate
             numbers["fastest duration [s]"] = best and best.duration
+        if posterior:
+            runs = options.climbers
+            events = chances(trajectory, climber, attachment, posterior, runs)
+            numbers["posterior"] = _told(posterior, events, runs)
         print("\n".join(lines(numbers, found.is_whole)))
         if options.output:
             from climber_uk.path_check.figure import draw  # matplotlib, which takes a second
