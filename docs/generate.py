@@ -47,6 +47,9 @@ UNSEEN = {  # that the node does not list, or publishes only where a package is 
     "plant_simulator": [("/tf", "tf2_msgs/TFMessage")],
     "wall_odometry": [("/tf", "tf2_msgs/TFMessage")],
 }
+ACTIONS = {  # that the node has only where a package is installed
+    "trajectory_publisher": [(topics.FOLLOW_PATH, "nav2_msgs/FollowPath")],
+}
 EVERY_NODE = (
     topics.LOG,
     "/parameter_events",
@@ -62,6 +65,8 @@ CONTENTS = {
     topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
     topics.GIVEN_PATH: "2 to 50 000 places to drive through, in `odom`; orientations are not read",
+    topics.FOLLOW_PATH: "an action, where nav2_msgs is installed: a path as a goal, with feedback, "
+    "cancel and result",
     topics.REFERENCE_PATH: "the whole path, for display",
     topics.TORQUES: "`effort` [N m] and `velocity` [rad/s] by joint name, of which motors "
     "take one; the stamp is that of the odometry it answers",
@@ -205,6 +210,8 @@ def interfaces(nodes: list[ClimberNode]) -> str:
             )
         for service in node.services:
             lines += entry(node, "serves", service.service_name, type_name(service.srv_type), "")
+        for name, kind in ACTIONS.get(node.get_name(), ()):
+            lines += entry(node, "serves", name, kind, "")
     return "\n".join(lines) + "\n"
 
 
@@ -237,6 +244,8 @@ def security_policy(nodes: list[ClimberNode]) -> str:
             ("topic", "subscribe"): ["/clock", *(end.topic_name for end in node.subscriptions)],
             ("service", "reply"): [service.service_name for service in node.services],
         }
+        if actions := ACTIONS.get(node.get_name()):
+            named["action", "execute"] = [f"/{name}" for name, _ in actions]
         lines.append(f'    <enclave path="{own}">\n      <profiles>')
         lines.append(f'        <profile ns="/" node="{node.get_name()}">')
         for (kind, may), names in named.items():
