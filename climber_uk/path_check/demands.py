@@ -72,6 +72,8 @@ class Reserves(NamedTuple):
     torque: Any  # (..., n) of the motors: what they have by what is asked for
     torques: tuple[Any, Any]  # (..., n) right, left [N m]
     rates: tuple[Any, Any]  # (..., n) of the wheels, right, left [rad/s]
+    lateral: Any  # (..., n) what both wheels take to the left [N]
+    loads: tuple[Any, Any]  # (..., n) on the right and on the left wheel [N]
 
 
 def times(trajectory: Trajectory) -> tuple[Array, bool]:
@@ -105,7 +107,9 @@ def reserves(
         (speed - climber.half_track * yaw_rate) / radius,
     )
     motors = _motors(climber, (right, left), rates)
-    return Reserves(slip, tip + 0 * np.asarray(slip), motors, (right, left), rates)
+    loads = attachment.wheel_loads(climber, attachment.wheel_load(climber, into_wall), across)
+    tips = tip + 0 * np.asarray(slip)
+    return Reserves(slip, tips, motors, (right, left), rates, lateral, loads)
 
 
 def demands(
