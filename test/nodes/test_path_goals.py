@@ -19,6 +19,7 @@ pytestmark = pytest.mark.nodes
 ABORTED, CANCELED, SUCCEEDED = (
     getattr(GoalStatus, f"STATUS_{name}") for name in ("ABORTED", "CANCELED", "SUCCEEDED")
 )
+FASTER = "rest_to_rest.rate:=0.25", "rest_to_rest.ramp_time:=1.0"
 PLANNER, CONTROLLER = "trajectory_publisher", "uk_torque_controller"
 
 
@@ -47,7 +48,7 @@ class Goals:
         for node, more in {
             "plant_simulator": [f"simulated_time:={str(lock_step).lower()}"],
             CONTROLLER: [time],
-            PLANNER: [time, "autostart:=false", *parameters],
+            PLANNER: [time, "autostart:=false", *FASTER, *parameters],
         }.items():
             world.start_node(node, *more, config="climber.yaml")
         self.odometry = world.listen(Odometry, "odom")
