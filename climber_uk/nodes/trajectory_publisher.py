@@ -286,7 +286,6 @@ class TrajectoryPublisher(ClimberNode):
         given = self.given.ready()
         if given is not None:
             self.journey.planned, described = given
-            self.journey.release()
             self.shape, begins = "path", self.begin(PATH)
             self.get_logger().info(f"path taken: {described}; {begins}")
         under_way = self.journey.under_way

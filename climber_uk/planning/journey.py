@@ -54,7 +54,8 @@ class Journey(Generic[Row]):
         What is under way is at `position` [ns]; if it is not driven, nothing moves along it.
         """
         self.next, under_way = what, self.under_way
-        self.is_halted = False
+        if self.is_halted:
+            self.is_halted, self.is_paused = False, self.is_paused and self._stays_paused
         self.waits_for_rest = bool(under_way and is_driven and not under_way.rests(position))
         if not self.waits_for_rest:
             return True, STARTS
@@ -93,17 +94,12 @@ class Journey(Generic[Row]):
         return self._pause(position)
 
     def halt(self, position: int) -> None:
-        """Come to rest, as `pause` does, until another path is begun."""
+        """Come to rest, as `pause` does, until something is begun."""
         if self.is_halted:
             return
         self.is_halted, self._stays_paused, self.waits_for_rest = True, self.is_paused, False
         self._pause(position)
         self.is_paused = True
-
-    def release(self) -> None:
-        """Let another path begin: paused only if that was asked for."""
-        if self.is_halted:
-            self.is_halted, self.is_paused = False, self._stays_paused
 
     def _pause(self, position: int) -> Said:
         if self.hand is not None:

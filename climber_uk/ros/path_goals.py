@@ -150,8 +150,8 @@ class PathGoals:
     def _trouble(self, now: int, what: Fate) -> tuple[str, str] | None:
         """Error code, and in words why a goal fails, if it does."""
         is_alone = not self._mode and not self._node.count_publishers(REFERENCE_TIME)
-        if self._journey.waits_for_rest or (is_alone and what is Fate.DRIVEN):
-            self._heard_at = self._followed_at = now
+        if is_alone and (self._journey.waits_for_rest or what is Fate.DRIVEN):
+            self._heard_at = self._followed_at = now  # by the clock
         if now - self._followed_at <= self._patience:
             return None
         seconds = f"for {self._patience / SECOND:g} s"

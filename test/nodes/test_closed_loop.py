@@ -156,13 +156,15 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
 
 def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_its_path(runs):
     pump = "\n    suction:\n      pump_time: 0.1"
-    asked = "\n    least_suction:\n      enabled: true\n      slip_margin: 2.5"
+    asked = (
+        "\n    least_suction:\n      enabled: true\n      slip_margin: 2.5\n      fall_rate: 1500.0"
+    )
     changed = {
         "max_heading: 0.3": f"max_heading: 0.3{asked}{pump}",
         "integration_step: 0.0025": f"integration_step: 0.0025\n    setpoint_timeout: 0.5{pump}",
     }
-    run = read_run(small_bag(runs, "climber.yaml", 8.0, SMALL | changed, "least_suction_"))
-    assert run.time[-1] >= 8.0
+    run = read_run(small_bag(runs, "climber.yaml", 6.0, SMALL | changed, "least_suction_"))
+    assert run.time[-1] >= 6.0
     pressure = run.recorded[PRESSURE].values[:, 0]
     assert pressure[0] == 8000.0  # at rest
     assert 5160.0 <= pressure.min() < 6500.0

@@ -1,5 +1,6 @@
 """Paths as goals: against the definition of Nav2's FollowPath, by a client as Nav2 has it."""
 
+import signal
 import sys
 
 import generated_action
@@ -9,6 +10,7 @@ from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.action import ActionClient
+from sensor_msgs.msg import TimeReference
 from std_srvs.srv import SetBool
 
 from climber_uk.messages import reading
@@ -17,6 +19,7 @@ pytestmark = pytest.mark.nodes
 ABORTED, CANCELED, SUCCEEDED = (
     getattr(GoalStatus, f"STATUS_{name}") for name in ("ABORTED", "CANCELED", "SUCCEEDED")
 )
+FASTER = "rest_to_rest.rate:=0.25", "rest_to_rest.ramp_time:=1.0"
 PLANNER, CONTROLLER = "trajectory_publisher", "uk_torque_controller"
 
 
@@ -37,14 +40,15 @@ def definition(tmp_path_factory):
 
 
 class Goals:
-    """A climber in simulated time, and a client that sends it goals."""
+    """A climber in lock-step, or in the wall clock's time, and a client that sends it goals."""
 
-    def __init__(self, world, action, *parameters):
+    def __init__(self, world, action, *parameters, lock_step=True):
         self.world, self.action = world, action
+        time = f"use_sim_time:={str(lock_step).lower()}"
         for node, more in {
-            "plant_simulator": ["simulated_time:=true"],
-            CONTROLLER: ["use_sim_time:=true"],
-            PLANNER: ["use_sim_time:=true", "autostart:=false", *parameters],
+            "plant_simulator": [f"simulated_time:={str(lock_step).lower()}"],
+            CONTROLLER: [time],
+            PLANNER: [time, "autostart:=false", *FASTER, *parameters],
         }.items():
             world.start_node(node, *more, config="climber.yaml")
         self.odometry = world.listen(Odometry, "odom")
@@ -158,6 +162,29 @@ def test_a_goal_fails_that_is_not_followed_and_another_is_driven_then(definition
     assert goals.speed < 0.01
     assert np.hypot(*(rested - UP[0])) < 0.9  # of 1.27 m: it is paused
     assert goals.send(rested, rested + RIGHT).end()[0] == SUCCEEDED
+
+
+@pytest.mark.soak
+def test_a_goal_fails_whose_controller_is_lost_and_another_is_driven_by_the_next_one(
+    definition, world
+):
+    goals, codes = (
+        Goals(world, definition, "goal_patience:=6.0", lock_step=False),
+        definition.Result,
+    )
+    first = goals.send(*UP)
+    first.drives(0.05)
+    world.end(CONTROLLER, signal.SIGKILL)
+    status, code, said = first.end()
+    assert (status, code) == (ABORTED, codes.CONTROLLER_TIMED_OUT)
+    assert said == "the controller is not heard for 6 s"
+    status, code, said = goals.send(*UP).end()
+    assert (status, code) == (ABORTED, codes.FAILED_TO_MAKE_PROGRESS)
+    assert "it does not begin" in said
+    followed = world.hear(TimeReference, "reference_time")
+    world.start_node(CONTROLLER, config="climber.yaml")
+    world.wait(lambda: "following" in [message.source for message in followed], "the next one")
+    assert goals.send(goals.here, goals.here + RIGHT).end()[0] == SUCCEEDED
 
 
 @pytest.mark.soak

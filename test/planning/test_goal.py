@@ -66,8 +66,9 @@ def test_it_is_left_for_a_stick_for_the_way_back_and_for_good_if_another_is_gone
     assert all(what.is_left for what in (Fate.BACK, Fate.BY_HAND, Fate.REPLACED))
 
 
+@pytest.mark.parametrize("what", [PATH, HAND, BACK])
 @pytest.mark.parametrize("was_paused", [False, True])
-def test_a_halt_ends_with_the_next_path_and_a_pause_that_was_asked_for_does_not(was_paused):
+def test_a_halt_ends_with_what_is_begun_and_a_pause_that_was_asked_for_does_not(what, was_paused):
     journey = under_way()
     if was_paused:
         journey.pause(MIDDLE)
@@ -75,22 +76,34 @@ def test_a_halt_ends_with_the_next_path_and_a_pause_that_was_asked_for_does_not(
     journey.halt(MIDDLE)
     assert journey.is_paused
     assert rest(journey) < END
-    journey.release()
+    journey.begin(what, rest(journey), True)
     assert journey.is_paused is was_paused
     journey.halt(MIDDLE)
     journey.pause(MIDDLE)
-    journey.release()
+    journey.begin(what, rest(journey), True)
     assert journey.is_paused
 
 
-def test_what_was_to_begin_does_not_after_a_halt_until_something_else_is_begun():
+def test_what_was_to_begin_does_not_after_a_halt_until_something_is_begun():
     journey = under_way(OTHER)
     journey.planned = ONE
     journey.begin(PATH, MIDDLE, True)
     journey.halt(MIDDLE)
     assert journey.is_halted
     assert not journey.waits_for_rest
-    journey.release()
     journey.begin(PATH, rest(journey), True)
     assert not journey.is_halted
+    assert not journey.is_paused
+
+
+def test_who_starts_or_goes_on_after_a_halt_is_not_paused():
+    journey = under_way()
+    journey.halt(MIDDLE)
+    journey.go_on(MIDDLE)
+    assert not journey.is_halted
+    assert not journey.is_paused
+    journey.pause(MIDDLE)
+    journey.halt(MIDDLE)
+    journey.is_paused = False  # as ~/start does
+    journey.begin(PATH, rest(journey), True)
     assert not journey.is_paused
