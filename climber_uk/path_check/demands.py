@@ -14,10 +14,11 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import Attachment
-from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import cos, sin
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import Plane, Wall
 
 PERIOD = 0.02  # [s] between two times that are looked at
 MOST_TIMES = 50_000
@@ -63,7 +64,7 @@ class Resistance(NamedTuple):
     turning_viscous: Any = 0.0  # [N m s]
 
 
-NOTHING_ELSE = Resistance()
+NOTHING_ELSE, PLANE = Resistance(), Plane()
 
 
 class Reserves(NamedTuple):
@@ -76,6 +77,7 @@ class Reserves(NamedTuple):
     rates: tuple[Any, Any]  # (..., n) of the wheels, right, left [rad/s]
     lateral: Any  # (..., n) what both wheels take to the left [N]
     loads: tuple[Any, Any]  # (..., n) on the right and on the left wheel [N]
+    normal: Any  # (..., n) force onto the wall [N]
 
 
 def times(trajectory: Trajectory) -> tuple[Array, bool]:
@@ -92,26 +94,29 @@ def reserves(
     climber: Climber,
     attachment: Attachment,
     resistance: Resistance = NOTHING_ELSE,
+    wall: Wall = PLANE,
 ) -> Reserves:
     """Reserves at n places of a reference, of one climber, or of many: fields (k, 1)."""
     speed, heading, yaw_rate = reference.speed, reference.heading, reference.yaw_rate
-    weight = climber.weight_along_wall
+    (x, y, _), (x_speed, y_speed, _) = reference.pose.T, reference.velocity.T
+    g_x, g_y = (GRAVITY * part for part in wall.along(climber.inclination, x, y))
+    into_wall = wall.into(climber.inclination, x, y, x_speed, y_speed)
+    pull = climber.mass * (g_x * cos(heading) + g_y * sin(heading))
+    across = climber.mass * (g_y * cos(heading) - g_x * sin(heading))
     rolls = np.sign(np.where(np.abs(speed) > STANDS, speed, 0))
     rubbing = (attachment.seal_friction(climber) + resistance.rolling) * rolls
-    force = climber.driven_mass * reference.forward_acceleration + rubbing + weight * sin(heading)
+    force = climber.driven_mass * reference.forward_acceleration + rubbing - pull
     moment = climber.driven_inertia * reference.acceleration[..., 2]
     right, left = climber.torques(
         force + resistance.viscous * speed,
         moment + resistance.turning * np.sign(yaw_rate) + resistance.turning_viscous * yaw_rate,
     )
     radius = climber.wheel_radius
-    across = -weight * cos(heading)
     lateral = climber.mass * speed * yaw_rate - across
-    into_wall, along_wall = climber.gravity_into_wall, weight / climber.mass
     slip = attachment.slip_margin(
         climber, into_wall, (right / radius, left / radius), lateral, across
     )
-    tip = attachment.tip_margin(climber, into_wall, along_wall)
+    tip = attachment.tip_margin(climber, into_wall, np.hypot(g_x, g_y))
     rates = (
         (speed + climber.half_track * yaw_rate) / radius,
         (speed - climber.half_track * yaw_rate) / radius,
@@ -119,16 +124,21 @@ def reserves(
     motors = _motors(climber, (right, left), rates)
     loads = attachment.wheel_loads(climber, attachment.wheel_load(climber, into_wall), across)
     tips = tip + 0 * np.asarray(slip)
-    return Reserves(slip, tips, motors, (right, left), rates, lateral, loads)
+    normal = attachment.normal_force(climber, into_wall)
+    return Reserves(slip, tips, motors, (right, left), rates, lateral, loads, normal)
 
 
 def demands(
-    trajectory: Trajectory, climber: Climber, attachment: Attachment, margin: float
+    trajectory: Trajectory,
+    climber: Climber,
+    attachment: Attachment,
+    margin: float,
+    wall: Wall = PLANE,
 ) -> Demands:
     """Demands of a trajectory; slipping is to be a `margin` away."""
     time, is_whole = times(trajectory)
     reference = trajectory.at(time)
-    left = reserves(reference, climber, attachment)
+    left = reserves(reference, climber, attachment, wall=wall)
     power = sum(
         np.maximum(torque * rate, 0.0)
         for torque, rate in zip(left.torques, left.rates, strict=True)
