@@ -49,7 +49,7 @@ class Problem(NamedTuple):
 
 def problems() -> dict[str, Problem]:
     """The paper's ellipse and climber.yaml's eight by the climber of climber.yaml; its lanes."""
-    eight, climber, held = read(CONFIG / "climber.yaml", {}, [])
+    eight, climber, held, _ = read(CONFIG / "climber.yaml", {}, [])
     lanes, *_ = read(CONFIG / "lanes.yaml", {}, [])
     ellipse = Trajectory(Ellipse(), RestToRest(rate=1.0))
     paths = {"ellipse": ellipse, "eight": eight, "lanes": lanes}

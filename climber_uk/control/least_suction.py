@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from climber_uk.control.control_law import Command
+from climber_uk.control.control_law import Command, ControlLaw
 from climber_uk.control.controller import Answer, Controller
 from climber_uk.control.safety import Mode
 from climber_uk.control.time_scaling import IN_TIME, STANDSTILL
@@ -23,6 +23,7 @@ from climber_uk.mechanics.demand import NO_WRENCH, Demand, demanded
 from climber_uk.mechanics.elementary import sign
 from climber_uk.mechanics.quantities import Torques
 from climber_uk.mechanics.reference import Reference
+from climber_uk.mechanics.wall import PLANE
 from climber_uk.parameters.declaration import parameter, parameters
 
 RESERVE = 0.02  # of the full pressure, above what is needed: for the pump's lag, and the gauge
@@ -107,11 +108,12 @@ class LeastSuction:
         climber, learnt = controller.law.climber, controller.estimator.disturbance
         friction = self.attachment.seal_friction(climber)
         lowest = controller.safety.least_pressure
-        demands = [demanded(climber, friction, ahead, wrench) for wrench in (NO_WRENCH, learnt)]
+        wall = controller.law.wall or PLANE
+        demands = [demanded(climber, friction, ahead, of, wall) for of in (NO_WRENCH, learnt)]
         needs = np.maximum(*(self.least(climber, demand, lowest) for demand in demands))
         if measured < min(needs[0], self.full - self.reserve):
             return everything._replace(trouble=TOO_WEAK)
-        acting = _acting(climber, answer.wheels, command, demands[0])
+        acting = _acting(controller.law, answer.wheels, command, demands[0])
         now = max(needs[0], *self.least(climber, acting, lowest)) + self.reserve
         if (ahead.speed * np.sign(ahead.speed[0])).min() < STANDSTILL:
             return Need(now, self.full)
@@ -144,9 +146,9 @@ class LeastSuction:
         right, left = (
             torque / climber.wheel_radius + rubs * demand.direction / 2 for torque in demand.torques
         )
-        into, along = climber.gravity_into_wall, climber.weight_along_wall / climber.mass
+        into = demand.into_wall
         slip = attachment.slip_margin(at, into, (right, left), demand.lateral, demand.across)
-        tip = attachment.tip_margin(at, into, along)
+        tip = attachment.tip_margin(at, into, demand.along_wall)
         keeps = (slip >= options.slip_margin) & (tip >= options.tip_margin)
         keeps[-1] = True
         keeps = np.logical_and.accumulate(keeps[::-1])[::-1]
@@ -170,8 +172,14 @@ def _ahead(controller: Controller) -> Reference | None:
     return ahead if goes else None
 
 
-def _acting(climber: Climber, wheels: Torques, command: Command, planned: Demand) -> Demand:
+def _acting(law: ControlLaw, wheels: Torques, command: Command, planned: Demand) -> Demand:
     """Demand (1,) of torques that are sent."""
-    across = -climber.weight_along_wall * command.motion.cosine
-    torques = Torques(*(np.array([torque]) for torque in wheels))
-    return Demand(torques, np.array([command.lateral]), across, planned.direction[:1])
+    into_wall, along_wall, across = law.gravity(command.motion)
+    return Demand(
+        torques=Torques(*(np.array([torque]) for torque in wheels)),
+        lateral=np.array([command.lateral]),
+        across=across,
+        into_wall=into_wall,
+        along_wall=along_wall,
+        direction=planned.direction[:1],
+    )

@@ -17,9 +17,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
-from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
-from climber_uk.mechanics.waypoints import Rounding
 from climber_uk.messages import reading, writing
 from climber_uk.messages.references import ReferenceWriter, Row
 from climber_uk.messages.topics import (
@@ -135,12 +133,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def manner(self) -> Manner:
         """How a path is driven that comes from outside: as waypoints would be."""
-        law = self.parameters.read(TrajectoryParameters).time_law
-        return Manner(
-            rounding=self.parameters.read(Rounding, "waypoints."),
-            law=self.parameters.read(TIME_LAWS[law], f"{law}."),
-            reverse_gear=self.journey.planned.reverse_gear,
-        )
+        return Manner.by(self.parameters.read, self.journey.planned.reverse_gear)
 
     # What an operator asks for
 

@@ -359,13 +359,11 @@ class UkTorqueController(ManagedNode):
 
     def add_margins(self, answer: Answer, motion: Motion) -> None:
         """Add the slip margin under an answer's torques, and the tip margin."""
-        climber, attachment = self.controller.law.climber, self.attachment
-        right, left = answer.wheels
+        law, attachment = self.controller.law, self.attachment
+        climber, (right, left) = law.climber, answer.wheels
         forces = right / climber.wheel_radius, left / climber.wheel_radius
-        across = -climber.weight_along_wall * motion.cosine
+        into_wall, along_wall, across = law.gravity(motion)
         lateral = -across if answer.command is None else answer.command.lateral
-        into_wall = climber.gravity_into_wall
-        along_wall = climber.weight_along_wall / climber.mass
         self.margins.take(
             attachment.slip_margin(climber, into_wall, forces, lateral, across),
             attachment.tip_margin(climber, into_wall, along_wall),

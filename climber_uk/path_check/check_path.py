@@ -21,6 +21,7 @@ from climber_uk.mechanics.fastest_law import DEGREE
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
+from climber_uk.mechanics.wall import WALLS, Wall
 from climber_uk.messages.topics import CONTROLLER, PLANNER
 from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
 from climber_uk.parameters.parameter_paths import located
@@ -50,19 +51,20 @@ MOST_CLIMBERS = 1_000_000
 
 def read(
     file: Path, changes: dict[str, Any], remarks: list[str]
-) -> tuple[Trajectory, Climber, Attachment]:
-    """Path, climber and what holds it, by a parameter file and changes of the path's parameters.
+) -> tuple[Trajectory, Climber, Attachment, Wall]:
+    """Path, climber, what holds it and its wall, by a file and changes of the path's parameters.
 
     Raises `ValueError`, also for a name that no part of the path has. `remarks` gets a line on each
     value that can hardly be meant.
     """
     trajectory = build_trajectory(Values(_planner(file, changes, remarks)).read)
     values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
-    name = values.read(ControllerChoice).adhesion
+    choice = values.read(ControllerChoice)
+    name, wall = choice.adhesion, choice.wall
     attachment = Attachment(
         adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)
     )
-    return trajectory, values.read(Climber), attachment
+    return trajectory, values.read(Climber), attachment, values.read(WALLS[wall], f"{wall}.")
 
 
 def _planner(file: Path, changes: dict[str, Any], remarks: list[str]) -> dict[str, Any]:
@@ -83,7 +85,11 @@ def _count(text: str) -> int:
 
 
 def _fastest_law(
-    options: argparse.Namespace, trajectory: Trajectory, climber: Climber, attachment: Attachment
+    options: argparse.Namespace,
+    trajectory: Trajectory,
+    climber: Climber,
+    attachment: Attachment,
+    wall: Wall,
 ) -> tuple[Trajectory | None, dict[str, Any]]:
     """The path by the fastest law, and what that takes; or None, and the reason."""
     given = {
@@ -93,12 +99,11 @@ def _fastest_law(
     }
     limits, period = Limits(options.margin, **given), options.smoothing / (DEGREE + 1)
     try:
-        law = time_optimal(trajectory, climber, attachment, limits, period).trajectory
+        law = time_optimal(trajectory, climber, attachment, limits, period, wall).trajectory
     except ValueError as error:
         return None, {"reason": str(error)}
-    least = min(
-        demands(law, climber, attachment, options.margin).least(), key=lambda of: of.reserve
-    )
+    found = demands(law, climber, attachment, options.margin, wall)
+    least = min(found.least(), key=lambda of: of.reserve)
     return law, {
         "duration [s]": law.duration,
         "fastest [m/s]": summary(law, climber.half_track).fastest_speed,
@@ -159,20 +164,20 @@ def main() -> None:
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
     with failing_in_a_line("check_path") as remarks:
-        trajectory, climber, attachment = read(options.params, dict(options.param), remarks)
+        trajectory, climber, attachment, wall = read(options.params, dict(options.param), remarks)
         posterior = read_posterior(options.posterior) if options.posterior else None
-        found = demands(trajectory, climber, attachment, options.margin)
-        numbers = told(found, trajectory, climber.half_track)
         asked, law = (climber, attachment), None
+        found = demands(trajectory, *asked, options.margin, wall)
+        numbers = told(found, trajectory, climber.half_track)
         if options.fastest and trajectory.law.rate > 0:
-            best = fastest(trajectory, *asked, options.margin)
+            best = fastest(trajectory, *asked, options.margin, wall)
             numbers["fastest rate"] = best and best.law.rate
             numbers["fastest duration [s]"] = best and best.duration
         if options.fastest:
-            law, numbers["fastest law"] = _fastest_law(options, trajectory, *asked)
+            law, numbers["fastest law"] = _fastest_law(options, trajectory, *asked, wall)
         if posterior:
             runs = options.climbers
-            events = chances(trajectory, *asked, posterior, runs)
+            events = chances(trajectory, *asked, posterior, runs, wall=wall)
             numbers["posterior"] = told_of(posterior, events, runs)
         print("\n".join(lines(numbers, found.is_whole)))
         if options.output:

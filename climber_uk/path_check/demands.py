@@ -17,6 +17,7 @@ from climber_uk.mechanics.demand import demanded
 from climber_uk.mechanics.quantities import Wrench
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import PLANE, Wall
 
 PERIOD = 0.02  # [s] between two times that are looked at
 MOST_TIMES = 50_000
@@ -74,6 +75,7 @@ class Reserves(NamedTuple):
     rates: tuple[Any, Any]  # (..., n) of the wheels, right, left [rad/s]
     lateral: Any  # (..., n) what both wheels take to the left [N]
     loads: tuple[Any, Any]  # (..., n) on the right and on the left wheel [N]
+    normal: Any  # (..., n) force onto the wall [N]
 
 
 def times(trajectory: Trajectory) -> tuple[Array, bool]:
@@ -90,18 +92,19 @@ def reserves(
     climber: Climber,
     attachment: Attachment,
     resistance: Resistance = NOTHING_ELSE,
+    wall: Wall = PLANE,
 ) -> Reserves:
     """Reserves at n places of a reference, of one climber, or of many: fields (k, 1)."""
     speed, yaw_rate, radius = reference.speed, reference.yaw_rate, climber.wheel_radius
     friction = attachment.seal_friction(climber) + resistance.rolling
     turning = resistance.turning * np.sign(yaw_rate) + resistance.turning_viscous * yaw_rate
     resists = Wrench(-resistance.viscous * speed, -turning)
-    (right, left), lateral, across, _ = demanded(climber, friction, reference, resists)
-    into_wall, along_wall = climber.gravity_into_wall, climber.weight_along_wall / climber.mass
+    demand = demanded(climber, friction, reference, resists, wall)
+    (right, left), lateral, across, into_wall = demand[:4]
     slip = attachment.slip_margin(
         climber, into_wall, (right / radius, left / radius), lateral, across
     )
-    tip = attachment.tip_margin(climber, into_wall, along_wall)
+    tip = attachment.tip_margin(climber, into_wall, demand.along_wall)
     rates = (
         (speed + climber.half_track * yaw_rate) / radius,
         (speed - climber.half_track * yaw_rate) / radius,
@@ -109,16 +112,21 @@ def reserves(
     motors = _motors(climber, (right, left), rates)
     loads = attachment.wheel_loads(climber, attachment.wheel_load(climber, into_wall), across)
     tips = tip + 0 * np.asarray(slip)
-    return Reserves(slip, tips, motors, (right, left), rates, lateral, loads)
+    normal = attachment.normal_force(climber, into_wall)
+    return Reserves(slip, tips, motors, (right, left), rates, lateral, loads, normal)
 
 
 def demands(
-    trajectory: Trajectory, climber: Climber, attachment: Attachment, margin: float
+    trajectory: Trajectory,
+    climber: Climber,
+    attachment: Attachment,
+    margin: float,
+    wall: Wall = PLANE,
 ) -> Demands:
     """Demands of a trajectory; slipping is to be a `margin` away."""
     time, is_whole = times(trajectory)
     reference = trajectory.at(time)
-    left = reserves(reference, climber, attachment)
+    left = reserves(reference, climber, attachment, wall=wall)
     power = sum(
         np.maximum(torque * rate, 0.0)
         for torque, rate in zip(left.torques, left.rates, strict=True)

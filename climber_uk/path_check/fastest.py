@@ -13,6 +13,7 @@ from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.fastest_law import Tabulated, write_table
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import PLANE, Wall
 from climber_uk.messages.topics import PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.path_check.demands import demands
@@ -21,7 +22,11 @@ WIDEST, HALVINGS = 16.0, 12  # times slower and faster than planned; to 0.1 %
 
 
 def fastest(
-    trajectory: Trajectory, climber: Climber, attachment: Attachment, margin: float
+    trajectory: Trajectory,
+    climber: Climber,
+    attachment: Attachment,
+    margin: float,
+    wall: Wall = PLANE,
 ) -> Trajectory | None:
     """The trajectory at its highest rate, up to `WIDEST` times the planned one; None: at no rate.
 
@@ -34,7 +39,7 @@ def fastest(
         return replace(trajectory, law=faster)
 
     def holds(log: float) -> bool:
-        found = demands(at(log), climber, attachment, margin)
+        found = demands(at(log), climber, attachment, margin, wall)
         return all(limit.reserve >= 1 for limit in found.least())
 
     low, high = -math.log(WIDEST), math.log(WIDEST)

@@ -6,6 +6,7 @@ Torques, speeds and accelerations of a climber that is exactly on its path are a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -15,10 +16,12 @@ from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import Wall
 from climber_uk.mechanics.waypoints import Rounding, SlowedPath
 from climber_uk.path_check.demands import Reserves, reserves
 
 HALVINGS = 50
+SLOWLY = 0.02  # [m/s] at which what is affine is looked at
 LEAST_EFFECT = 1e-12  # of U on a row: below it, it has none
 
 
@@ -48,10 +51,10 @@ class Affine(NamedTuple):
     u: Array
 
     @classmethod
-    def of(cls, at_one: Array, at_two: Array, with_second: Array) -> "Affine":
-        """From values at (X, U) = (1, 0), (2, 0) and (1, 1)."""
-        x = at_two - at_one
-        return cls(at_one - x, x, with_second - at_one)
+    def of(cls, X: Array, at_one: Array, at_two: Array, with_second: Array) -> "Affine":
+        """From values at (X, 0), (2 X, 0) and (X, 1)."""
+        x = (at_two - at_one) / X
+        return cls(at_one - x * X, x, with_second - at_one)
 
 
 @dataclass(frozen=True)
@@ -61,12 +64,13 @@ class PathLimits:
     trajectory: Trajectory
     climber: Climber
     attachment: Attachment
+    wall: Wall
     limits: Limits
     s: Array  # (n,)
     tighter: Array  # (n,)
     torques: Affine  # (2, n) right, left [N m]
     lateral: Affine  # (n,) [N]
-    loads: Array  # (2, n) [N] of the wheels
+    loads: Affine  # (2, n) [N] of the wheels
     rates: Array  # (2, n) of the wheels at ṡ = 1 [rad/s]
     forwards: Affine  # (n,) acceleration along [m/s²]
     across: Array  # (n,) acceleration across by X [m/s²]
@@ -78,6 +82,7 @@ class PathLimits:
         trajectory: Trajectory,
         climber: Climber,
         attachment: Attachment,
+        wall: Wall,
         limits: Limits,
         s: Array,
         share: float,
@@ -87,12 +92,16 @@ class PathLimits:
         Raises `ValueError` if the climber tips over.
         """
         limits = limits.with_those_of(trajectory.shape)
-        points = [(1.0, 0.0), (np.sqrt(2.0), 0.0), (1.0, 1.0)]
-        at = [trajectory.at_progress((s, r + 0 * s, u + 0 * s, 0 * s)) for r, u in points]
-        found = [reserves(each, climber, attachment) for each in at]
-        one = at[0]
-        _check_tip(found[0], one)
+        one = trajectory.at_progress((s, 1 + 0 * s, 0 * s, 0 * s))
         speed, yaw_rate = np.abs(one.speed), np.abs(one.yaw_rate)
+        rate = SLOWLY / speed  # at which no curve lifts it off
+        at = [
+            trajectory.at_progress((s, by * rate, of + 0 * s, 0 * s))
+            for by, of in ((1.0, 0.0), (np.sqrt(2.0), 0.0), (1.0, 1.0))
+        ]
+        found = [reserves(each, climber, attachment, wall=wall) for each in at]
+        _check_tip(found[0], one)
+        affine = partial(Affine.of, rate**2)
         most = np.minimum(_leg_speed(trajectory, s), limits.speed)
         with np.errstate(divide="ignore"):
             fastest = np.minimum(most / speed, limits.yaw_rate / yaw_rate)
@@ -100,14 +109,15 @@ class PathLimits:
             trajectory=trajectory,
             climber=climber,
             attachment=attachment,
+            wall=wall,
             limits=limits,
             s=s,
             tighter=np.full_like(s, share),
-            torques=Affine.of(*(np.stack(each.torques) for each in found)),
-            lateral=Affine.of(*(each.lateral for each in found)),
-            loads=np.stack(found[0].loads) + 0 * s,
-            rates=np.stack(found[0].rates),
-            forwards=Affine.of(*(each.forward_acceleration for each in at)),
+            torques=affine(*(np.stack(each.torques) for each in found)),
+            lateral=affine(*(each.lateral for each in found)),
+            loads=affine(*(np.stack(each.loads) + 0 * s for each in found)),
+            rates=np.stack(found[0].rates) / rate,
+            forwards=affine(*(each.forward_acceleration for each in at)),
             across=speed * yaw_rate,
             fastest=fastest,
         )
@@ -121,17 +131,18 @@ class PathLimits:
 
         tighter, radius = at(self.tighter), self.climber.wheel_radius
         grip = self.attachment.grip.wheel_friction_coefficient / self.limits.margin
-        load = np.maximum(at(self.loads.sum(axis=0)), 1e-12)
+        loads = [np.maximum(at(c) + at(x) * X, 0.0) for c, x in zip(*self.loads[:2], strict=True)]
+        load = np.maximum(loads[0] + loads[1], 1e-12)
         lateral = (at(self.lateral.c) + at(self.lateral.x) * X) / load
         rate = np.sqrt(X)
         low, high = np.full(X.shape, -np.inf), np.full(X.shape, np.inf)
-        impossible = at(self.fastest * self.tighter) ** 2 < X
+        impossible = (at(self.fastest * self.tighter) ** 2 < X) | (loads[0] + loads[1] <= 0)
         most, no_load = self.climber.max_wheel_torque, self.climber.no_load_wheel_rate or np.inf
         for side in range(2):
             share = grip * tighter
             holds = share**2 - lateral**2
             impossible |= holds < 0
-            grips = radius * at(self.loads[side]) * np.sqrt(np.maximum(holds, 0.0))
+            grips = radius * loads[side] * np.sqrt(np.maximum(holds, 0.0))
             turns = at(self.rates[side]) * rate / no_load
             least = np.maximum(-most * np.clip(tighter + turns, 0.0, tighter), -grips)
             largest = np.minimum(most * np.clip(tighter - turns, 0.0, tighter), grips)

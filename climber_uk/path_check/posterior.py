@@ -19,6 +19,7 @@ from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import is_pulled_off
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import PLANE, Wall
 from climber_uk.path_check.demands import Resistance, reserves, times
 from climber_uk.report.proportion import wilson
 
@@ -123,6 +124,7 @@ def chances(
     posterior: Posterior,
     runs: int,
     seed: int = 0,
+    wall: Wall = PLANE,
 ) -> dict[str, Chance]:
     """By event, in how many of `runs` climbers it happens somewhere on the path."""
     random = np.random.default_rng(seed)
@@ -136,9 +138,8 @@ def chances(
         changes: dict[str, Any] = {name: drawn[name] for name in OF_CLIMBER if name in drawn}
         these = replace(climber, **changes)
         resists = {of: drawn[name] for of, name in RESISTING.items() if name in drawn}
-        left = reserves(reference, these, attachment, Resistance(**resists))
-        normal = attachment.normal_force(these, these.gravity_into_wall)
-        happens = is_pulled_off(these, normal) | (left.tip < 1), left.slip < 1, left.torque < 1
+        left = reserves(reference, these, attachment, Resistance(**resists), wall)
+        happens = is_pulled_off(these, left.normal) | (left.tip < 1), left.slip < 1, left.torque < 1
         number = min(block, runs - first)
         for event, where in zip(counts, happens, strict=True):
             every = np.broadcast_to(where, (number, len(time))).any(axis=-1)

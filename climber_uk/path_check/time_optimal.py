@@ -17,6 +17,7 @@ from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.fastest_law import DEGREE, Tabulated, spline
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import PLANE, Wall
 from climber_uk.path_check.demands import reserves
 from climber_uk.path_check.path_limits import Limits, PathLimits
 
@@ -44,6 +45,7 @@ def time_optimal(
     attachment: Attachment,
     limits: Limits,
     period: float = PERIOD,
+    wall: Wall = PLANE,
 ) -> TimeOptimal:
     """The path of a trajectory by the fastest law, sampled each `period` [s].
 
@@ -54,7 +56,7 @@ def time_optimal(
     inner = (rests > 0) & (rests < trajectory.course.length)
     places = np.concatenate([[0.0], rests[inner], [trajectory.course.length]])
     s = _grid(trajectory, places)
-    along = PathLimits.of(trajectory, climber, attachment, limits, s, AT_FIRST)
+    along = PathLimits.of(trajectory, climber, attachment, wall, limits, s, AT_FIRST)
     dwells = np.append(dwell[inner], 0.0)
     abrupt = 0.0
     for _ in range(ROUNDS):
@@ -166,7 +168,7 @@ def _tightened(along: PathLimits, period: float, table: Array) -> Any:
     progress = tuple(law(time, order) for order in range(4))
     moves = progress[1] > 0
     reference = along.trajectory.at_progress(tuple(of[moves] for of in progress))
-    left = reserves(reference, along.climber, along.attachment)
+    left = reserves(reference, along.climber, along.attachment, wall=along.wall)
     reserve = np.full(count - 1, np.inf)
     reserve[moves] = along.reserve(left, reference)
     if reserve.min() >= KEPT:

@@ -69,10 +69,10 @@ def reference(heading, speed, yaw_rate, acceleration, yaw_acceleration):
 def margins_at(climber, attachment, motion, pressure):
     """Slip and tip margin of a climber that has been at that pressure all along."""
     there = replace(climber, suction_pressure=pressure)
-    torques, lateral, across, _ = demanded(there, there.seal_friction, reference(*motion))
-    forces = tuple(torque / there.wheel_radius for torque in torques)
+    demand = demanded(there, there.seal_friction, reference(*motion))
+    forces = tuple(torque / there.wheel_radius for torque in demand.torques)
     into, along = there.gravity_into_wall, there.weight_along_wall / there.mass
-    slip = attachment.slip_margin(there, into, forces, lateral, across)
+    slip = attachment.slip_margin(there, into, forces, demand.lateral, demand.across)
     return float(np.squeeze(slip)), float(attachment.tip_margin(there, into, along))
 
 

@@ -13,6 +13,9 @@ from climber_uk.closed_loop.batch import Loops
 from climber_uk.closed_loop.period import BatchRun
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.guidance import Guidance
+from climber_uk.identification.identified import NAMES
+from climber_uk.identification.integral_equations import Site
+from climber_uk.identification.report import EFFECTIVE, label_of
 from climber_uk.mechanics.adhesion import Attachment, Grip, Magnetic
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.shapes import Circle, Line
@@ -152,3 +155,15 @@ def test_the_command_refuses_it_with_status_2(monkeypatch, capsys, tmp_path, fil
         check_path.main()
     said = capsys.readouterr()
     assert (ended.value.code, said.out, len(said.err.splitlines())) == (2, "", 1)
+
+
+@pytest.mark.parametrize("has_seal", [True, False])
+def test_whatever_identify_may_tell_is_known(tmp_path, has_seal):
+    site = Site(has_seal=has_seal)
+    names = [label_of(name, site)[0] for name in NAMES] + [EFFECTIVE]
+    file = tmp_path / "told.json"
+    file.write_text(json.dumps([{**ROWS[0], "parameter": name} for name in names]))
+    told = read_posterior(file)
+    assert {*told} == {*names} - {EFFECTIVE}
+    circle = Trajectory(Circle(1.0), ConstantRate(0.2))
+    assert chances(circle, CLIMBER, HELD, told, 3)["falls"].runs == 3

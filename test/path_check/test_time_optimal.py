@@ -222,7 +222,7 @@ def test_the_command_writes_what_the_nodes_drive_and_checks_it_from_anywhere(
         status, said = run(monkeypatch, capsys, "--params", file)
         assert status == 0
         assert "at most 0.3 m/s" in said
-    read, climber, held = check_path.read(tmp_path / "out" / "fastest.yaml", {}, [])
+    read, climber, held, _ = check_path.read(tmp_path / "out" / "fastest.yaml", {}, [])
     assert all(limit.reserve > 0.999 for limit in demands(read, climber, held, 1.5).least())
 
 
