@@ -24,8 +24,11 @@ from climber_uk.mechanics.demand import demanded
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.mechanics.reference import Reference
+from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
+from climber_uk.mechanics.waypoints import Rounding
 from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.planning.given_path import Manner, planned
 from climber_uk.ros import plant_parts
 from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.simulated_robot import SimulatedRobot
@@ -140,18 +143,24 @@ def test_only_a_pump_can_be_asked_for_less():
         LeastSuction(SuctionOptions(enabled=True), CLIMBER, Attachment(adhesion=Magnetic()))
 
 
-ROUND = Values(  # up at first, then down, and up again, in 10.5 s
-    {**PLAN.by_name, "shape": "circle", "circle.radius": 0.25, "rest_to_rest.rate": 0.8}
+ROUND = build_trajectory(  # up at first, then down, and up again, in 10.5 s
+    Values(
+        {**PLAN.by_name, "shape": "circle", "circle.radius": 0.25, "rest_to_rest.rate": 0.8}
+    ).read
 )
 
 
 class Drive:
-    """climber.yaml's climber once around a circle, its pump set as it is asked for."""
+    """A climber on its path, its pump set as it is asked for; climber.yaml's, around a circle.
 
-    def __init__(self, **options):
-        lag = {"suction.pump_time": 0.2}
-        self.ours, plants = (Values({**values.by_name, **lag}) for values in (OURS, PLANTS))
-        trajectory = build_trajectory(ROUND.read)
+    `true` and `told` are parameters of the climber that differ from those of that file, and what
+    the controller has in their place.
+    """
+
+    def __init__(self, trajectory=ROUND, true=None, told=None, lag=0.2, **options):
+        true, pump = true or {}, {"suction.pump_time": lag}
+        self.ours = Values({**OURS.by_name, **pump, **true, **(told or {})})
+        plants = Values({**PLANTS.by_name, **pump, **true})
         self.options, self.duration = plants.read(SimulationOptions), trajectory.duration
         start, self.period = (
             State.rolling(trajectory.at(0.0).pose, 0.0, 0.0),
@@ -160,10 +169,12 @@ class Drive:
         self.robot = SimulatedRobot(plant_parts.parts(plants), start, self.period)
         self.controller = build_controller(self.ours, self.robot.pressure)
         attachment = Attachment(adhesion=self.ours.read(Suction, "suction."), grip=GRIP)
-        self.least = LeastSuction(SuctionOptions(**options), CLIMBER, attachment)
+        climber = self.ours.read(Climber)
+        self.least = LeastSuction(SuctionOptions(**options), climber, attachment)
         self.path = sampled(trajectory, self.duration + 2.0)
         self.tick, self.rows, self.troubles = 0, [], set()
         self.measures = self.tells = self.obeys = True
+        self.otherwise = 5000.0  # [Pa] to which a pump is set that does not obey
 
     def until(self, end):
         """Rows (n, 5) of pressure, setpoint [Pa], slip margin, distance off [m], speed [m/s]."""
@@ -186,7 +197,7 @@ class Drive:
             pressure, trouble = self.least.setpoint(controller, answer, measured)
             self.troubles.add(trouble)
             self.rows.append(self.row(controller.active.at(stamp), pressure))
-            robot.setpoint = pressure if self.obeys else 5000.0
+            robot.setpoint = pressure if self.obeys else self.otherwise
         for _ in range(self.options.steps):
             robot.advance(np.zeros(2) if answer is None else answer.torques)
         robot.measure()
@@ -235,3 +246,37 @@ def test_in_the_safe_output_it_is_the_full_pressure_at_once():
     assert drive.until(3.0)[-1, 1] < 0.9 * FULL
     drive.controller.enable(False)
     assert drive.until(3.1)[-1, 1] == FULL
+
+
+def random_case(random):
+    """A path, the climber, what its controller is told of it, and the pump's lag."""
+    corners = np.cumsum(random.normal(0, 0.5, (5, 2)), axis=0)
+    manner = Manner(Rounding(), RestToRest(rate=0.15, ramp_time=1.0))
+    trajectory, _ = planned(corners, manner)
+    uniform = random.uniform
+    true = {
+        "mass": uniform(3, 7),
+        "wheel_load_share": uniform(0.6, 0.95),
+        "seal_friction_coefficient": uniform(0.2, 0.7),
+        "suction_pressure": uniform(8000, 14000),
+        "inclination": random.choice([60.0, 90.0, 120.0]),
+    }
+    told = {"mass": true["mass"] * uniform(0.9, 1.1), "least_pressure": random.choice([0.0, 3e3])}
+    told["seal_friction_coefficient"] = true["seal_friction_coefficient"] * uniform(0.7, 1.3)
+    return trajectory, true, told, uniform(0.0, 0.4)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("seed", range(20))
+def test_random_climbers_that_are_told_wrong_keep_the_margins_that_they_can_have(seed):
+    """Mass within 10 %, friction within 30 %, which the observer learns."""
+    random = np.random.default_rng(seed)
+    case, asked = random_case(random), random.uniform(1.3, 3.0)
+    options = {"slip_margin": asked, "tip_margin": asked, "fall_rate": 3000.0}
+    drives = [Drive(*case, **options) for _ in range(2)]
+    drives[0].obeys, drives[0].otherwise = False, None
+    full, saved = (drive.until(min(drive.duration, 20.0)) for drive in drives)
+    assert saved[:, 2].min() > 0.97 * min(asked, full[:, 2].min())
+    assert saved[:, 3].max() < full[:, 3].max() + 1e-3
+    assert drives[1].controller.mode.value == "following"
