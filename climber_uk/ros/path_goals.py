@@ -139,13 +139,11 @@ class PathGoals:
             self._tell(goal, goal.odometer, position if what is Fate.DRIVEN else None)
 
     def _rests(self, position: int) -> bool:
-        """Whether the climber rests: what is not driven does not move."""
+        """Whether the climber rests, as far as is known: one that is not to move does."""
         under_way = self._journey.under_way
-        return under_way is None or not self._is_driven or under_way.rests(position)
-
-    @property
-    def _is_driven(self) -> bool:
-        return self._mode in ("", FOLLOWING)
+        if under_way is None or self._mode not in ("", FOLLOWING, APPROACHING):
+            return True
+        return self._mode != APPROACHING and under_way.rests(position)
 
     def _trouble(self, now: int, what: Fate) -> tuple[str, str] | None:
         """Error code, and in words why a goal fails, if it does."""
@@ -169,7 +167,8 @@ class PathGoals:
         course = self._journey.course
         if position is not None and course is not None:
             own_time, rate = course.own_time(position)
-            speed = abs(float(course.trajectory.at(own_time).speed) * rate) * self._is_driven
+            is_driven = self._mode in ("", FOLLOWING)
+            speed = abs(float(course.trajectory.at(own_time).speed) * rate) * is_driven
         left = odometer.whole - odometer.at(own_time)
         goal.handle.publish_feedback(_of(FollowPath.Feedback, distance_to_goal=left, speed=speed))
 

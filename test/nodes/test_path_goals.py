@@ -163,6 +163,14 @@ def test_a_goal_fails_that_is_not_followed_and_another_is_driven_then(definition
     assert np.hypot(*(rested - UP[0])) < 0.9  # of 1.27 m: it is paused
     assert goals.send(rested, rested + RIGHT).end()[0] == SUCCEEDED
 
+    begin = goals.here + RIGHT
+    cancelled = goals.send(begin, begin + RIGHT)
+    world.wait(lambda: goals.speed > 0.02, "its way to the beginning")
+    world.wait(cancelled.handle.cancel_goal_async().done, "word of it")
+    assert cancelled.end()[0] == CANCELED
+    assert goals.speed < 0.01
+    assert np.hypot(*(goals.here - begin)) < 0.15
+
 
 @pytest.mark.soak
 def test_a_goal_fails_whose_controller_is_lost_and_another_is_driven_by_the_next_one(
