@@ -74,7 +74,7 @@ class PathLimits:
     rates: Array  # (2, n) of the wheels at ṡ = 1 [rad/s]
     forwards: Affine  # (n,) acceleration along [m/s²]
     across: Array  # (n,) acceleration across by X [m/s²]
-    fastest: Array  # (n,) ṡ by speed and yaw rate
+    fastest: Array  # (n,) ṡ by speed, yaw rate and the rate at which a motor has no torque left
 
     @classmethod
     def of(
@@ -103,8 +103,11 @@ class PathLimits:
         _check_tip(found[0], one)
         affine = partial(Affine.of, rate**2)
         most = np.minimum(_leg_speed(trajectory, s), limits.speed)
+        rates = np.stack(found[0].rates) / rate
+        no_load = climber.no_load_wheel_rate or np.inf
         with np.errstate(divide="ignore"):
             fastest = np.minimum(most / speed, limits.yaw_rate / yaw_rate)
+            fastest = np.minimum(fastest, no_load / np.abs(rates).max(axis=0))
         return cls(
             trajectory=trajectory,
             climber=climber,
@@ -116,7 +119,7 @@ class PathLimits:
             torques=affine(*(np.stack(each.torques) for each in found)),
             lateral=affine(*(each.lateral for each in found)),
             loads=affine(*(np.stack(each.loads) + 0 * s for each in found)),
-            rates=np.stack(found[0].rates) / rate,
+            rates=rates,
             forwards=affine(*(each.forward_acceleration for each in at)),
             across=speed * yaw_rate,
             fastest=fastest,
@@ -159,7 +162,7 @@ class PathLimits:
         return np.where(impossible, np.inf, low), np.where(impossible, -np.inf, high)
 
     def largest(self) -> Array:
-        """Largest X (n,) at which any U is allowed; raises `ValueError` where there is none."""
+        """Largest X (n,) up to which any U is allowed; raises `ValueError` where there is none."""
         low, high = np.zeros_like(self.s), self.fastest**2
         for _ in range(HALVINGS):
             middle = (low + high) / 2
@@ -193,6 +196,7 @@ class PathLimits:
                 [
                     left.slip / self.limits.margin,
                     1 / used.max(axis=0),
+                    1 / np.abs(rate).max(axis=0),
                     self.limits.speed / speed,
                     self.limits.yaw_rate / yaw_rate,
                     self.limits.acceleration / total,

@@ -7,6 +7,7 @@ time it is the table of the time law `fastest`, which is smooth. What smoothing 
 the limits are tightened there for, and it is done again.
 """
 
+import math
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -29,7 +30,8 @@ SPEEDS = np.linspace(0.0, 1.0, 33)  # of the largest ṡ, at which bounds of U a
 ROUNDS = 20  # of tightening
 AT_FIRST = 0.999  # share of the limits
 KEPT, AIM = 1.0001, 1.0005  # least reserve that is enough, and that is aimed at if it is not
-MORE = 1.2  # times what is lacking that the limits are tightened by
+MORE, LEAST_SHARE = 1.2, 0.8  # times what is lacking that limits are tightened by, in a round
+CLOSELY = 0.0025  # [s] between two times at which a smooth law is looked at, at most
 
 
 class TimeOptimal(NamedTuple):
@@ -58,16 +60,23 @@ def time_optimal(
     s = _grid(trajectory, places)
     along = PathLimits.of(trajectory, climber, attachment, wall, limits, s, AT_FIRST)
     dwells = np.append(dwell[inner], 0.0)
-    abrupt = 0.0
+    X, U = _optimum(along, places)
+    abrupt = _sampled(s, X, U, places, dwells, period)[1]
     for _ in range(ROUNDS):
-        X, U = _optimum(along, places)
-        table, duration = _sampled(s, X, U, places, dwells, period)
-        abrupt = abrupt or duration
+        table, _ = _sampled(s, X, U, places, dwells, period)
         if (tighter := _tightened(along, period, table)) is None:
             law = Tabulated(period, table)
             return TimeOptimal(replace(trajectory, law=law), abrupt)
         along = replace(along, tighter=tighter)
-    raise ValueError(f"no law as smooth as {period:g} s keeps its limits: sample it more often")
+        try:
+            X, U = _optimum(along, places)
+        except ValueError:  # what is left of the limits is too little
+            break
+    smoothing = (DEGREE + 1) * period
+    raise ValueError(
+        f"no law that is smooth within {smoothing:g} s keeps the limits: "
+        "smooth it less, or round its corners more"
+    )
 
 
 def unstretched(trajectory: Trajectory) -> Trajectory:
@@ -83,6 +92,7 @@ def _grid(trajectory: Trajectory, places: Array) -> Array:
     length = float(np.hypot(*np.diff(_pose(trajectory, ends)[:, :2], axis=0).T).sum())
     count = int(np.clip(length / STEP, LEAST_STEPS, MOST_STEPS))
     fine = np.union1d(np.linspace(0.0, trajectory.course.length, LOOKS * count + 1), places)
+    fine = np.union1d(fine, trajectory.course.stations)
     pose = _pose(trajectory, fine)
     way = np.hypot(*np.diff(pose[:, :2], axis=0).T)
     turn = np.abs(np.mod(np.diff(pose[:, 2]) + np.pi / 2, np.pi) - np.pi / 2)
@@ -111,7 +121,6 @@ def _passes(along: PathLimits, largest: Array) -> Array:
     """X (n,), no larger than `largest` (n,), where it rests if that is 0."""
     s = along.s
     step = 2 * np.diff(s)
-    fastest = np.sqrt(largest)
     speeds = largest[:, None] * SPEEDS**2
     low, high = along.interval(speeds * (1 - 1e-9))
     ends_low = speeds[:-1] + step[:, None] * np.minimum(low[:-1], np.finfo(float).max)
@@ -129,14 +138,30 @@ def _passes(along: PathLimits, largest: Array) -> Array:
             share = (most[k + 1] - below) / (above - below)
             most[k] += share * (speeds[k, last + 1] - speeds[k, last])
     X = np.zeros_like(s)
-    for k in range(len(s) - 1):  # forwards: as hard as it can
-        # between two speeds in ṡ, in which the motors' line is straight
-        share = np.sqrt(X[k]) / fastest[k] if largest[k] > 0.0 else 0.0
-        U = np.interp(share, SPEEDS, high[k])
-        X[k + 1] = min(most[k + 1], X[k] + step[k] * U)
-        if X[k + 1] < 0 or (X[k + 1] == 0.0 and X[k] == 0.0):
+    begins_high = speeds[1:] - step[:, None] * high[1:]
+    for k in range(len(s) - 1):  # forwards: as hard as it can, by the bounds where it comes to
+        if largest[k + 1] == 0.0:
+            continue
+        too_high = begins_high[k] > X[k]
+        cell = int(np.argmax(too_high)) if too_high.any() else 0
+        if too_high[0]:
             along.refuse_at(k, "it cannot go on there: its weight and friction are too much")
+        share = _reached(X[k], step[k], largest[k + 1], high[k + 1], cell) if cell else 1.0
+        X[k + 1] = min(most[k + 1], share * share * largest[k + 1])
     return X
+
+
+def _reached(before: float, step: float, largest: float, high: Array, cell: int) -> float:
+    """Share r of the fastest ṡ at which X = r² `largest` is `before` + `step` U(r).
+
+    In a `cell` of `SPEEDS` U goes straight with r, as a motor's line does.
+    """
+    slope = (high[cell] - high[cell - 1]) / (SPEEDS[cell] - SPEEDS[cell - 1])
+    at_none = high[cell - 1] - slope * SPEEDS[cell - 1]
+    half = step * slope / 2
+    root = half * half + largest * (before + step * at_none)
+    reached = (half + math.sqrt(max(root, 0.0))) / largest
+    return float(np.clip(reached, SPEEDS[cell - 1], SPEEDS[cell]))
 
 
 def _sampled(
@@ -163,8 +188,9 @@ def _sampled(
 def _tightened(along: PathLimits, period: float, table: Array) -> Any:
     """Shares (n,) of the limits, where the smooth law needs less than before; None: nowhere."""
     law = spline(period, table)
-    count = 2 * (len(table) - DEGREE)
-    time = period / 2 * np.arange(1, count)
+    parts = max(2, math.ceil(period / CLOSELY))
+    count = parts * (len(table) - DEGREE)
+    time = period / parts * np.arange(1, count)
     progress = tuple(law(time, order) for order in range(4))
     moves = progress[1] > 0
     reference = along.trajectory.at_progress(tuple(of[moves] for of in progress))
@@ -174,7 +200,7 @@ def _tightened(along: PathLimits, period: float, table: Array) -> Any:
     if reserve.min() >= KEPT:
         return None
     lacking = np.flatnonzero(reserve < KEPT)
-    share = 1 - MORE * (AIM - reserve)
+    share = np.maximum(1 - MORE * (AIM - reserve), LEAST_SHARE)
     tighter = np.ones_like(along.s)
     # what is smooth there comes from as long before and after
     reach = period * (DEGREE + 1) / 2

@@ -16,6 +16,7 @@ from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate, Line, SineWave
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import Cone, Cylinder, Plane, Sphere, Tank
 from climber_uk.mechanics.waypoints import Polyline, Waypoints
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.path_check import check_path
@@ -233,3 +234,47 @@ def test_the_command_tells_why_there_is_no_fastest_law(monkeypatch, capsys, tmp_
     status, said = run(monkeypatch, capsys, "--params", file, "--fastest")
     assert status == 1
     assert "fastest law: none: at (" in said
+
+
+def random_problem(random):
+    """A path, a climber, limits and a wall on which it can be driven slowly, or not."""
+    points = np.cumsum(
+        random.normal(0, random.uniform(0.2, 1), (random.integers(2, 12), 2)), axis=0
+    )
+    shape = (
+        Ellipse(*random.uniform(0.3, 5, 2)),
+        Lemniscate(*random.uniform(0.3, 3, 2)),
+        Line(10 ** random.uniform(-1, 1), random.uniform(-3, 3)),
+        SineWave(random.uniform(0.3, 6), random.uniform(0, 1), random.uniform(0.3, 3)),
+        Polyline(places=points, tolerance=10 ** random.uniform(-2, -1)),
+    )[random.integers(5)]
+    climber = replace(
+        CLIMBER,
+        mass=random.uniform(2, 8),
+        yaw_inertia=random.uniform(0.05, 1),
+        max_wheel_torque=random.uniform(2.5, 10),
+        no_load_wheel_rate=float(random.choice([0, 20, 60])),
+        inclination=random.uniform(0, 180),
+    )
+    walls = Plane(), Plane(30.0), Tank(-4.0), Sphere(3.0), Cone(20.0), Cylinder(-6.0)
+    limits = Limits(
+        margin=random.uniform(1, 2),
+        speed=float(random.choice([100.0, 0.5])),
+        acceleration=float(random.choice([np.inf, 1.0])),
+    )
+    return Trajectory(shape, SLOW), climber, limits, walls[random.integers(6)]
+
+
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(2, 60))]
+)
+def test_any_path_is_driven_within_its_limits_or_cannot_be_driven_slowly_either(seed):
+    path, climber, limits, wall = random_problem(np.random.default_rng(seed))
+    try:
+        law = time_optimal(path, climber, HELD, limits, wall=wall).trajectory
+        can_be_driven = True
+    except ValueError:
+        law, can_be_driven = replace(path, law=RestToRest(rate=0.003, ramp_time=10.0)), False
+    left = reserves(law.at(np.linspace(0.0, law.duration, 5001)[1:-1]), climber, HELD, wall=wall)
+    worst = min(np.min(left.slip) / limits.margin, np.min(left.torque), np.min(left.tip))
+    assert bool(worst >= 1.0) is can_be_driven
