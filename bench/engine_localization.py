@@ -24,8 +24,16 @@ from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.ros import plant_parts
 
 sys.path.insert(0, str(ROOT / "examples"))
-# what wheels show while they scrub (bench/physics.py), and how far they sag in a turn
-SCRUBS = {"effective_half_track": 0.357, "way_noise": 0.03, "creep_deviation": 0.05}
+# what wheels show while they scrub (bench/physics.py), and how far they slip
+SCRUBS = {
+    "effective_half_track": 0.357,
+    "scrub_deviation": 0.1,
+    "creep_deviation": 0.0,
+    "way_noise": 0.006,
+    "scale_deviation": 0.06,
+    "scale_time": 2.0,
+    "acceleration_noise": 0.02,
+}
 TOLD = {"two wheels": {"way_noise": 0.002}, "four wheels": {**SCRUBS, "output_frequency": 100.0}}
 
 
