@@ -6,13 +6,14 @@ highest at which the same limits hold all along, with the fastest ramps up to it
 highest rate is that of `rest_to_rest`. The plant's wheels may slip.
 """
 
+from __future__ import annotations
+
 import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from climber_uk.closed_loop.simulate import simulate
@@ -32,6 +33,9 @@ from climber_uk.path_check.fastest import fastest
 from climber_uk.path_check.path_limits import Limits
 from climber_uk.path_check.time_optimal import time_optimal
 from climber_uk.simulation.plant import Plant
+
+if TYPE_CHECKING:
+    import casadi as ca
 
 CONFIG = Path(__file__).parents[1] / "config"
 NODES = {"ellipse": 1500, "eight": 1500, "lanes": 5000}
@@ -61,6 +65,8 @@ def problems() -> dict[str, Problem]:
 
 def optimum(problem: Problem, ours: Trajectory, nodes: int) -> float:
     """Least time [s] by IPOPT, at places that are even in the time of our law."""
+    import casadi as ca
+
     s = ours.law.progress(np.linspace(0.0, ours.duration, nodes), ours.course)[0]
     rests = np.concatenate([[0.0], ours.course.rests[0], [ours.course.length]])
     s = np.union1d(s, rests)
@@ -95,6 +101,8 @@ def limits(
     problem: Problem, ours: Trajectory, s: Array, X: ca.MX, U: ca.MX
 ) -> tuple[ca.MX, Array, Array]:
     """What is to lie between two bounds, by (11), (15) and §4 of docs/theory.md."""
+    import casadi as ca
+
     _, climber, held, limits = problem
     _, p_1, p_2, p_3 = (np.asarray(of) for of in ours.course.derivatives(s))
     square = (p_1**2).sum(axis=1)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from climber_uk.control.build import KINDS as CONTROLLER_TYPES
+from climber_uk.control.least_suction import SuctionOptions
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
@@ -36,7 +37,7 @@ def fields_of(node: str, kinds: Iterable[tuple[type, str]]) -> "dict[str, datacl
 ON_WALL = [(Grip, ""), (Alarm, ""), *((kind, f"{name}.") for name, kind in ADHESION.items())]
 PARAMETERS = {
     **fields_of(PLANNER, TRAJECTORY_TYPES),
-    **fields_of(CONTROLLER, [*CONTROLLER_TYPES, *ON_WALL]),
+    **fields_of(CONTROLLER, [*CONTROLLER_TYPES, *ON_WALL, (SuctionOptions, "least_suction.")]),
     **fields_of(PLANT, ((k, "") for k in (SimulationOptions, Climber, Physics, Motors, Sensors))),
     **fields_of(PLANT, ((k, f"{n}.") for group in VARIANTS.values() for n, k in group.items())),
     **fields_of(PLANT, ON_WALL),
@@ -45,7 +46,7 @@ PARAMETERS = {
 # sensors that no odometry comes from
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
-    *("stop_time", "reaction", "speed", "exclusive"),
+    *("stop_time", "reaction", "speed", "exclusive", "goal_patience"),
     *(f"by_hand.{name}" for name in ("input", "speed", "yaw_rate", "ramp_time", "timeout")),
     *("effort_commands", "effort_order", "publish_cmd_vel", "odom_frame", "base_frame"),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames"),
