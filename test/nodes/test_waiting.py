@@ -73,7 +73,9 @@ class Waiting(Climb):
         return self.world.wait(is_there, what)
 
     def is_in(self, mode):
-        self.comes_to(lambda found: found == mode, mode)
+        """Wait for a mode; time of the plant [s] of which it is told."""
+        told = self.comes_to(lambda found: found == mode, mode)
+        return reading.nanoseconds(told.header.stamp) / SECOND
 
     def fastest(self, since=0.0):
         return max(
@@ -182,9 +184,8 @@ def test_a_start_that_is_allowed_to_be_far_off_is_approached_at_its_speed(world)
         "approaching the reference (1.50 m away)"  # its modes come before they are heard, perhaps
     )
     world.wait(lambda: said in world.log(CONTROLLER), said)
-    climb.is_in("following")
+    begin = climb.is_in("following")
     assert climb.fastest() < 0.84
-    begin = climb.now
     climb.passes(1.5)
     assert climb.off_the_path(begin) < 0.02
 
