@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from climber_uk.control.actuator_check import ActuatorCheck
 from climber_uk.control.estimator import Observed
+from climber_uk.control.force_budget import ForceBudget
 from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics import SECOND
@@ -116,7 +117,7 @@ class Guard:
         self._rests_at: Motion | None = None
         self._followed = math.inf  # [s] since the last fault
         self.faults: deque[int] = deque()  # [ns] stamps
-        self._actuators = ActuatorCheck()
+        self._actuators, self.budget = ActuatorCheck(), ForceBudget()
         self.restart()
 
     def forgive(self) -> None:
@@ -131,6 +132,7 @@ class Guard:
         self._swings = Swings(), Swings()
         self._since_rest = math.inf  # [s]
         self._actuators.restart()
+        self.budget.restart()
 
     def watch(self, climber: Climber, observed: Observed, expected: Expected) -> Trouble | None:
         """What is wrong with what is observed; None if all is well."""
@@ -138,6 +140,7 @@ class Guard:
         self._followed += observed.time
         asked = expected.wanted.speed - climber.half_track * expected.wanted.yaw_rate
         self._actuators.add(climber, observed, self.options.response_time, asked)
+        given = self.budget.see(climber, observed, expected.allowed.speed)
         too_fast = self._watch_rates(climber, observed, expected)
         return (
             self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
@@ -145,6 +148,7 @@ class Guard:
             or self._watch_limit(climber, observed, expected, torques)
             or self._watch_swings(climber, observed, torques)
             or self._watch_disturbance(climber, observed.disturbance)
+            or given
         )
 
     def _watch_rates(
