@@ -16,7 +16,7 @@ from typing import NamedTuple
 from climber_uk.control.active_reference import ActiveReference
 from climber_uk.control.approach import Approach
 from climber_uk.control.constraint_set import ConstraintSet, blended
-from climber_uk.control.control_law import CUT, Command, ControlInput, ControlLaw, check_finite
+from climber_uk.control.control_law import CUT, Command, ControlLaw, check_finite
 from climber_uk.control.encoder_check import EncoderCheck
 from climber_uk.control.estimator import Estimator, Observed
 from climber_uk.control.guard import Guard, GuardOptions
@@ -382,13 +382,16 @@ class Controller:
             at = partial(active.around, target, target_time)
             course = estimator.slip.course(self._law.climber, point, at)
             ahead, law = ahead._replace(course=course), self._law_for(target.is_gentle)
-            command = self._within(law.command(ahead, point), ahead)
+            pending, budget = estimator.pending(ahead.begins), self.guard.budget
+            command = law.command(ahead, point)
+            command = budget.within(command, law.climber, ahead.period, pending)
             lost = command.lost.force
             if abs(lost) > CUT and active.pacing.catch_up > 0:
                 target = active.slowed(
                     target, lost / law.climber.driven_mass, target_time, ahead.period
                 )
-                command = self._within(law.command(ahead, target.point or point), ahead)
+                command = law.command(ahead, target.point or point)
+                command = budget.within(command, law.climber, ahead.period, pending)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
@@ -398,11 +401,6 @@ class Controller:
         wheels, fits, speeds = command.wheels, command.fits, (point.speed, command.yaw_rate)
         estimator.sent(ahead.begins, wheels, fits, *speeds)
         return target.mode, target.detail, command
-
-    def _within(self, command: Command, ahead: ControlInput) -> Command:
-        """A command within the guard's budget."""
-        pending = self.estimator.pending(ahead.begins)
-        return self.guard.budget.within(command, self._law.climber, ahead.period, pending)
 
     def _law_for(self, is_gentle: bool) -> ControlLaw:
         """The control law, with the constraints that are followed now."""

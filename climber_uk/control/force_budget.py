@@ -1,10 +1,10 @@
-"""How much force is given on trust: what goes beyond known resistance while no motion is told.
+"""How much force is given on trust: what goes beyond known friction while no motion is told.
 
 A seal that sticks looks like odometry that is late, or stuck: torque is given, and no motion is
 told. The climber may move in truth, at a speed that is the excess force's integral over the mass.
-So that speed is bounded. Where it is used up, the climber is let come to rest (its seal holds it),
-is waited for, and then pushed again, a little more. A seal that sticks breaks loose by that; what
-was told too late shows while nothing drives.
+So that speed is bounded. Where it is used up, the climber is let come to rest, as its seal makes
+it; then it is pushed again, a little more. A seal that sticks breaks loose by that, and what was
+told too late shows while nothing drives.
 """
 
 import math
@@ -14,158 +14,154 @@ from climber_uk.control.estimator import Acting, Observed
 from climber_uk.control.model import SLOW
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import Motion, Torques, Wrench
+from climber_uk.mechanics.quantities import Torques, Wrench
 
-TRUSTED, TRUSTED_SHARE = 0.05, 0.2  # [m/s] of the first push, and beside it of what is allowed
+FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
 GROWS = 1.4  # from one push to the next
-MOST = 1.2, 2.5  # times what is allowed, of odometry that stands exactly, and of one that lives
+MOST, PUSHES = 1.2, 8  # times what is allowed, and pushes, after which it is stalled
 SPENT = 0.8  # of it, from which it is used up
-PUSHES = 8, 20  # of the same, without an answer, after which it is stalled
 FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing drives
-KNOWN = 0.2  # [s] of sliding, after which its friction is
+HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
+LATE = 0.035  # [s] into a pause, from which on a motion that begins comes too late
+MEMORY = 0.1  # [s] in which friction is learnt
+KNOWN = 0.2  # [s] of sliding, after which it is known
 MOST_FRICTION = 2.0  # times that of the model
-HELD = 0.8  # of the friction, that is pushed meanwhile, once it rests
-LATE = 0.035  # [s] into it, from which on a motion that begins comes too late
-MEMORY = 0.1  # [s] in which it is learnt what resists a climber that slides
 
 
 class ForceBudget:
-    """What a climber may do by the torques that it was given, beyond the motion that is told."""
+    """What a climber may do by its torques, while odometry tells that it rests."""
 
     def __init__(self) -> None:
         self.restart()
 
     def restart(self) -> None:
-        """Nothing was given."""
-        self.speed = 0.0  # [m/s] beyond what is told
-        self.turn = 0.0  # [m/s] of a rim, the same
-        self._resistance = 0.0  # [N] of what slides
-        self._slides = 0.0  # [s] for which it does
-        self._pushes = 0
-        self._paused: float | None = None  # [s] for which nothing drives
-        self._allowed = math.inf  # [m/s]
-        self._changed = self._lives = False  # odometry, at all, since the last push; in that
-        self._friction = 0.0  # [N] of the seal, as it was when it slid last
+        """Know nothing of a climber."""
+        self.pause()
+        self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
 
-    @property
-    def most(self) -> float:
-        """Speed [m/s] that may be given."""
-        return min(self.first * GROWS**self._pushes, MOST[self._lives] * self._allowed)
+    def pause(self) -> None:
+        """Watch nothing for now: it need not move."""
+        self._rests = False  # as it is told
+        self.speed = self.turn = 0.0  # [m/s] that it may have, and a rim by turning
+        self.pushes = 0  # without an answer
+        self.paused: float | None = None  # [s] for which nothing drives
+        self._allowed = math.inf  # [m/s]
+        self._lives = False  # odometry, that has changed at all since the first push
 
     @property
     def first(self) -> float:
-        """The same, at first [m/s]."""
-        return TRUSTED + TRUSTED_SHARE * self._allowed
+        """Speed [m/s] that is given at first."""
+        return FIRST + FIRST_SHARE * self._allowed
+
+    @property
+    def most(self) -> float:
+        """Speed [m/s] that may be given now."""
+        return min(self.first * GROWS**self.pushes, MOST * self._allowed)
 
     def see(self, climber: Climber, observed: Observed, allowed: float) -> Trouble | None:
-        """Take what an odometry tells; `allowed` [m/s] is the reference's fastest, and catch-up."""
+        """Take what an odometry tells; `allowed` [m/s] is what the reference may ask for."""
         self._allowed = allowed
-        force, _ = climber.wrench(*observed.torques)
-        push = force - climber.weight_along_wall * observed.after.sine
-        if abs(observed.after.speed) < SLOW:
-            return self._rest(climber, observed, push)
-        return self._slide(climber, observed, push)
+        if abs(observed.after.speed) >= SLOW or _falls(climber):
+            return self._slide(climber, observed)
+        return self._rest(climber, observed)
 
-    def _rest(self, climber: Climber, observed: Observed, push: float) -> Trouble | None:
-        if self._slides:
-            self.speed, self._slides, self.turn = observed.before.speed, 0.0, 0.0
-            self._changed = self._lives = False
-        elif observed.after[:3] != observed.before[:3]:
-            self._changed = True
-        if climber.seal_friction < climber.weight_along_wall:  # it does not rest by itself
-            self.speed = 0.0
-            return None
-        self.speed = _rolled(climber, self._holds(climber), self.speed, push, observed.time)
-        if self._pushes:
-            _, moment = climber.wrench(*observed.torques)
-            rate = moment / climber.driven_inertia
-            self.turn += climber.half_track * (rate * observed.time)
-        if self._paused is not None:
-            self._paused += observed.time
-            pause = FIRST_PAUSE if self._pushes == 1 else PAUSE
-            if self._paused > pause + observed.reaction and self.speed == 0:
-                self._paused = None
-        elif abs(self.speed) > SPENT * self.most:
-            self._paused, self._pushes = 0.0, self._pushes + 1
-            self._lives, self._changed = self._changed, False
-        if self._pushes > PUSHES[self._lives]:
-            return Mode.STALLED, f"{self._pushes} pushes moved nothing"
-        return None
-
-    def _slide(self, climber: Climber, observed: Observed, push: float) -> Trouble | None:
-        time, late = observed.time, self._paused
-        if not self._slides:
-            self.speed, self._paused, self._pushes = 0.0, None, self._pushes // 2
-        self._slides += time
-        change = observed.after.speed - observed.before.speed
-        resists = push - climber.driven_mass * change / time
-        off = resists - self._resistance
-        new = max(1 - math.exp(-time / MEMORY), time / self._slides)
-        self._resistance += new * off
-        self.speed = math.exp(-time / MEMORY) * self.speed + off / climber.driven_mass * time * (1-new)
-        if self._slides > KNOWN:
-            self._friction = abs(self._resistance)
+    def _slide(self, climber: Climber, observed: Observed) -> Trouble | None:
+        before, after, time = observed.before, observed.after, observed.time
+        late = self.paused
+        if self._rests:
+            self._rests, self.paused, self._slid, self.pushes = False, None, 0.0, self.pushes // 2
+        self._slid += time
+        resists = _push(climber, observed.torques, after.sine)
+        resists -= climber.driven_mass * (after.speed - before.speed) / time
+        new = max(1 - math.exp(-time / MEMORY), time / self._slid)
+        self._friction += new * (math.copysign(1.0, after.speed) * resists - self._friction)
         if late is not None and late > LATE + observed.reaction:
-            return Mode.LATE, f"it moves {late:.2f} s after the last push"
+            return Mode.LATE, f"it moves {late:.2f} s after a push has ended"
         return None
 
-    def within(
-        self, command: Command, climber: Climber, period: float, pending: Acting
-    ) -> Command:
+    def _rest(self, climber: Climber, observed: Observed) -> Trouble | None:
+        before, after, time = observed.before, observed.after, observed.time
+        if not self._rests:
+            self._friction *= self._slid > KNOWN
+            self._rests, self.speed, self.turn = True, before.speed, 0.0
+            self._lives = False
+        elif self.pushes and after[:3] != before[:3]:
+            self._lives = True
+        if self._lives and self.paused is None:
+            return None
+        push = _push(climber, observed.torques, after.sine)
+        self.speed = self._rolled(climber, push, time)
+        if self.pushes:
+            _, moment = climber.wrench(*observed.torques)
+            self.turn += climber.half_track * moment / climber.driven_inertia * time
+        if self.paused is not None:
+            self.paused += time
+            pause = FIRST_PAUSE if self.pushes == 1 else PAUSE
+            if self.paused > pause + observed.reaction and self.speed == 0:
+                self.paused = None
+        elif abs(self.speed) > SPENT * self.most:
+            self.paused, self.pushes = 0.0, self.pushes + 1
+        if self.pushes > PUSHES:
+            return Mode.STALLED, f"{self.pushes} pushes moved nothing"
+        return None
+
+    def _holds(self, climber: Climber) -> float:
+        """Friction [N] that is known to hold it."""
+        model = climber.seal_friction
+        return min(max(model, self._friction), MOST_FRICTION * model)
+
+    def _rolled(self, climber: Climber, push: float, time: float) -> float:
+        """The speed [m/s] that it may have, a time [s] later."""
+        speed, friction = self.speed, self._holds(climber)
+        if speed == 0 and abs(push) <= friction:
+            return 0.0
+        push -= math.copysign(friction, speed or push)
+        end = speed + time * push / climber.driven_mass
+        return 0.0 if speed * end < 0 else end
+
+    def within(self, command: Command, climber: Climber, period: float, pending: Acting) -> Command:
         """A command, or what of it is in the budget; `pending` torques act before it."""
-        force, moment = climber.wrench(*command.wheels)
-        weight, mass = climber.weight_along_wall * command.motion.sine, climber.driven_mass
-        push, speed, known = force - weight, self.speed, self._resistance
-        if self._slides:
-            for torques, time in pending:
-                before, _ = climber.wrench(*torques)
-                speed += time * (before - weight - known) / mass
-            most = known + mass * (self.most - speed) / period
-            least = known - mass * (self.most + speed) / period
-            goes = command.motion.speed > 0  # it may always be braked
-            lowest, highest = (-math.inf, most) if goes else (least, math.inf)
-        elif climber.seal_friction < climber.weight_along_wall:
+        if not self._rests or (self._lives and self.paused is None):
             return command
-        elif self._paused is not None:
-            highest = 0.0 if self.speed else HELD * climber.seal_friction
-            lowest = -highest
+        sine = command.motion.sine
+        push, (_, moment) = _push(climber, command.wheels, sine), climber.wrench(*command.wheels)
+        if self.paused is not None:
+            most = 0.0 if self.speed else HELD * climber.seal_friction
+            lowest, highest = -most, most
         else:
+            speed = self.speed
             for torques, time in pending:
-                before, _ = climber.wrench(*torques)
-                speed = _rolled(climber, self._holds(climber), speed, before - weight, time)
-            known = self._holds(climber)
-            lowest = -known - mass * max(self.most + speed, 0.0) / period
-            highest = known + mass * max(self.most - speed, 0.0) / period
-        cut, turned = push - min(max(push, lowest), highest), 0.0
-        if self._pushes and not self._slides:
-            turned = moment - self._turning(climber, moment, period)
+                self.speed = self._rolled(climber, _push(climber, torques, sine), time)
+            speed, self.speed = self.speed, speed
+            holds, to_force = self._holds(climber), climber.driven_mass / period
+            lowest = -holds - to_force * max(self.most + speed, 0.0)
+            highest = holds + to_force * max(self.most - speed, 0.0)
+        cut = push - min(max(push, lowest), highest)
+        turned = moment - self._turning(climber, moment, period) if self.pushes else 0.0
         if abs(cut) + abs(turned) <= CUT:
             return command
-        most = climber.max_wheel_torque
-        off = climber.torques(cut, turned)
+        limit, less = climber.max_wheel_torque, climber.torques(cut, turned)
         right, left = (
-            min(max(it - less, -most), most) for it, less in zip(command.wheels, off, strict=True)
+            min(max(it - off, -limit), limit) for it, off in zip(command.wheels, less, strict=True)
         )
         lost = Wrench(command.lost.force + cut, command.lost.moment + turned)
         return command._replace(wheels=Torques(right, left), lost=lost)
 
-    def _holds(self, climber: Climber) -> float:
-        """Friction [N] that is known to hold it."""
-        friction = climber.seal_friction
-        return min(max(friction, self._friction), MOST_FRICTION * friction)
-
     def _turning(self, climber: Climber, moment: float, period: float) -> float:
         """A moment [N m], or what of it is given while no motion is told: none in a pause."""
-        if self._paused is not None:
+        if self.paused is not None:
             return 0.0
-        stopping = climber.driven_inertia / climber.half_track / period
-        lowest = -max(self.first + self.turn, 0.0) * stopping
-        return min(max(moment, lowest), max(self.first - self.turn, 0.0) * stopping)
+        to_moment = climber.driven_inertia / climber.half_track / period
+        lowest = -to_moment * max(self.first + self.turn, 0.0)
+        return min(max(moment, lowest), to_moment * max(self.first - self.turn, 0.0))
 
 
-def _rolled(climber: Climber, friction: float, speed: float, push: float, time: float) -> float:
-    """Speed [m/s] after a force [N] without weight has acted for a time [s]."""
-    if speed == 0 and abs(push) <= friction:
-        return 0.0
-    end = speed + time * (push - math.copysign(friction, speed or push)) / climber.driven_mass
-    return 0.0 if speed * end < 0 else end
+def _push(climber: Climber, torques: Torques, sine: float) -> float:
+    """Drive force [N] beside the one that carries the weight."""
+    force, _ = climber.wrench(*torques)
+    return force - climber.weight_along_wall * sine
+
+
+def _falls(climber: Climber) -> bool:
+    """Whether its weight is more than its seal holds: it does not come to rest by itself."""
+    return climber.seal_friction < climber.weight_along_wall

@@ -22,6 +22,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 TOO_FAST_IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
+RESTS = 1e-3  # [m/s] of a reference that does
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: a limit cycle
@@ -140,7 +141,7 @@ class Guard:
         self._followed += observed.time
         asked = expected.wanted.speed - climber.half_track * expected.wanted.yaw_rate
         self._actuators.add(climber, observed, self.options.response_time, asked)
-        given = self.budget.see(climber, observed, expected.allowed.speed)
+        given = self._watch_budget(climber, observed, expected)
         too_fast = self._watch_rates(climber, observed, expected)
         return (
             self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
@@ -150,6 +151,14 @@ class Guard:
             or self._watch_disturbance(climber, observed.disturbance)
             or given
         )
+
+    def _watch_budget(
+        self, climber: Climber, observed: Observed, expected: Expected
+    ) -> Trouble | None:
+        if self.options.stall_time == 0 or expected.wanted.speed < RESTS:
+            self.budget.pause()
+            return None
+        return self.budget.see(climber, observed, expected.allowed.speed)
 
     def _watch_rates(
         self, climber: Climber, observed: Observed, expected: Expected
