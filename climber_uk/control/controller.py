@@ -382,16 +382,15 @@ class Controller:
             at = partial(active.around, target, target_time)
             course = estimator.slip.course(self._law.climber, point, at)
             ahead, law = ahead._replace(course=course), self._law_for(target.is_gentle)
-            pending, budget = estimator.pending(ahead.begins), self.guard.budget
             command = law.command(ahead, point)
-            command = budget.within(command, law.climber, ahead.period, pending)
             lost = command.lost.force
             if abs(lost) > CUT and active.pacing.catch_up > 0:
                 target = active.slowed(
                     target, lost / law.climber.driven_mass, target_time, ahead.period
                 )
                 command = law.command(ahead, target.point or point)
-                command = budget.within(command, law.climber, ahead.period, pending)
+            pending = estimator.pending(ahead.begins)
+            command = self.guard.budget.within(command, law.climber, ahead.period, pending)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
