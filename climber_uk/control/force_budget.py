@@ -18,7 +18,7 @@ from climber_uk.mechanics.quantities import Torques, Wrench
 
 FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
 GROWS = 1.4  # from one push to the next
-MOST, PUSHES = 1.1, 5  # times what is allowed, and pushes, after which it is stalled
+MOST, PUSHES = 1.1, 6  # times what is allowed, and pushes, after which it is stalled
 SPENT = 0.8  # of it, from which it is used up
 FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing drives
 HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
