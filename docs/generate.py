@@ -36,7 +36,9 @@ ALL_ON = [  # what a node publishes and subscribes only if it is asked to
     "trajectory_publisher:by_hand.input:=twist_stamped",
     "uk_torque_controller:stops.emergency_stop:=true",
     "uk_torque_controller:stops.least_charge:=0.2",
+    "uk_torque_controller:least_suction.enabled:=true",
     "plant_simulator:simulated_time:=true",
+    "plant_simulator:setpoint_timeout:=0.5",
     "plant_simulator:imu.enabled:=true",
     "plant_simulator:fixes.period:=0.1",
 ]
@@ -44,6 +46,9 @@ UNSEEN = {  # that the node does not list, or publishes only where a package is 
     "uk_torque_controller": [("~/transition_event", "lifecycle_msgs/TransitionEvent")],
     "plant_simulator": [("/tf", "tf2_msgs/TFMessage")],
     "wall_odometry": [("/tf", "tf2_msgs/TFMessage")],
+}
+ACTIONS = {  # that the node has only where a package is installed
+    "trajectory_publisher": [(topics.FOLLOW_PATH, "nav2_msgs/FollowPath")],
 }
 EVERY_NODE = (
     topics.LOG,
@@ -60,6 +65,8 @@ CONTENTS = {
     topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
     topics.GIVEN_PATH: "2 to 50 000 places to drive through, in `odom`; orientations are not read",
+    topics.FOLLOW_PATH: "an action, where nav2_msgs is installed: a path as a goal, with feedback, "
+    "cancel and result",
     topics.REFERENCE_PATH: "the whole path, for display",
     topics.TORQUES: "`effort` [N m] and `velocity` [rad/s] by joint name, of which motors "
     "take one; the stamp is that of the odometry it answers",
@@ -67,6 +74,8 @@ CONTENTS = {
     topics.STICK: "of the controller: the speeds again, if `publish_cmd_vel`: forward, about z; of "
     "the planner: a stick's, by `by_hand.input`",
     topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
+    topics.SETPOINT: "least pressure difference [Pa] that margins need, for the pump, 20 Hz; with "
+    "`least_suction.enabled` of the controller, `setpoint_timeout` of the plant",
     topics.JOINTS: "angle [rad], rate [rad/s] and torque [N m] of the wheels; the controller reads "
     "them with `guard.encoder_distance`",
     topics.IMU: "yaw rate [rad/s] and specific force [m/s²], gravity in it: on a vertical "
@@ -201,6 +210,8 @@ def interfaces(nodes: list[ClimberNode]) -> str:
             )
         for service in node.services:
             lines += entry(node, "serves", service.service_name, type_name(service.srv_type), "")
+        for name, kind in ACTIONS.get(node.get_name(), ()):
+            lines += entry(node, "serves", name, kind, "")
     return "\n".join(lines) + "\n"
 
 
@@ -233,6 +244,8 @@ def security_policy(nodes: list[ClimberNode]) -> str:
             ("topic", "subscribe"): ["/clock", *(end.topic_name for end in node.subscriptions)],
             ("service", "reply"): [service.service_name for service in node.services],
         }
+        if actions := ACTIONS.get(node.get_name()):
+            named["action", "execute"] = [f"/{name}" for name, _ in actions]
         lines.append(f'    <enclave path="{own}">\n      <profiles>')
         lines.append(f'        <profile ns="/" node="{node.get_name()}">')
         for (kind, may), names in named.items():

@@ -41,7 +41,8 @@ def test_links_lead_somewhere(page):
 def test_files_that_are_named_are_there(page):
     named = re.findall(r"(?<![\w/.])((?:[a-z_]+/)+[\w.]+\.(?:py|c|yaml|md))\b", page.read_text())
     roots = ROOT, ROOT / "climber_uk", ROOT / "docs"
-    assert not [path for path in named if not any((root / path).exists() for root in roots)]
+    ours = [path for path in named if not path.startswith("run/")]  # else a command writes it
+    assert not [path for path in ours if not any((root / path).exists() for root in roots)]
 
 
 def test_the_index_has_each_page_once_with_what_it_tells():

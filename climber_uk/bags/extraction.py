@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from climber_uk.bags.batches import Batch
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.messages.reading import LARGEST, MOST_TILT, NORM_TOLERANCE, rotation_about_z
-from climber_uk.messages.topics import FORCE, MARGINS, ODOMETRY, PRESSURE, REFERENCE_TIME, TRUTH
+from climber_uk.messages.topics import (
+    FORCE,
+    MARGINS,
+    ODOMETRY,
+    PRESSURE,
+    REFERENCE_TIME,
+    SETPOINT,
+    TRUTH,
+)
 
 Faults = NDArray[np.intp]  # (n,) places in FAULTS
 FAULTS = (
@@ -69,7 +77,7 @@ EXTRACTORS: dict[str, Callable[[Batch], tuple[Array, Faults]]] = {
     ODOMETRY: _odometry,
     TRUTH: _odometry,
     REFERENCE_TIME: _behind,
-    PRESSURE: partial(_columns, ["fluid_pressure"]),
+    **dict.fromkeys((PRESSURE, SETPOINT), partial(_columns, ["fluid_pressure"])),
     FORCE: partial(_columns, ["wrench.force.x", "wrench.force.y", "wrench.torque.z"]),
     **dict.fromkeys(MARGINS, partial(_columns, ["vector.x", "vector.y", "vector.z"])),
 }

@@ -257,4 +257,7 @@ def _seconds(event: Event, odometry: TimeSeries, start: int) -> float:
     if stamp is not None and stamps[0] - tolerance <= stamp <= stamps[-1] + tolerance:
         return (stamp - start) / SECOND
     i = int(np.clip(np.searchsorted(arrivals, event.arrival), 1, len(stamps)) - 1)
-    return (int(stamps[i]) - start + event.arrival - int(arrivals[i])) / SECOND
+    since = event.arrival - int(arrivals[i])
+    if i + 1 < len(stamps):  # in lock-step, time may have stood still since then
+        since = min(since, int(stamps[i + 1] - stamps[i]))
+    return (int(stamps[i]) - start + since) / SECOND

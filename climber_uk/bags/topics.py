@@ -8,7 +8,8 @@ from climber_uk.messages.topics import ODOMETRY
 
 NAMES = (
     *(ODOMETRY, topics.TRUTH, topics.REFERENCE, topics.REFERENCE_TIME, topics.TORQUES),
-    *(topics.JOINTS, topics.PRESSURE, topics.PARAMETERS, topics.FORCE, *topics.MARGINS),
+    *(topics.JOINTS, topics.PRESSURE, topics.SETPOINT),
+    *(topics.PARAMETERS, topics.FORCE, *topics.MARGINS),
 )
 TYPES = {
     ODOMETRY: "nav_msgs/msg/Odometry",

@@ -13,11 +13,12 @@ from climber_uk.campaign.campaign import Campaign
 from climber_uk.campaign.counting import histograms, rank_correlations
 from climber_uk.campaign.limits import METRICS
 from climber_uk.campaign.parts import Store
-from climber_uk.campaign.results import broken, wilson
+from climber_uk.campaign.results import broken
 from climber_uk.closed_loop.node_parameters import PARAMETERS
 from climber_uk.mechanics import Array
 from climber_uk.messages.topics import PLANT
 from climber_uk.report.plotting import plt, saved
+from climber_uk.report.proportion import wilson
 
 POINTS = 5000  # in a scatter figure: the first runs, which are random as all are
 BARS = 60  # in a histogram

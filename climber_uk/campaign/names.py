@@ -31,6 +31,8 @@ REQUIRED = {
     f"{CONTROLLER}.least_pressure": 0.0,
     **{f"{CONTROLLER}.stops.{f.name}": f.default for f in dataclasses.fields(StopOptions)},
     f"{CONTROLLER}.adhesion": "suction",
+    f"{CONTROLLER}.wall": "plane",
+    f"{CONTROLLER}.plane.tilt": 0.0,
     f"{CONTROLLER}.controller": UDWADIA_KALABA,
     f"{CONTROLLER}.motors": "torque",
     f"{CONTROLLER}.observer.velocity_source": "odometry",

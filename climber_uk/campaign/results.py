@@ -13,17 +13,10 @@ from climber_uk.campaign.names import SEED
 from climber_uk.campaign.parts import Store
 from climber_uk.mechanics import Array
 from climber_uk.messages.topics import PLANT
+from climber_uk.report.proportion import wilson
 
 QUANTILES = {"lowest": 0.0, "1 %": 0.01, "50 %": 0.5, "99 %": 0.99, "highest": 1.0}
 WORST = 3  # runs that are reported for each limit
-
-
-def wilson(count: int, number: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a probability, of `count` events in `number` trials."""
-    from scipy.stats import binomtest  # slow to import
-
-    interval = binomtest(count, number).proportion_ci(confidence_level=0.95, method="wilson")
-    return float(interval.low), float(interval.high)
 
 
 def broken(limits: Sequence[Limit], batch: dict[str, Array]) -> Any:

@@ -98,7 +98,7 @@ class Loops:
         number = len(self.start.x)
         in_motion = np.any(self.start.speed) or np.any(self.start.yaw_rate)
         return LoopsState(
-            Estimator(self.law.climber, self.observer, self.timing),
+            Estimator(self.law.climber, self.observer, self.timing, wall=self.law.wall),
             Tally.begun(number, self.contact),
             self.sensors,
             self.start,

@@ -23,6 +23,8 @@ from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Sensors
 from climber_uk.simulation.simulated_robot import Parts, Physics, SimulatedRobot
 
+POINT_PERIOD = 0.05  # [s] of a reference, as trajectory_publisher's
+
 
 @dataclass(frozen=True)
 class Link:
@@ -101,9 +103,11 @@ def simulate(
     seed: int = 0,
     plant_of: Callable[[Climber, float], Plant] = Plant,
     robot_of: Callable[[Parts, State, float], SimulatedRobot] = SimulatedRobot,
+    point_period: float = POINT_PERIOD,
 ) -> Run:
     """Run of `duration` [s] from `start`; `climber` may change with time.
 
+    The reference has points every `point_period` [s].
     `plant_of` makes a plant from a climber and a step [s], `robot_of` the robot from parts, start
     and period [s]. `motors` makes torques (2,) [N m] from the state and the command in force, at
     every step. No torque acts before the first command, unless the climber starts in motion: then
@@ -111,7 +115,7 @@ def simulate(
     """
     random = np.random.default_rng(seed)
     climber_at = climber if callable(climber) else lambda _: climber
-    controlling.on_reference(0, sampled(trajectory, duration))
+    controlling.on_reference(0, sampled(trajectory, duration, point_period))
     arriving: deque[tuple[int, int, Motion]] = deque()  # step of arrival, stamp, odometry
     commanded: deque[tuple[int, Array]] = deque()  # step from which they act, torques
     acting: Array | None = None
@@ -148,9 +152,9 @@ def simulate(
     return Run(time[:, 0], pose, velocity, error, torques)
 
 
-def sampled(trajectory: Trajectory, duration: float) -> Preview:
-    """Preview of a whole trajectory that starts at 1 s, with points every 0.05 s."""
-    times = np.arange(0.0, duration + 2.0, 0.05)
+def sampled(trajectory: Trajectory, duration: float, point_period: float = POINT_PERIOD) -> Preview:
+    """Preview of a whole trajectory that starts at 1 s, with points every `point_period` [s]."""
+    times = np.arange(0.0, duration + 2.0, point_period)
     reference = trajectory.at(times)
     stamps = SECOND + np.round(times * SECOND).astype(np.int64)
     return Preview(stamps, reference.pose, reference.velocity, reference.acceleration)

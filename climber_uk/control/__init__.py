@@ -8,6 +8,6 @@ from top to bottom. What it tells: `estimator` (by the `model`; `timing`: when t
 `stops`, else the `safe_output`, which brakes by `polarity`. Where to: `active_reference`
 (`approach`, `time_scaling`). Which torques: `control_law`, with one of the `constraints` (which
 acceleration: `guidance`, `exact`, as `constraint_set` says); and which speeds of motors that take
-these, `speed_command`.
+these, `speed_command`. How little suction will do for it: `least_suction`.
 docs/architecture.md follows one odometry through it.
 """

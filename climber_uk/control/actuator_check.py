@@ -142,6 +142,7 @@ class ActuatorCheck:
         yaw_force = inertia * (after.yaw_rate - before.yaw_rate) / time / climber.half_track
         new = 1 - math.exp(-time / response_time)
         push, turn = observed.disturbance
+        push += observed.pull
         turn /= climber.half_track
         acted = (drive + yaw_force) / 2, (drive - yaw_force) / 2
         known = (push + turn) / 2, (push - turn) / 2

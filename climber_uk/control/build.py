@@ -17,6 +17,7 @@ from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import Timing
 from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.wall import WALLS, Plane
 from climber_uk.parameters.declaration import parameter, parameters
 
 T = TypeVar("T")
@@ -41,6 +42,9 @@ class ControllerChoice:
         choices=(UDWADIA_KALABA, *FORCE_LAWS),
     )
     adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
+    wall: str = parameter(
+        "plane", "", "its shape, by which the weight along it is known", choices=WALLS
+    )
 
 
 KINDS: list[tuple[type, str]] = [
@@ -51,6 +55,7 @@ KINDS: list[tuple[type, str]] = [
     (Pacing, "pacing."),
     (GuardOptions, "guard."),
     (StopOptions, "stops."),
+    *((kind, f"{name}.") for name, kind in WALLS.items()),
 ]
 """All that is read, with the prefix of its parameters."""
 
@@ -70,7 +75,9 @@ def settings(parameters: ParameterSource, pressure: float | None) -> Settings:
         raise ValueError(f"solver=closed_form must be generic for {name}, which gives rows")
     other = choice.controller
     force_law = read(FORCE_LAWS[other], f"{other}.") if other != UDWADIA_KALABA else None
-    law = ControlLaw(climber, constraints, options, force_law)
+    wall = read(WALLS[choice.wall], f"{choice.wall}.")
+    is_known = wall == Plane()  # by the climber's inclination alone
+    law = ControlLaw(climber, constraints, options, force_law, None if is_known else wall)
     observer, pacing = read(Observer, "observer."), read(Pacing, "pacing.")
     return Settings(law, observer, read(Timing), pacing, read(MotorBoard))
 

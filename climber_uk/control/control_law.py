@@ -17,7 +17,7 @@ from climber_uk.control.constraint_set import ConstraintSet, rows
 from climber_uk.control.model import predict
 from climber_uk.control.side_slip import Course
 from climber_uk.mechanics import SECOND, Array, pack, unpack
-from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
 from climber_uk.mechanics.quantities import (
     Bounds,
@@ -30,6 +30,7 @@ from climber_uk.mechanics.quantities import (
     along,
 )
 from climber_uk.mechanics.udwadia_kalaba import constraint_force
+from climber_uk.mechanics.wall import Wall, weight_beyond
 from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
@@ -148,6 +149,7 @@ class ControlLaw:
     constraints: ConstraintSet
     options: ControlOptions = field(default_factory=ControlOptions)
     other: ForceLaw | None = None  # in the constraints' place
+    wall: Wall | None = None  # None: a plane that is not tilted
 
     def target_time(self, situation: ControlInput) -> int:
         """Time [ns] for which a situation's torques are computed: that of its `target`."""
@@ -166,16 +168,22 @@ class ControlLaw:
         right, left = self._fixed_bounds or self._bounds(situation)
         solve, comes = self._solve, self.comes(target)
         drive, yaw_moment = climber.wrench(held.right, held.left)
+        wall, push, left_pull = self.wall, r_F, 0.0
+        if wall is not None:
+            push = r_F + weight_beyond(wall, climber, motion, ahead)[0]
         for _ in range(2 if ahead else 1):
-            force, moment = drive + r_F, yaw_moment + r_N
+            force, moment = drive + push, yaw_moment + r_N
             predicted = predict(climber, motion, force, moment, ahead, friction, turning, aside)
             force, moment, v_1, yaw_rate = solve(
                 prepared, predicted, comes, friction, turning, course
             )
+            if wall is not None:
+                forward_pull, left_pull = weight_beyond(wall, climber, predicted)
+                force = force - forward_pull
             force, moment = force - r_F, moment - r_N
             drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
         lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
-        lateral = climber.lateral_reaction(predicted)
+        lateral = climber.lateral_reaction(predicted) - left_pull
         demanded, wheels = Wrench(force, moment), Torques(tau_r, tau_l)
         return Command(wheels, demanded, lateral, lost, predicted, v_1, yaw_rate)
 
@@ -283,12 +291,39 @@ class ControlLaw:
     def braking(self, situation: ControlInput, braking: Braking) -> Torques:
         """Torques that carry the weight and brake what moves."""
         climber, motion = self.climber, situation.motion
-        weight = climber.weight_along_wall * motion.sine if braking.carries else 0.0
+        weight = self._weight(motion) if braking.carries else 0.0
         shaken, shaken_yaw = braking.shaking
         force = weight + climber.driven_mass * (shaken - braking.drive * motion.speed)
         turning = shaken_yaw / climber.half_track - braking.yaw * motion.yaw_rate
         moment = climber.driven_inertia * turning
         return Torques(*climber.saturate(force, moment, *self._bounds(situation))[2:4])
+
+    def _weight(self, motion: Motion) -> Any:
+        """Drive [N] that carries the weight."""
+        on_plane = self.climber.weight_along_wall * motion.sine
+        if self.wall is None:
+            return on_plane
+        return on_plane - weight_beyond(self.wall, self.climber, motion)[0]
+
+    def gravity(self, motion: Motion) -> tuple[Any, Any, Any]:
+        """Into the wall and along it [m/s²], and what the weight pulls to the left [N]."""
+        climber, wall = self.climber, self.wall
+        across = -climber.weight_along_wall * motion.cosine
+        if wall is None:
+            return climber.gravity_into_wall, climber.weight_along_wall / climber.mass, across
+        at = climber.inclination, motion.x, motion.y
+        speeds = motion.speed * motion.cosine, motion.speed * motion.sine
+        along_wall = GRAVITY * math.hypot(*wall.along(*at))
+        beyond = weight_beyond(wall, climber, motion)[1]
+        return float(wall.into(*at, *speeds)), along_wall, across + beyond
+
+    @property
+    def falls(self) -> bool:
+        """Whether its weight may be more than its seal holds."""
+        climber = self.climber
+        is_plane = self.wall is None
+        most = climber.weight_along_wall if is_plane else climber.mass * GRAVITY
+        return climber.seal_friction < most
 
     @cached_property
     def _solve(self) -> Solve:

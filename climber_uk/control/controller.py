@@ -86,7 +86,8 @@ class Controller:
         """`adhesion` is for the guard; `gentle` are the constraints of what begins at rest."""
         self.safety = safety or Safety()
         self._law, observer, timing, pacing, self.board = settings
-        self.estimator = Estimator(self._law.climber, observer, timing, self.safety)
+        law = self._law
+        self.estimator = Estimator(law.climber, observer, timing, self.safety, law.wall)
         self.active = ActiveReference(pacing, approach or Approach(), gentle or Guidance())
         self.guard = Guard(guard or GuardOptions(), adhesion or Suction())
         self.stops = stops or Stops()

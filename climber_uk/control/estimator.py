@@ -25,6 +25,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, select, sign
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
+from climber_uk.mechanics.wall import Wall, weight_beyond
 
 LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
 PERIOD_SMOOTHING = 0.1  # share of a new period in the mean
@@ -40,6 +41,7 @@ class Observed(NamedTuple):
     acted: Acting  # torques, and how long each [s]
     disturbance: Wrench  # as it was known before
     reaction: float  # [s] in which a torque can answer
+    pull: float = 0.0  # [N] forwards, of the weight beyond that on a plane: see `weight_beyond`
 
     @property
     def torques(self) -> Torques:
@@ -73,9 +75,15 @@ class Estimator:
     """
 
     def __init__(
-        self, climber: Climber, observer: Observer, timing: Timing, safety: Safety | None = None
+        self,
+        climber: Climber,
+        observer: Observer,
+        timing: Timing,
+        safety: Safety | None = None,
+        wall: Wall | None = None,
     ) -> None:
         self.climber, self.observer, self.timing, self.safety = climber, observer, timing, safety
+        self.wall = wall  # None: a plane that is not tilted
         self.period = timing.control_period  # [s] from one odometry to the next
         self._period_is_measured = False
         self._sent = TorqueHistory()
@@ -213,8 +221,11 @@ class Estimator:
         climber, learnt = self.climber, self.learnt
         r_F, r_N, resisting = learnt.force, learnt.moment, (learnt.friction, learnt.turning)
         aside = self.slip.speed(climber, motion) if self.slip is not NO_SLIP else 0.0
+        wall = self.wall
         for torques, time in acting:
             force, moment = climber.wrench(*torques)
+            if wall is not None:
+                force = force + weight_beyond(wall, climber, motion, time)[0]
             motion = predict(climber, motion, force + r_F, moment + r_N, time, *resisting, aside)
         return motion
 
@@ -224,7 +235,8 @@ class Estimator:
         """Correct what is `expected` at `stamp` [ns] by the `motion` that odometry gives."""
         time = (stamp - self.stamp) / SECOND
         reaction = self._delay + self.period / 2
-        observed = Observed(before, motion, time, acted, self.disturbance, reaction)
+        pull = 0.0 if self.wall is None else weight_beyond(self.wall, self.climber, motion)[0]
+        observed = Observed(before, motion, time, acted, self.disturbance, reaction, pull)
         has_twist = self.observer.velocity_source == "odometry" and isinstance(motion.x, float)
         bandwidth = self.observer.side_slip_bandwidth
         # speeds that come from poses share their noise, which would be learnt

@@ -82,6 +82,7 @@ class Polarities:
         force, moment = climber.wrench(*observed.torques)
         mass, inertia, friction, weight = climber.inertial
         force -= weight * after.sine + math.copysign(friction, after.speed)
+        force += observed.pull
         self.drive.add(force / mass * time, after.speed - before.speed, time)
         lever = climber.half_track
         turn = lever * (after.yaw_rate - before.yaw_rate)

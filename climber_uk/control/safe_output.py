@@ -73,7 +73,7 @@ class SafeOutput:
                 self.polarities.forget_unknown()
             since = None if self._doubted is None else stamp - self._doubted
             believed, signs = self._believed(mode, motion) if since is not None else (motion, None)
-            braking = self._braking(mode, climber, believed, signs, since)
+            braking = self._braking(mode, law, believed, signs, since)
             return _brake(estimator, law, age, braking, None if since is None else believed)
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
@@ -97,7 +97,7 @@ class SafeOutput:
     def _braking(
         self,
         mode: Mode,
-        climber: Climber,
+        law: ControlLaw,
         motion: Motion,
         doubtful: tuple[int, int] | None,
         doubted: int | None,
@@ -107,14 +107,14 @@ class SafeOutput:
         if doubtful is None or doubted is None:
             drive, yaw = (rate * (sign or 1) for sign in self.polarities.signs)
             # the other wheel can brake a turn, while the seal holds what it drives
-            holds = not _falls(climber)
+            holds = not law.falls
             if mode is Mode.DEAD_WHEEL and holds:
                 return Braking(0.0, yaw, carries=False)
             # nobody knows its heading where odometry is stuck
             return Braking(drive, yaw, carries=not (mode is Mode.STALLED and holds))
-        if _falls(climber) and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
+        if law.falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
             doubtful = doubtful[0] or 1, doubtful[1] or 1
-        rims = motion.speed, climber.half_track * motion.yaw_rate
+        rims = motion.speed, law.climber.half_track * motion.yaw_rate
         drive, yaw = (
             0.0 if sign or abs(rim) < SHAKEN else _shaking(doubted)
             for sign, rim in zip(doubtful, rims, strict=True)
@@ -134,14 +134,9 @@ def _let_go(estimator: Estimator, age: float) -> Torques:
     return NO_TORQUES
 
 
-def _falls(climber: Climber) -> bool:
-    """Whether its weight is more than its seal holds."""
-    return climber.seal_friction < climber.weight_along_wall
-
-
 def _coast(estimator: Estimator, law: ControlLaw, age: float) -> Torques:
     """Torques that brake nothing, and carry the weight where no seal holds it."""
-    if not _falls(law.climber):
+    if not law.falls:
         return _let_go(estimator, age)
     return _brake(estimator, law, age, Braking(0.0, 0.0), None)
 

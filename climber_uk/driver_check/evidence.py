@@ -171,6 +171,7 @@ class TrialRecord:
     highest: float  # [N m] limit of a wheel's torque in the trial
     silence: tuple[int, int] | None = None  # begin and end [ns] without commands
     trouble: str = ""  # why it was stopped before the end
+    hint: str = ""  # what to do about that
     takes_speeds: bool | None = False  # whether the board obeys rates; None: not found out
 
 

@@ -25,7 +25,7 @@ from climber_uk.driver_check.evidence import (
     WheelRates,
 )
 from climber_uk.driver_check.graph import graph, others_commanding
-from climber_uk.driver_check.trial import Bounds, Trial
+from climber_uk.driver_check.trial import AGAIN, Bounds, Trial
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages import reading, writing
@@ -187,7 +187,8 @@ class DriverNode(ClimberNode):
     def watch(self, trial: Trial) -> None:
         """Stop a trial if others command, nothing receives torques, or odometry has stopped."""
         if others := others_commanding(self):
-            trial.stop(f"{', '.join(others)} publishes wheel_torques")
+            hint = f"stop all that commands it besides, {AGAIN}"
+            trial.stop(f"{', '.join(others)} publishes wheel_torques", hint)
         elif not self.is_heard:
             trial.stop("nobody receives wheel_torques")
         silent = (time.monotonic_ns() - self.heard_at) / SECOND

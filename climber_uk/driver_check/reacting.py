@@ -12,12 +12,6 @@ from climber_uk.driver_check.report import Finding, failed, graded, passed, skip
 from climber_uk.driver_check.response import Response, pushed_on, response_of
 
 NOT_MOVED = skipped("only with --move")
-# by words of what has stopped a trial
-HINTS = {
-    "came late": "computer or network are too busy: end what else runs there, and try again",
-    "moves already": "stop it, hold it, and try again",
-    "publishes": "stop all that commands it besides, and try again",
-}
 
 
 def trial(seen: Evidence) -> Finding:
@@ -25,9 +19,7 @@ def trial(seen: Evidence) -> Finding:
     if seen.trial is None:
         return NOT_MOVED
     if seen.trial.trouble:
-        trouble = seen.trial.trouble
-        hints = (hint for words, hint in HINTS.items() if words in trouble)
-        return failed(f"stopped: {trouble}", next(hints, "look what has moved it, and try again"))
+        return failed(f"stopped: {seen.trial.trouble}", seen.trial.hint)
     if seen.trial.takes_speeds:
         return passed("steps of speed, and back")
     return passed(f"torques up to {_peak(seen):.2f} N m, of {seen.trial.highest:.2f} allowed")

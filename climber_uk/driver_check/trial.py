@@ -20,6 +20,8 @@ ORDER = True, False, False, True  # whether each pulse yaws, or drives
 # odometry is late by so much [s] or so many periods, whichever is more
 LATE, LATE_PERIODS = 0.02, 4
 TRIES = 20  # of stages in all, as a busy computer spoils some
+AGAIN = "and try again"
+LOOK = f"look what has moved it, {AGAIN}"  # if nothing better is known of a trial that stopped
 BACK = 0.005, 0.02  # [m], [rad] from its start at which the next pulse leads back
 
 
@@ -71,7 +73,7 @@ class Trial:
         self.takes_speeds: bool | None = None  # not known yet
         self.pulses: list[evidence.PulseTimes] = []
         self.silence: tuple[int, int] | None = None
-        self.trouble = ""
+        self.trouble, self.hint = "", LOOK
         self.start: State | None = None
         self.way = np.zeros(2)  # forward [m], turned [rad] since the start
         self.stage: Stage | None = self.pulse(ORDER[0])
@@ -82,7 +84,8 @@ class Trial:
         """The first stage that is not done yet; None if all are, or the trial is in trouble."""
         self.tries, self.spoilt, self.begun_at = self.tries + 1, False, 0
         if self.tries > TRIES:
-            self.stop(f"odometry came late in {TRIES - len(self.pulses)} of {TRIES} pulses")
+            late = f"odometry came late in {TRIES - len(self.pulses)} of {TRIES} pulses"
+            self.stop(late, f"computer or network are too busy: end what else runs there, {AGAIN}")
         if self.trouble:
             return None
         if len(self.pulses) < len(ORDER):
@@ -122,12 +125,15 @@ class Trial:
             self.limit,
             self.silence,
             self.trouble,
+            self.hint,
             self.takes_speeds,
         )
 
-    def stop(self, why: str) -> None:
+    def stop(self, why: str, hint: str = LOOK) -> None:
         """Command zero from now on; `why` is the trouble, unless there is one."""
-        self.stage, self.trouble = None, self.trouble or why
+        self.stage = None
+        if not self.trouble:
+            self.trouble, self.hint = why, hint
 
     def command(self, stamp: int, now: int, state: State) -> WheelCommand | None:
         """What answers an odometry; None: send nothing."""
@@ -153,7 +159,8 @@ class Trial:
             self.start = state
             speed, rate = np.median(np.abs(motion_of(self.heard[-REST_MESSAGES:]).reaction), axis=0)
             if speed > thresholds.STANDING_SPEED or rate > thresholds.STANDING_RATE:
-                self.stop(f"it moves already, with {speed:.2f} m/s and {rate:.2f} rad/s")
+                moves = f"it moves already, with {speed:.2f} m/s and {rate:.2f} rad/s"
+                self.stop(moves, f"stop it, hold it, {AGAIN}")
         way = state.pose - self.start.pose
         gone, turned = float(np.hypot(*way[:2])), wrapped(float(way[2]))
         self.way = np.array([along(self.start.heading, way), turned])

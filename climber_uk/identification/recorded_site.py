@@ -33,14 +33,18 @@ OF_SUCTION = ("seal_friction_coefficient", "wheel_load_share", "suction_pressure
 
 
 def site_of(controller: Parameters, plant: Parameters) -> Site:
-    """Wall of the plant, and whether there is a seal; raises `ValueError` for unknown names."""
-    wall = plant.get("wall", "plane")
+    """Wall of the plant, or else of the controller, and whether there is a seal.
+
+    Raises `ValueError` for unknown names.
+    """
+    values = {**controller, **plant}
+    wall = values.get("wall", "plane")
     if wall not in WALLS:
         raise ValueError(f"wall={wall!r} must be one of {', '.join(WALLS)}")
     adhesion = controller.get("adhesion", plant.get("adhesion", "suction"))
     if adhesion not in ADHESION:
         raise ValueError(f"adhesion={adhesion!r} must be one of {', '.join(ADHESION)}")
-    return Site(Values(plant).read(WALLS[wall], f"{wall}."), ADHESION[adhesion].has_seal)
+    return Site(Values(values).read(WALLS[wall], f"{wall}."), ADHESION[adhesion].has_seal)
 
 
 def differences(file: Parameters, recorded: Parameters, site: Site) -> Iterator[str]:
@@ -59,6 +63,6 @@ def assumed_away(controller: Parameters, plant: Parameters) -> Iterator[str]:
         value = plant.get(name, controller.get(name))
         if value is not None and violates(value):
             yield f"{name} is {value}: {follows}"
-    wall = plant.get("wall", "plane")
+    wall = plant.get("wall", controller.get("wall", "plane"))
     if wall != "plane":
         yield f"the wall is a {wall}, as the parameter file has it"

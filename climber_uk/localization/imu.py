@@ -66,7 +66,7 @@ class Imu:
         self._place = x, y
         self.stamp: int | None = None  # [ns] of the last sample
         self.period = 0.005  # [s] between two samples
-        self._yaw_rates: list[float] = []  # since the last encoders
+        self._samples: list[tuple[float, float]] = []  # since the last encoders
         self._is_used = False
         self._known = self._unused = 0.0  # [s]
         self._forwards, self._left = LowPass(), LowPass()
@@ -81,9 +81,9 @@ class Imu:
             self.period = min((stamp - self.stamp) * 1e-9, STALE)
         self.stamp = stamp
         if self._is_used:
-            self._yaw_rates.clear()
+            self._samples.clear()
         self._is_used = False
-        self._yaw_rates.append(yaw_rate)
+        self._samples.append((yaw_rate, forwards))
         self._known, self._unused = self._known + self.period, self._unused + self.period
         self._forwards.add(forwards, self.period)
         self._left.add(left, self.period)
@@ -98,12 +98,16 @@ class Imu:
             return False
         return (stamp - self.stamp) * 1e-9 >= 0.9 * self.period
 
-    def mean_yaw_rate(self) -> float:
-        """Mean yaw rate [rad/s] since the last call; without a sample since then, the last one."""
-        mean = sum(self._yaw_rates) / len(self._yaw_rates)
-        del self._yaw_rates[:-1]
+    def means(self) -> tuple[float, float]:
+        """Mean yaw rate [rad/s] and specific force forwards of the centre, less what ω̇ makes.
+
+        They are of all samples since the last call; without any, the last one.
+        """
+        number = len(self._samples)
+        yaw_rate, forwards = (sum(parts) / number for parts in zip(*self._samples, strict=True))
+        del self._samples[:-1]
         self._is_used = True
-        return mean
+        return yaw_rate, forwards + yaw_rate * yaw_rate * self._place[0]
 
     def weight(self, rolled: Rolled, yaw_rate: float) -> Weight | None:
         """Force of the weight after what was `rolled` at a `yaw_rate` [rad/s]; None: not yet."""

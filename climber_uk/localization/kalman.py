@@ -11,7 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.localization import models
-from climber_uk.localization.models import BIAS, CREEP, HEADING, SCALE, SIZE, Late, Travel
+from climber_uk.localization.models import (
+    BIAS,
+    CREEP,
+    HEADING,
+    PIVOT,
+    SCALE,
+    SCRUB,
+    SIZE,
+    Late,
+    Travel,
+)
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import Array
 
@@ -26,8 +36,8 @@ LEAST = 1e-18  # variance added to each, so that what is known exactly can be di
 class Estimate:
     """What is believed of the state, and how far that may be off."""
 
-    mean: Array  # (8,) as in `models`
-    covariance: Array  # (8, 8)
+    mean: Array  # (10,) as in `models`
+    covariance: Array  # (10, 10)
 
     def deviation(self, part: int) -> float:
         """Standard deviation of a part of the state."""
@@ -43,8 +53,10 @@ class Estimate:
         deviations[HEADING], deviations[BIAS] = o.initial_heading_deviation, o.gyro_bias_deviation
         deviations[SCALE], deviations[CREEP] = o.scale_deviation, o.creep_deviation
         deviations[models.FORCE_BIASES] = o.acceleration_bias_deviation
+        deviations[[SCRUB, PIVOT]] = o.scrub_deviation
         pose = o.initial_x, o.initial_y, o.initial_heading
-        mean = np.array([*pose, 0.0, 0.0, o.initial_creep, 0.0, 0.0])
+        scrub = o.initial_scrub, o.initial_pivot
+        mean = np.array([*pose, 0.0, 0.0, o.initial_creep, 0.0, 0.0, *scrub])
         return cls(mean, np.diag(deviations**2))
 
     def with_heading(self, heading: float, deviation: float, along_wall: float) -> "Estimate":
@@ -71,7 +83,7 @@ def predicted(estimate: Estimate, travel: Travel, options: LocalizationOptions) 
 def predicted_with_jacobian(
     estimate: Estimate, travel: Travel, options: LocalizationOptions
 ) -> tuple[Estimate, Array]:
-    """The same, and the derivative (8, 8) of its mean by the one before."""
+    """The same, and the derivative (10, 10) of its mean by the one before."""
     pull = models.share_along_wall(options)
     mean = models.advanced(estimate.mean, travel, pull)
     jacobian = models.advanced_jacobian(estimate.mean, travel, pull)
@@ -86,7 +98,7 @@ def predicted_with_jacobian(
 def corrected(
     estimate: Estimate, innovation: Array, jacobian: Array, noise: Array, limit: float = math.inf
 ) -> Estimate:
-    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 8).
+    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 10).
 
     One whose χ² is above `limit` counts for less, by as much as it is above.
     """

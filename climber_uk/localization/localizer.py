@@ -14,6 +14,7 @@ from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
 from climber_uk.localization.models import (
     BIAS,
     FORCE_BIASES,
+    FORWARD_BIAS,
     HEADING,
     SCALE,
     Travel,
@@ -24,6 +25,7 @@ from climber_uk.localization.models import (
 )
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.output_speed import OutputSpeed
+from climber_uk.localization.scrubbing import Push, Scrubbing
 from climber_uk.localization.smoothing import Smoothing
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
@@ -74,7 +76,8 @@ class Localizer:
         self._early: list[Fix] = []  # that are ahead of the encoders
         self._disagrees = 0.0  # [s]
         self._is_first = False  # whether gravity's first samples tell the heading, each anew
-        self._output = OutputSpeed(options.output_frequency)
+        self._scrubbing = Scrubbing()
+        self._output = OutputSpeed(options.output_frequency, options.scrubs)
 
     @property
     def estimate(self) -> Estimate:
@@ -128,11 +131,25 @@ class Localizer:
     def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
         assert self.stamp is not None
         is_gyro = self.imu.is_there(self.stamp)
-        yaw_rate = self.imu.mean_yaw_rate() if is_gyro else rolled.yaw_rate
+        yaw_rate, forwards = self.imu.means() if is_gyro else (rolled.yaw_rate, None)
         travel = Travel(rolled.duration, rolled.distance, rolled.path, yaw_rate, is_gyro)
+        if self.options.scrubs:
+            travel = self._scrubbed(rolled, travel, forwards)
         weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
+        if self._scrubbing.breaks_away:
+            weight = None
         counts = weight is not None and self.knows_heading and not weight.has_only_begun
         return Sample(travel, weight if counts else None, rolled.rests), weight
+
+    def _scrubbed(self, rolled: Rolled, travel: Travel, forwards: float | None) -> Travel:
+        """The travel of wheels that scrub, by the specific force forwards where there is one."""
+        options, mean, push = self.options, self.estimate.mean, None
+        yaw_rate = turn(float(mean[BIAS]), travel) / travel.duration
+        if forwards is not None and self.knows_heading:
+            weight = options.gravity_along_wall * math.sin(float(mean[HEADING]))
+            push = Push(forwards - float(mean[FORWARD_BIAS]) - weight, yaw_rate, options.imu_y)
+        turned = self._scrubbing.turned(yaw_rate, travel.duration)
+        return travel._replace(distance=self._scrubbing.distance(rolled, push), scrubbed=turned)
 
     def _watch_gravity(self, weight: Weight) -> None:
         """Take the heading from gravity where nothing else tells it, or all tells another one."""

@@ -1,13 +1,17 @@
 """How the state goes on, and what sensors show of it, with Jacobians (docs/localization.md).
 
-    x = (x, y, θ, b, σ, κ, β_x, β_y)   pose; gyro's bias; encoders' scale error; creep;
-                                       accelerometer's biases, forwards and to the left
+    x = (x, y, θ, b, σ, κ, β_x, β_y, λ, a)   pose; gyro's bias; encoders' scale error; creep;
+                                             accelerometer's biases, forwards and to the left;
+                                             scrub; pivot
 
     s = S (1 - σ)   α = (ω_gyro - b) Δt   over a way of signed length S and length |S|
-    x⁺ = x + s cos(θ + α/2)   y⁺ = y + s sin(θ + α/2) - κ p |S|   θ⁺ = θ + α
+    ψ = θ + α/2     u = p (a α sinψ - λ |α| cosψ)   to the left   p = sin(inclination)
+    x⁺ = x + s cosψ - u sinψ   y⁺ = y + s sinψ + u cosψ - κ p |S|   θ⁺ = θ + α
 
 A wheel under load gives way in proportion to its force. Of the weight's part of that, along
--sinθ and across -cosθ in the body's frame, is left -κ p |S| along y; p = sin(inclination).
+-sinθ and across -cosθ in the body's frame, is left -κ p |S| along y. Wheels that scrub are dragged
+round as the climber turns, and give way to a side by the angle turned, whichever way (λ); and as
+the weight loads the lower ones, it turns about a point that is a sinθ behind its centre.
 """
 
 import math
@@ -19,8 +23,8 @@ from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY
 
-X, Y, HEADING, BIAS, SCALE, CREEP, FORWARD_BIAS, LEFT_BIAS = range(8)
-SIZE = 8
+X, Y, HEADING, BIAS, SCALE, CREEP, FORWARD_BIAS, LEFT_BIAS, SCRUB, PIVOT = range(10)
+SIZE = 10
 FORCE_BIASES = [FORWARD_BIAS, LEFT_BIAS]
 
 
@@ -32,6 +36,7 @@ class Travel(NamedTuple):
     path: float  # |S| [m], that of turning on the spot included
     yaw_rate: float  # [rad/s], of the gyro, else of the wheels
     is_gyro: bool  # whether it is the gyro's: biased
+    scrubbed: float = 0.0  # |α| [rad], whichever way, of wheels that scrub
 
 
 class Late(NamedTuple):
@@ -42,21 +47,16 @@ class Late(NamedTuple):
 
 
 def advanced(state: Array, travel: Travel, pull: float) -> Array:
-    """State (8,) after a `travel`; `pull` is p, the share of gravity along the wall."""
-    x, y, heading, bias, scale, creep, *force_biases = state.tolist()
+    """State (10,) after a `travel`; `pull` is p, the share of gravity along the wall."""
+    x, y, heading, bias, scale, creep, _, _, scrub, pivot = state.tolist()
     angle, way = turn(bias, travel), travel.distance * (1 - scale)
-    middle = heading + angle / 2
-    return np.array(
-        [
-            x + way * math.cos(middle),
-            y + way * math.sin(middle) - creep * pull * travel.path,
-            heading + angle,
-            bias,
-            scale,
-            creep,
-            *force_biases,
-        ]
-    )
+    cosine, sine = math.cos(heading + angle / 2), math.sin(heading + angle / 2)
+    aside = pull * (pivot * sine * angle - scrub * cosine * travel.scrubbed)
+    after = state.copy()
+    after[X] = x + way * cosine - aside * sine
+    after[Y] = y + way * sine + aside * cosine - creep * pull * travel.path
+    after[HEADING] = heading + angle
+    return after
 
 
 def turn(bias: float, travel: Travel) -> float:
@@ -65,15 +65,22 @@ def turn(bias: float, travel: Travel) -> float:
 
 
 def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
-    """Derivative (8, 8) of `advanced` by the state."""
-    _, _, heading, bias, scale, *_ = state.tolist()
-    way, middle = travel.distance * (1 - scale), heading + turn(bias, travel) / 2
+    """Derivative (10, 10) of `advanced` by the state."""
+    _, _, heading, bias, scale, *_, scrub, pivot = state.tolist()
+    angle, way = turn(bias, travel), travel.distance * (1 - scale)
+    middle = heading + angle / 2
     cosine, sine = math.cos(middle), math.sin(middle)
     angle_by_bias = -travel.duration if travel.is_gyro else 0.0
+    sag, swing = pull * travel.scrubbed, pull * angle
     jacobian = np.eye(SIZE)
-    jacobian[X, HEADING], jacobian[Y, HEADING] = -way * sine, way * cosine
-    jacobian[X, BIAS] = -way * sine * angle_by_bias / 2
-    jacobian[Y, BIAS] = way * cosine * angle_by_bias / 2
+    jacobian[X, SCRUB], jacobian[Y, SCRUB] = sag * cosine * sine, -sag * cosine * cosine
+    jacobian[X, PIVOT], jacobian[Y, PIVOT] = -swing * sine * sine, swing * sine * cosine
+    double, doubled = math.cos(2 * middle), math.sin(2 * middle)
+    jacobian[X, HEADING] = -way * sine + scrub * sag * double - pivot * swing * doubled
+    jacobian[Y, HEADING] = way * cosine + scrub * sag * doubled + pivot * swing * double
+    jacobian[: HEADING + 1, BIAS] = jacobian[: HEADING + 1, HEADING] * angle_by_bias / 2
+    jacobian[X, BIAS] -= pull * pivot * sine * sine * angle_by_bias
+    jacobian[Y, BIAS] += pull * pivot * sine * cosine * angle_by_bias
     jacobian[HEADING, BIAS] = angle_by_bias
     jacobian[X, SCALE], jacobian[Y, SCALE] = -travel.distance * cosine, -travel.distance * sine
     jacobian[Y, CREEP] = -pull * travel.path
@@ -81,7 +88,7 @@ def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
 
 
 def process_noise(travel: Travel, options: LocalizationOptions) -> Array:
-    """Variances (8,) that a `travel` adds."""
+    """Variances (10,) that a `travel` adds."""
     way = options.way_noise**2 * travel.path
     if travel.is_gyro:
         angle = options.gyro_noise**2 * travel.duration
@@ -92,7 +99,7 @@ def process_noise(travel: Travel, options: LocalizationOptions) -> Array:
     bias = options.gyro_bias_walk**2 * travel.duration
     scale = 2 * options.scale_deviation**2 * travel.duration / options.scale_time
     force = options.acceleration_bias_walk**2 * travel.duration
-    return np.array([way, way, angle, bias, scale, 0.0, force, force])
+    return np.array([way, way, angle, bias, scale, 0.0, force, force, 0.0, 0.0])
 
 
 def gravity(state: Array, late: Late, along_wall: float) -> Array:
@@ -104,7 +111,7 @@ def gravity(state: Array, late: Late, along_wall: float) -> Array:
 
 
 def gravity_jacobian(state: Array, late: Late, along_wall: float) -> Array:
-    """Derivative (2, 8) of `gravity` by the state."""
+    """Derivative (2, 10) of `gravity` by the state."""
     heading = earlier_heading(state, late)
     jacobian = np.zeros((2, SIZE))
     jacobian[:, HEADING] = along_wall * math.cos(heading), -along_wall * math.sin(heading)
@@ -124,7 +131,7 @@ def fixed(state: Array, lever: tuple[float, float]) -> Array:
 
 
 def fixed_jacobian(state: Array, lever: tuple[float, float]) -> Array:
-    """Derivative (3, 8) of `fixed` by the state."""
+    """Derivative (3, 10) of `fixed` by the state."""
     jacobian, away = np.eye(HEADING + 1, SIZE), fixed(state, lever) - state[: HEADING + 1]
     jacobian[X, HEADING], jacobian[Y, HEADING] = -away[Y], away[X]
     return jacobian

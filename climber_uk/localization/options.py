@@ -46,6 +46,13 @@ class LocalizationOptions:
     creep_deviation: float = parameter(
         0.03, "", "of what the climber sags on a vertical wall, by the way rolled", at_least=0
     )
+    scrub_deviation: float = parameter(
+        0.0,
+        "m",
+        "of how far wheels that scrub give way by an angle (λ, a); 0: they do not scrub",
+        at_least=0,
+        plausible=(0.0, 1.0),
+    )
     way_noise: float = parameter(
         0.001, "m/√m", "deviation of the position after a metre, else unexplained", at_least=0
     )
@@ -60,6 +67,12 @@ class LocalizationOptions:
         "creep at the start, as `localize` has told of an earlier run",
         at_least=-1,
         at_most=1,
+    )
+    initial_scrub: float = parameter(
+        0.0, "m", "λ at the start: sag to a side by the angle turned, as `localize` has told"
+    )
+    initial_pivot: float = parameter(
+        0.0, "m", "a at the start: how far below the centre it turns, as `localize` has told"
     )
     initial_heading: float = parameter(0.0, "rad", "heading at the start")
     initial_position_deviation: float = parameter(
@@ -96,6 +109,11 @@ class LocalizationOptions:
     output_frequency: float = parameter(
         100.0, "rad/s", "W of the output's speeds: lower is smoother, and later", above=0
     )
+
+    @cached_property
+    def scrubs(self) -> bool:
+        """Whether wheels scrub in turns."""
+        return self.scrub_deviation > 0 or self.initial_scrub != 0
 
     @cached_property
     def turning_lever(self) -> float:

@@ -13,6 +13,7 @@ import math
 from climber_uk.localization.imu import Mean
 
 GYRO_TIME = 0.2  # [s]
+SCRUBBING_TIME = 0.01  # [s] of wheels that scrub: their turns tell hardly more than gyros do
 
 
 class Rate:
@@ -38,10 +39,12 @@ class Rate:
 class OutputSpeed:
     """Goes on from one sample of the encoders to the next."""
 
-    def __init__(self, frequency: float) -> None:
-        """With a filter's W [rad/s]."""
+    def __init__(self, frequency: float, scrubs: bool = False) -> None:
+        """With a filter's W [rad/s], of wheels that roll or scrub."""
         self._speed, self._yaw_rate = Rate(frequency), Rate(frequency)
-        self._lag = Mean(GYRO_TIME)  # [rad/s] by which the wheels' yaw rate is below the gyro's
+        self._lag = Mean(
+            SCRUBBING_TIME if scrubs else GYRO_TIME
+        )  # [rad/s] by which the wheels' yaw rate is below the gyro's
 
     def go_on(
         self, distance: float, wheels: float, gyro: float, duration: float

@@ -2,9 +2,10 @@
 
 The climber: `quantities` (what is told of it), `climber` (its equations), `adhesion`, `friction`,
 `contact`, `wall`; `udwadia_kalaba` for any system. Its path: `shapes`, or `waypoints` of a file
-(`waypoint_file`, `rounding`, `slowing`), or `lanes` over an `area`, by `time_laws` is a
-`trajectory` (from parameters: `trajectory_parameters`; in numbers: `summary`). Its points are each
-a `reference`, and sent ahead a `preview`.
+(`waypoint_file`, `rounding`, `slowing`), or `lanes` over an `area`, by `time_laws`
+(`fastest_law`) is a `trajectory` (from parameters: `trajectory_parameters`; in numbers:
+`summary`). Its points are each a `reference`, which asks a `demand` of the wheels, and sent ahead a
+`preview`.
 Arithmetic of one number or of many: `elementary`, `many`; see docs/architecture.md for its rules.
 """
 

@@ -1,7 +1,7 @@
 """Time laws: how far along its shape the climber is at a time, s(t) with three derivatives.
 
-A new law is one class, a `TimeLaw` with `rate` as a field, and one entry in `TIME_LAWS`, or an
-entry point `climber_uk.time_laws` of another package.
+A new law is one class, a `TimeLaw` with `rate` as a field or 0, and one entry in `TIME_LAWS`, or
+an entry point `climber_uk.time_laws` of another package.
 """
 
 import math
@@ -12,6 +12,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives
+from climber_uk.mechanics.fastest_law import Fastest
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
@@ -136,7 +137,7 @@ class RestToRest(TimeLaw):
 
 
 TIME_LAWS = Variants[type[TimeLaw]](
-    {"constant_rate": ConstantRate, "rest_to_rest": RestToRest}, "time_laws"
+    {"constant_rate": ConstantRate, "rest_to_rest": RestToRest, "fastest": Fastest}, "time_laws"
 )
 
 

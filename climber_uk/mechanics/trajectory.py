@@ -29,6 +29,7 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         if self.law.stops:
+            _ = self.duration  # raises if the law is none for this path
             return
         if not self.shape.closed:
             raise ValueError(f"time_law {self.law} runs off an open shape: use 'rest_to_rest'")
@@ -51,20 +52,20 @@ class Trajectory:
 
     def at(self, time: Array | float) -> Reference:
         """Reference at `time` (...) [s] since the start."""
-        return self._travelled(self.law.progress(np.asarray(time, dtype=float), self.course))
+        return self.at_progress(self.law.progress(np.asarray(time, dtype=float), self.course))
 
     def at_own_time(self, own_time: Derivatives) -> Reference:
         """Reference (...) at the law's time (...) [s], which goes on with these derivatives."""
         u, *rates = own_time
         progress = self.law.progress(np.asarray(u, dtype=float), self.course)
-        return self._travelled(compose(progress, tuple(rates)))  # type: ignore[arg-type]
+        return self.at_progress(compose(progress, tuple(rates)))  # type: ignore[arg-type]
 
     def path(self, points: int) -> Array:
         """Poses (points, 3) [m, rad], even in the path parameter, once along the shape."""
         s = np.linspace(0, self.course.length, points)
-        return self._travelled((s, np.ones_like(s), 0 * s, 0 * s)).pose
+        return self.at_progress((s, np.ones_like(s), 0 * s, 0 * s)).pose
 
-    def _travelled(self, progress: Derivatives) -> Reference:
+    def at_progress(self, progress: Derivatives) -> Reference:
         """Reference (...) of s and its derivatives by time (...), by the chain rule."""
         s, *rates = progress
         s_1, s_2, s_3 = (rate[..., None] for rate in rates)

@@ -15,8 +15,9 @@ origin, and across them by (x² + y²)/6R² too long, which is neglected. A new 
 import math
 from typing import Any, ClassVar, Protocol
 
-from climber_uk.mechanics.climber import DEGREE, GRAVITY
+from climber_uk.mechanics.climber import DEGREE, GRAVITY, Climber
 from climber_uk.mechanics.elementary import cos, select, sin, sqrt
+from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
 
@@ -164,6 +165,25 @@ class Sphere(Wall):
         far = sqrt(x * x + y * y)
         safe = select(far > 0, far, 1.0)
         return x / safe, y / safe, far
+
+
+PLANE = Plane()  # that is not tilted
+
+
+def weight_beyond(
+    wall: Wall, climber: Climber, motion: Motion, time: float = 0.0
+) -> tuple[Any, Any]:
+    """What the weight pulls forwards and to the left [N] beyond its part on an untilted plane.
+
+    In the middle of the next `time` [s], at the speeds of now.
+    """
+    way, turn = 0.5 * time * motion.speed, 0.5 * time * motion.yaw_rate
+    cosine, sine = motion.cosine - turn * motion.sine, motion.sine + turn * motion.cosine
+    x, y = motion.x + way * motion.cosine, motion.y + way * motion.sine
+    s_x, s_y = wall.along(climber.inclination, x, y)
+    weight = climber.mass * GRAVITY
+    x, y = weight * s_x, weight * s_y + climber.weight_along_wall
+    return x * cosine + y * sine, y * cosine - x * sine
 
 
 def _turned(inclination: Any, ahead: Any, angle: Any) -> tuple[Any, Any]:

@@ -1,5 +1,6 @@
 """A path through waypoints: the polyline of a file with its corners rounded, slow in its bends."""
 
+import math
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from operator import itemgetter
@@ -281,6 +282,11 @@ class SlowedPath:
         legs, place = self.path.legs, self._progress(s)[0]
         leg = np.searchsorted(legs, place + 1e-9 * legs[-1], "right") - 1
         return self.path.numbers[np.clip(leg, 0, len(legs) - 2)]
+
+    def leg_speed(self, s: Array) -> Array:
+        """Most speed (...) [m/s] that is said of the points before s (...); infinite if none is."""
+        place, *_ = self._progress(s)
+        return SpeedLimits(0.0, math.inf, math.inf, self.placed.legs).speed(place)
 
     def derivatives(self, s: Array) -> tuple[Array, Array, Array, Array]:
         """See `Shape`."""

@@ -1,15 +1,19 @@
-"""The places of a serialised nav_msgs/Path; no ROS needed.
+"""The places of a nav_msgs/Path, serialised or not; no ROS needed.
 
 rclpy takes seconds for 50 000 poses, in which no other message is heard.
 """
 
 import math
 import struct
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.messages.reading import LARGEST
+
+if TYPE_CHECKING:
+    from nav_msgs.msg import Path
 
 MOST_POSES = 50_000
 HEAD = 4  # [bytes] of the encapsulation, before which nothing is aligned
@@ -23,13 +27,41 @@ def path_points(data: bytes, odom_frame: str) -> Array:
     """
     try:
         frame, number, at = _header(data)
-        if frame != odom_frame:
-            raise ValueError(f"frame_id={frame!r} must be {odom_frame!r}")
-        if not 2 <= number <= MOST_POSES:
-            raise ValueError(f"{number} pose(s), want 2 to {MOST_POSES}")
+        _check(frame, number, odom_frame)
         return _places(data, number, at, odom_frame)
     except (struct.error, UnicodeDecodeError, IndexError):
         raise ValueError("not a serialised Path") from None
+
+
+def message_points(message: "Path", odom_frame: str) -> Array:
+    """The same of a message."""
+    _check(message.header.frame_id, len(message.poses), odom_frame)
+    places = []
+    for i, stamped in enumerate(message.poses, start=1):
+        frame, place = stamped.header.frame_id, stamped.pose.position
+        if frame and frame != odom_frame:
+            raise _wrong_frame(i, frame, odom_frame)
+        places.append(_checked(i, place.x, place.y))
+    return np.array(places)
+
+
+def _check(frame: str, number: int, odom_frame: str) -> None:
+    if frame != odom_frame:
+        raise ValueError(f"frame_id={frame!r} must be {odom_frame!r}")
+    if not 2 <= number <= MOST_POSES:
+        raise ValueError(f"{number} pose(s), want 2 to {MOST_POSES}")
+
+
+def _wrong_frame(i: int, frame: str, odom_frame: str) -> ValueError:
+    return ValueError(f"pose {i}: frame_id={frame!r} must be {odom_frame!r}")
+
+
+def _checked(i: int, x: float, y: float) -> tuple[float, float]:
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise ValueError(f"pose {i} at ({x:g}, {y:g}) is not finite")
+    if max(abs(x), abs(y)) > LARGEST:
+        raise ValueError(f"pose {i} at ({x:g}, {y:g}) must be within {LARGEST:g} m")
+    return x, y
 
 
 def _header(data: bytes) -> tuple[str, int, int]:
@@ -53,14 +85,9 @@ def _places(data: bytes, number: int, at: int, odom_frame: str) -> Array:
         (size,) = size_of(data, at)
         at += 4
         if size > 1 and data[at : at + size] != own:
-            raise ValueError(f"pose {i}: frame_id={_text(data, at, size)!r} must be {odom_frame!r}")
+            raise _wrong_frame(i, _text(data, at, size), odom_frame)
         at = _aligned(at + size, 8)
-        x, y = place_of(data, at)
-        if not (math.isfinite(x) and math.isfinite(y)):
-            raise ValueError(f"pose {i} at ({x:g}, {y:g}) is not finite")
-        if max(abs(x), abs(y)) > LARGEST:
-            raise ValueError(f"pose {i} at ({x:g}, {y:g}) must be within {LARGEST:g} m")
-        places.append((x, y))
+        places.append(_checked(i, *place_of(data, at)))
         at += POSE
     if at > len(data):
         raise struct.error

@@ -5,7 +5,7 @@ from math import inf
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import SetBool, Trigger
 
 from climber_uk.mechanics import SECOND, Array
@@ -13,7 +13,15 @@ from climber_uk.mechanics.adhesion import Alarm
 from climber_uk.mechanics.quantities import NO_TORQUES
 from climber_uk.messages import reading
 from climber_uk.messages.in_place import NumberReader
-from climber_uk.messages.topics import JOINTS, ODOMETRY, PLANT, PUSH, REFERENCE, TORQUES
+from climber_uk.messages.topics import (
+    JOINTS,
+    ODOMETRY,
+    PLANT,
+    PUSH,
+    REFERENCE,
+    SETPOINT,
+    TORQUES,
+)
 from climber_uk.ros import plant_parts
 from climber_uk.ros.margins import Margins
 from climber_uk.ros.plant_time import PlantTime
@@ -51,6 +59,8 @@ class PlantSimulator(ClimberNode):
         self.read_torques = NumberReader(JointState, *obeyed)
         self.subscription(JointState, TORQUES, self.on_torques, raw=True)
         self.subscription(WrenchStamped, PUSH, self.on_push)
+        if self.options.setpoint_timeout > 0:
+            self.subscription(FluidPressure, SETPOINT, self.on_setpoint)
         self.create_service(Trigger, "~/reset", self.on_reset)
         self.create_service(SetBool, "~/pause", self.on_pause)
         self.create_service(Trigger, "~/step", self.on_step)
@@ -86,6 +96,8 @@ class PlantSimulator(ClimberNode):
         timeout = 0.0 if self.options.simulated_time else self.options.command_timeout
         self.commands: CommandBuffer[Array] = CommandBuffer(round(timeout * SECOND))
         self.pushes: CommandBuffer[Push] = CommandBuffer(round(self.options.push_timeout * SECOND))
+        timeout = self.options.setpoint_timeout
+        self.setpoints: CommandBuffer[float] = CommandBuffer(round(timeout * SECOND))
         self.fallen = self.answered = False
         self.sensors = plant_parts.field_sensors(self.parameters)
         self.sense(self.time.stamp)
@@ -127,6 +139,18 @@ class PlantSimulator(ClimberNode):
         self.report(PUSH, "")
         begin = reading.nanoseconds(message.header.stamp) or self.time.stamp
         self.pushes.add(begin, Push(*wrench))
+
+    def on_setpoint(self, message: FluidPressure) -> None:
+        """Set the pump, from now on until the setpoint is too old."""
+        try:
+            if self.exclusive:
+                self.check_alone(SETPOINT)
+            pressure = reading.pressure(message)
+        except ValueError as error:
+            self.report(SETPOINT, "refused", str(error))
+            return
+        self.report(SETPOINT, "")
+        self.setpoints.add(self.time.stamp, pressure)
 
     def on_torques(self, serialized: bytes) -> None:
         """Let a command act from now on; in lock-step only if it answers the last odometry."""
@@ -187,6 +211,8 @@ class PlantSimulator(ClimberNode):
 
     def advance(self) -> None:
         """Advance by a control period and measure; a climber that falls is `fallen` then."""
+        self.robot.setpoint, is_stale = self.setpoints.at(self.time.stamp)
+        self.report("suction setpoint", "stale; full pressure instead" if is_stale else "")
         try:
             for number in range(0 if self.waits else self.options.steps):
                 time = self.time.stamp + number * self.time.period // self.options.steps

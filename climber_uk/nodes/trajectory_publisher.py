@@ -17,9 +17,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.summary import summary
-from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
-from climber_uk.mechanics.waypoints import Rounding
 from climber_uk.messages import reading, writing
 from climber_uk.messages.references import ReferenceWriter, Row
 from climber_uk.messages.topics import (
@@ -40,6 +38,7 @@ from climber_uk.planning.events import Events
 from climber_uk.planning.given_path import Manner
 from climber_uk.planning.journey import BACK, HAND, PATH, Journey, Said
 from climber_uk.planning.progress import BY_HAND, FOLLOWING, WAITING, Odometer, Progress, progress
+from climber_uk.ros.path_goals import path_goals
 from climber_uk.ros.path_intake import PathIntake
 from climber_uk.ros.running import (
     BEST_EFFORT,
@@ -71,6 +70,13 @@ class PublisherOptions:
         at_least=0.01,
         at_most=1,
         runtime=True,
+    )
+    goal_patience: float = parameter(
+        10.0,
+        "s",
+        "for which a goal of follow_path may not begin or be followed, until it fails",
+        above=0,
+        plausible=(0.5, 600),
     )
 
 
@@ -105,6 +111,8 @@ class TrajectoryPublisher(ClimberNode):
         self.subscription(TimeReference, REFERENCE_TIME, self.on_reference_time)
         self.subscription(Float64, "~/speed", self.on_speed)
         self.given = PathIntake(self, GIVEN_PATH, self.manner)
+        patience = self.parameters.read(PublisherOptions).goal_patience
+        self.goals = path_goals(self, self.journey, self.given, patience)
         listen_to_stick(self, hand.input, self.on_stick)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
@@ -125,12 +133,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def manner(self) -> Manner:
         """How a path is driven that comes from outside: as waypoints would be."""
-        law = self.parameters.read(TrajectoryParameters).time_law
-        return Manner(
-            rounding=self.parameters.read(Rounding, "waypoints."),
-            law=self.parameters.read(TIME_LAWS[law], f"{law}."),
-            reverse_gear=self.journey.planned.reverse_gear,
-        )
+        return Manner.by(self.parameters.read, self.journey.planned.reverse_gear)
 
     # What an operator asks for
 
@@ -209,7 +212,7 @@ class TrajectoryPublisher(ClimberNode):
 
     def on_odometry(self, message: Odometry) -> None:
         """Start the trajectory `start_delay` after the stamp of `message`."""
-        if self.odometry is None:
+        if self.odometry is None or self.journey.is_halted:
             return
         now, stamp = self.get_clock().now().nanoseconds, reading.nanoseconds(message.header.stamp)
         try:
@@ -245,6 +248,8 @@ class TrajectoryPublisher(ClimberNode):
         if under_way and is_of_now and under_way.start <= followed <= stamp + SECOND:
             self.followed, self.mode = followed, message.source
             self.tell_events(stamp)
+            if self.goals is not None:
+                self.goals.hear(self.mode, now)
 
     @property
     def position(self) -> int:
@@ -285,6 +290,9 @@ class TrajectoryPublisher(ClimberNode):
                 self.tell_events(now)
             if self.journey.waits_for_rest:
                 self.begin(self.journey.next)
+        if self.goals is not None:
+            is_starting = self.odometry is not None or self.journey.waits_for_rest
+            self.goals.look(now, self.position, is_starting)
         if self.is_progress_due(now) and self.progress.get_subscription_count():
             self.publish_progress(now)
 

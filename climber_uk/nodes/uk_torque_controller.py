@@ -16,6 +16,7 @@ from climber_uk.control.build import KINDS, ControllerChoice, build_controller, 
 from climber_uk.control.constraints import UDWADIA_KALABA
 from climber_uk.control.control_law import Command
 from climber_uk.control.controller import Answer
+from climber_uk.control.least_suction import SuctionOptions
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
@@ -52,6 +53,7 @@ from climber_uk.ros.running import (
     Throttle,
     run,
 )
+from climber_uk.ros.suction_setpoint import SuctionSetpoint
 
 LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points, which take a quarter of a second to read
 
@@ -78,7 +80,8 @@ class UkTorqueController(ManagedNode):
     def __init__(self) -> None:
         super().__init__(CONTROLLER)
         parts = [(kind, f"{name}.") for name, kind in ADHESION.items()]
-        for kind, prefix in [*KINDS, (NodeOptions, ""), (Grip, ""), (Alarm, ""), *parts]:
+        others = (NodeOptions, ""), (Grip, ""), (Alarm, ""), (SuctionOptions, "least_suction.")
+        for kind, prefix in [*KINDS, *others, *parts]:
             self.parameters.declare(kind, prefix)
         self.be_exclusive()
         self.parameters.refuse_unknown("the paper's scenario, up to 20 N m a wheel")
@@ -111,6 +114,10 @@ class UkTorqueController(ManagedNode):
         self.force = Output(force, wrench, writing.WRENCH)
         disturbance = self.publisher(WrenchStamped, "~/disturbance")
         self.disturbance = Output(disturbance, wrench, writing.WRENCH)
+        self.setpoint: SuctionSetpoint | None = None
+        if (suction := self.parameters.read(SuctionOptions, "least_suction.")).enabled:
+            climber = self.parameters.read(Climber)
+            self.setpoint = SuctionSetpoint(self, suction, climber, self.attachment)
         self.reference_time = self.publisher(TimeReference, REFERENCE_TIME)
         self.positions: dict[Mode, Output] = {}  # on this topic, which tells the mode
         self.parameter_values = self.publisher(ParameterEvent, private(PARAMETERS), LATCHED)
@@ -173,6 +180,8 @@ class UkTorqueController(ManagedNode):
         """Take up changed parameters."""
         self.margins.alarm = self.parameters.read(Alarm)
         self.attachment = self.read_attachment()
+        if self.setpoint is not None:
+            self.setpoint.take(self.parameters.read(Climber), self.attachment)
         self.retune()
         self.publish_parameters()
 
@@ -222,6 +231,8 @@ class UkTorqueController(ManagedNode):
             self.report(PRESSURE, "refused", str(error))
             return
         self.report(PRESSURE, "")
+        if self.setpoint is not None:
+            self.setpoint.measure(pressure, self.now())
         if pressure != self.pressure:
             self.pressure = pressure
             self.retune()
@@ -279,6 +290,8 @@ class UkTorqueController(ManagedNode):
             self.report("safe output", trouble, controller.detail, mode.is_fault)
         if answer is not None:
             self.publish_torques(answer)
+        if self.setpoint is not None:
+            self.setpoint.publish(controller, answer, self.now())
         self.publish_position()
         self.report_clock(controller.clock_offset)
         unheard = "" if controller.encoders.is_heard else "not heard: odometry has no witness"
@@ -346,13 +359,11 @@ class UkTorqueController(ManagedNode):
 
     def add_margins(self, answer: Answer, motion: Motion) -> None:
         """Add the slip margin under an answer's torques, and the tip margin."""
-        climber, attachment = self.controller.law.climber, self.attachment
-        right, left = answer.wheels
+        law, attachment = self.controller.law, self.attachment
+        climber, (right, left) = law.climber, answer.wheels
         forces = right / climber.wheel_radius, left / climber.wheel_radius
-        across = -climber.weight_along_wall * motion.cosine
+        into_wall, along_wall, across = law.gravity(motion)
         lateral = -across if answer.command is None else answer.command.lateral
-        into_wall = climber.gravity_into_wall
-        along_wall = climber.weight_along_wall / climber.mass
         self.margins.take(
             attachment.slip_margin(climber, into_wall, forces, lateral, across),
             attachment.tip_margin(climber, into_wall, along_wall),

@@ -227,6 +227,8 @@ class WallOdometry(ClimberNode):
             "bias of the accelerometer, left [m/s²]": with_deviation(models.LEFT_BIAS),
             "scale error of the encoders": with_deviation(models.SCALE),
             "creep": with_deviation(models.CREEP),
+            "scrub [m]": with_deviation(models.SCRUB),
+            "pivot [m]": with_deviation(models.PIVOT),
             "gravity along the wall [m/s²]": self.options.gravity_along_wall,
             "output less estimate [m, m, rad]": [f"{o:.3g}" for o in localizer.smoothing.offset],
             "fixes taken": counts.taken,

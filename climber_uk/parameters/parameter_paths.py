@@ -10,12 +10,13 @@ def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
     """`path`, the value of parameter `name` of `node`, relative to the working directory.
 
     It was relative to the last of the `arguments`' parameter files that gives the parameter;
-    a path from the command line stays as it is.
+    a path from the command line stays as it is, and so does one that `read_file` has located.
     """
     given = Path(path).expanduser()
     if given.is_absolute():
         return path
-    from climber_uk.parameters.parameter_file import read_file  # with yaml, which is slow to import
+    # with yaml, which is slow to import
+    from climber_uk.parameters.parameter_file import FILE, read_file
 
     found = path
     for file in paths(arguments):
@@ -23,6 +24,7 @@ def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
             values = read_file(file, node)
         except (OSError, ValueError):  # not a file for this node
             continue
-        if values.get(name) in (path, str(file.parent / path)):
-            found = str(file.parent / path)
+        beside, is_relative = str(file.parent / path), name.split(".")[-1] == FILE
+        if values.get(name) == (beside if is_relative else path):
+            found = beside
     return found

@@ -1,10 +1,12 @@
 """Tell whether a climber can drive a path, before it does: where what limits it, and what it takes.
 
 The path is that of trajectory_publisher's parameters in a file, the climber that of
-uk_torque_controller's. The status is 1 if the path asks for more than there is,
-and 2 if that cannot be told.
+uk_torque_controller's. With `--posterior` it tells as well how probable it is that a climber falls
+or slips that is known only as well as a bag told (`identify BAG --json FILE`). The status is 1 if
+the path asks for more than there is, and 2 if that cannot be told.
 """
 
+import argparse
 import json
 import sys
 from dataclasses import fields
@@ -15,14 +17,20 @@ from climber_uk.closed_loop.node_parameters import read_parameters
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics.adhesion import ADHESION, Attachment, Grip
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.fastest_law import DEGREE
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
+from climber_uk.mechanics.wall import WALLS, Wall
 from climber_uk.messages.topics import CONTROLLER, PLANNER
 from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
 from climber_uk.parameters.parameter_paths import located
-from climber_uk.path_check.demands import Demands, demands
-from climber_uk.path_check.fastest import fastest
+from climber_uk.path_check.demands import demands
+from climber_uk.path_check.fastest import fastest, write_fastest
+from climber_uk.path_check.findings import lines, told, told_of
+from climber_uk.path_check.path_limits import Limits
+from climber_uk.path_check.posterior import chances, read_posterior
+from climber_uk.path_check.time_optimal import PERIOD, time_optimal
 from climber_uk.report.outputs import failing_in_a_line, printable
 from climber_uk.system.command_line import Parser, between
 
@@ -38,68 +46,70 @@ PATHS = {  # parameters that are files
     if field.metadata.get("is_path")
 }
 
+MOST_CLIMBERS = 1_000_000
+
 
 def read(
     file: Path, changes: dict[str, Any], remarks: list[str]
-) -> tuple[Trajectory, Climber, Attachment]:
-    """Path, climber and what holds it, by a parameter file and changes of the path's parameters.
+) -> tuple[Trajectory, Climber, Attachment, Wall]:
+    """Path, climber, what holds it and its wall, by a file and changes of the path's parameters.
 
     Raises `ValueError`, also for a name that no part of the path has. `remarks` gets a line on each
     value that can hardly be meant.
     """
+    trajectory = build_trajectory(Values(_planner(file, changes, remarks)).read)
+    values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
+    choice = values.read(ControllerChoice)
+    name, wall = choice.adhesion, choice.wall
+    attachment = Attachment(
+        adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)
+    )
+    return trajectory, values.read(Climber), attachment, values.read(WALLS[wall], f"{wall}.")
+
+
+def _planner(file: Path, changes: dict[str, Any], remarks: list[str]) -> dict[str, Any]:
+    """Parameters of the path by name, its files relative to the working directory."""
     planner = {**read_parameters(file, f"/{PLANNER}", remarks), **changes}
     refuse_unknown(changes, NAMES, "a path")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
         planner[name] = located(planner[name], name, f"/{PLANNER}", words)
-    trajectory = build_trajectory(Values(planner).read)
-    values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
-    name = values.read(ControllerChoice).adhesion
-    attachment = Attachment(
-        adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)
-    )
-    return trajectory, values.read(Climber), attachment
+    return planner
 
 
-def told(found: Demands, trajectory: Trajectory, half_track: float) -> dict[str, Any]:
-    """What is found, as numbers by name."""
-    about = summary(trajectory, half_track)
-    limits: dict[str, Any] = {
-        least.name: {"reserve": least.reserve, "at [s]": least.time, "place [m]": least.place}
-        for least in found.least()
+def _count(text: str) -> int:
+    """A number of climbers; `ValueError` if it is none."""
+    if not (text.isdecimal() and 1 <= int(text) <= MOST_CLIMBERS):
+        raise argparse.ArgumentTypeError(f"{text!r} must be an integer from 1 to {MOST_CLIMBERS}")
+    return int(text)
+
+
+def _fastest_law(
+    options: argparse.Namespace,
+    trajectory: Trajectory,
+    climber: Climber,
+    attachment: Attachment,
+    wall: Wall,
+) -> tuple[Trajectory | None, dict[str, Any]]:
+    """The path by the fastest law, and what that takes; or None, and the reason."""
+    given = {
+        name: value
+        for name in ("speed", "yaw_rate", "acceleration")
+        if (value := getattr(options, name)) is not None
     }
-    return {
-        "feasible": all(limit["reserve"] >= 1 for limit in limits.values()),
-        "length [m]": about.length,
-        "duration [s]": about.duration,
-        "fastest [m/s]": about.fastest_speed,
-        "energy of the wheels [J]": found.energy,
-        "limits": limits,
+    limits, period = Limits(options.margin, **given), options.smoothing / (DEGREE + 1)
+    try:
+        law = time_optimal(trajectory, climber, attachment, limits, period, wall).trajectory
+    except ValueError as error:
+        return None, {"reason": str(error)}
+    found = demands(law, climber, attachment, options.margin, wall)
+    least = min(found.least(), key=lambda of: of.reserve)
+    return law, {
+        "duration [s]": law.duration,
+        "fastest [m/s]": summary(law, climber.half_track).fastest_speed,
+        "least reserve": least.reserve,
+        "limit": least.name,
     }
-
-
-def lines(numbers: dict[str, Any], is_whole: bool) -> list[str]:
-    """The same in words."""
-    part = "" if is_whole else ", once around"
-    said = [
-        f"{numbers['length [m]']:.4g} m, {numbers['duration [s]']:.4g} s, at most "
-        f"{numbers['fastest [m/s]']:.3g} m/s, {numbers['energy of the wheels [J]']:.4g} J{part}"
-    ]
-    for name, limit in sorted(numbers["limits"].items(), key=lambda of: of[1]["reserve"]):
-        x, y = limit["place [m]"]
-        verdict = "" if limit["reserve"] >= 1 else ": TOO MUCH"
-        said.append(
-            f"{name}: {limit['reserve']:.3g} times what is asked for, at ({x:.3g}, {y:.3g}) m, "
-            f"{limit['at [s]']:.4g} s{verdict}"
-        )
-    if "fastest rate" in numbers:
-        rate = numbers["fastest rate"]
-        said.append(
-            f"highest rate: {rate:.4g}, in {numbers['fastest duration [s]']:.4g} s"
-            if rate
-            else "highest rate: none is slow enough"
-        )
-    return [*said, "feasible" if numbers["feasible"] else "NOT feasible"]
 
 
 def main() -> None:
@@ -121,18 +131,54 @@ def main() -> None:
         help="of slipping that is to be kept (default: 1.5, as the alarm's)",
     )
     parser.add_argument(
-        "--fastest", action="store_true", help="tell the highest rate at which all limits hold, too"
+        "--fastest",
+        action="store_true",
+        help="tell the highest rate at which all limits hold, and the fastest time law, too; "
+        "with --output, write fastest.yaml, by which the nodes drive it",
+    )
+    for name, unit in (("speed", "m/s"), ("yaw-rate", "rad/s"), ("acceleration", "m/s²")):
+        parser.add_argument(
+            f"--{name}",
+            type=between(1e-3, 1e3),
+            default=None,
+            help=f"[{unit}] of the fastest law, at most (default: what the rest allows)",
+        )
+    parser.add_argument(
+        "--smoothing",
+        type=between(0.006, 6.0),
+        default=(DEGREE + 1) * PERIOD,
+        help="[s] in which the fastest law changes its acceleration "
+        f"(default: {(DEGREE + 1) * PERIOD:g})",
+    )
+    parser.add_argument(
+        "--posterior",
+        type=Path,
+        help="what `identify --json` wrote: tell how probable it is that such a climber falls",
+    )
+    parser.add_argument(
+        "--climbers",
+        type=_count,
+        default=1000,
+        help="that are drawn of the posterior (default: 1000)",
     )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
     with failing_in_a_line("check_path") as remarks:
-        trajectory, climber, attachment = read(options.params, dict(options.param), remarks)
-        found = demands(trajectory, climber, attachment, options.margin)
+        trajectory, climber, attachment, wall = read(options.params, dict(options.param), remarks)
+        posterior = read_posterior(options.posterior) if options.posterior else None
+        asked, law = (climber, attachment), None
+        found = demands(trajectory, *asked, options.margin, wall)
         numbers = told(found, trajectory, climber.half_track)
-        if options.fastest:
-            best = fastest(trajectory, climber, attachment, options.margin)
+        if options.fastest and trajectory.law.rate > 0:
+            best = fastest(trajectory, *asked, options.margin, wall)
             numbers["fastest rate"] = best and best.law.rate
             numbers["fastest duration [s]"] = best and best.duration
+        if options.fastest:
+            law, numbers["fastest law"] = _fastest_law(options, trajectory, *asked, wall)
+        if posterior:
+            runs = options.climbers
+            events = chances(trajectory, *asked, posterior, runs, wall=wall)
+            numbers["posterior"] = told_of(posterior, events, runs)
         print("\n".join(lines(numbers, found.is_whole)))
         if options.output:
             from climber_uk.path_check.figure import draw  # matplotlib, which takes a second
@@ -140,4 +186,9 @@ def main() -> None:
             options.output.mkdir(parents=True, exist_ok=True)
             (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
             print(printable(str(draw(found, options.output / "check_path.png"))))
+            if law:
+                planner = _planner(options.params, dict(options.param), remarks)
+                files = {name: str(Path(planner[name]).absolute()) for name in PATHS & {*planner}}
+                changes = {**dict(options.param), **files}
+                print(printable(str(write_fastest(law, options.params, changes, options.output))))
     sys.exit(not numbers["feasible"])

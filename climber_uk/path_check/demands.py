@@ -1,25 +1,26 @@
 """What a trajectory asks of a climber that is exactly on it, and how much of each limit is left.
 
-    F = m v̇ + f sgn v + m g_t sinθ     N = J θ̈     τR,L = r (F ± N/d) / 2     L = m v θ̇ + m g_t cosθ
-
-(docs/theory.md, §2 and §4): at each time the drive, the moment, the torques and the lateral
-reaction, and of them the margins of slipping and tipping, as the nodes tell them.
+At each time the torques and the lateral reaction (`mechanics.demand`), and of them the margins of
+slipping and tipping, as the nodes tell them.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import cos, sin
+from climber_uk.mechanics.demand import demanded
+from climber_uk.mechanics.quantities import Wrench
+from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import PLANE, Wall
 
 PERIOD = 0.02  # [s] between two times that are looked at
 MOST_TIMES = 50_000
-STANDS = 1e-4  # [m/s] below which friction holds, and asks for no torque
 
 
 @dataclass(frozen=True)
@@ -52,63 +53,108 @@ class Demands:
             yield Least(name, float(reserve[i]), float(self.time[i]), (x, y))
 
 
-def demands(
-    trajectory: Trajectory, climber: Climber, attachment: Attachment, margin: float
-) -> Demands:
-    """Demands of a trajectory; slipping is to be a `margin` away."""
+class Resistance(NamedTuple):
+    """What resists the motion beside the seal; numbers, or arrays (k, 1) of many climbers."""
+
+    rolling: Any = 0.0  # Coulomb's [N]
+    viscous: Any = 0.0  # [N s/m]
+    turning: Any = 0.0  # Coulomb's [N m]
+    turning_viscous: Any = 0.0  # [N m s]
+
+
+NOTHING_ELSE = Resistance()
+
+
+class Reserves(NamedTuple):
+    """What is left of the limits at n times, and what the wheels do there."""
+
+    slip: Any  # margin (..., n), as the nodes tell it
+    tip: Any  # likewise
+    torque: Any  # (..., n) of the motors: what they have by what is asked for
+    torques: tuple[Any, Any]  # (..., n) right, left [N m]
+    rates: tuple[Any, Any]  # (..., n) of the wheels, right, left [rad/s]
+    lateral: Any  # (..., n) what both wheels take to the left [N]
+    loads: tuple[Any, Any]  # (..., n) on the right and on the left wheel [N]
+    normal: Any  # (..., n) force onto the wall [N]
+
+
+def times(trajectory: Trajectory) -> tuple[Array, bool]:
+    """Times (n,) [s] to look at, and whether they are all of it, or a round or two."""
     duration = trajectory.duration
     horizon = trajectory.law.horizon(trajectory.course)
     last = min(duration, horizon) if np.isfinite(horizon) else duration
     time = np.linspace(0.0, last, min(int(last / PERIOD) + 2, MOST_TIMES))
-    reference = trajectory.at(time)
-    speed, heading = reference.speed, reference.heading
-    weight = climber.weight_along_wall
-    rubbing = attachment.seal_friction(climber) * np.sign(
-        np.where(np.abs(speed) > STANDS, speed, 0)
-    )
-    force = climber.driven_mass * reference.forward_acceleration + rubbing + weight * sin(heading)
-    moment = climber.driven_inertia * reference.acceleration[:, 2]
-    right, left = climber.torques(force, moment)
-    radius = climber.wheel_radius
-    across = -weight * cos(heading)
-    lateral = climber.mass * speed * reference.yaw_rate - across
-    into_wall, along_wall = climber.gravity_into_wall, weight / climber.mass
+    return time, bool(last >= duration)
+
+
+def reserves(
+    reference: Reference,
+    climber: Climber,
+    attachment: Attachment,
+    resistance: Resistance = NOTHING_ELSE,
+    wall: Wall = PLANE,
+) -> Reserves:
+    """Reserves at n places of a reference, of one climber, or of many: fields (k, 1)."""
+    speed, yaw_rate, radius = reference.speed, reference.yaw_rate, climber.wheel_radius
+    friction = attachment.seal_friction(climber) + resistance.rolling
+    turning = resistance.turning * np.sign(yaw_rate) + resistance.turning_viscous * yaw_rate
+    resists = Wrench(-resistance.viscous * speed, -turning)
+    demand = demanded(climber, friction, reference, resists, wall)
+    (right, left), lateral, across, into_wall = demand[:4]
     slip = attachment.slip_margin(
         climber, into_wall, (right / radius, left / radius), lateral, across
     )
-    tip = attachment.tip_margin(climber, into_wall, along_wall)
+    tip = attachment.tip_margin(climber, into_wall, demand.along_wall)
     rates = (
-        (speed + climber.half_track * reference.yaw_rate) / radius,
-        (speed - climber.half_track * reference.yaw_rate) / radius,
+        (speed + climber.half_track * yaw_rate) / radius,
+        (speed - climber.half_track * yaw_rate) / radius,
     )
-    power = np.maximum(right * rates[0], 0.0) + np.maximum(left * rates[1], 0.0)
+    motors = _motors(climber, (right, left), rates)
+    loads = attachment.wheel_loads(climber, attachment.wheel_load(climber, into_wall), across)
+    tips = tip + 0 * np.asarray(slip)
+    normal = attachment.normal_force(climber, into_wall)
+    return Reserves(slip, tips, motors, (right, left), rates, lateral, loads, normal)
+
+
+def demands(
+    trajectory: Trajectory,
+    climber: Climber,
+    attachment: Attachment,
+    margin: float,
+    wall: Wall = PLANE,
+) -> Demands:
+    """Demands of a trajectory; slipping is to be a `margin` away."""
+    time, is_whole = times(trajectory)
+    reference = trajectory.at(time)
+    left = reserves(reference, climber, attachment, wall=wall)
+    power = sum(
+        np.maximum(torque * rate, 0.0)
+        for torque, rate in zip(left.torques, left.rates, strict=True)
+    )
     step = np.hypot(*np.diff(reference.pose[:, :2], axis=0).T)
     return Demands(
         time=time,
         pose=reference.pose,
         distance=np.insert(np.cumsum(step), 0, 0.0),
         reserves={
-            f"slip, to a margin of {margin:g}": np.asarray(slip / margin),
-            "tip": np.broadcast_to(np.asarray(tip, float), time.shape),
-            **_motors(climber, (right, left), rates),
+            f"slip, to a margin of {margin:g}": left.slip / margin,
+            "tip": left.tip,
+            "torque": left.torque,
         },
-        torques=np.stack([right, left], axis=-1),
+        torques=np.stack(left.torques, axis=-1),
         energy=float(np.sum((power[:-1] + power[1:]) / 2 * np.diff(time))),
-        is_whole=bool(last >= duration),
+        is_whole=is_whole,
     )
 
 
-def _motors(
-    climber: Climber, torques: tuple[Array, Array], rates: tuple[Array, Array]
-) -> dict[str, Array]:
-    """Reserves (n,) of the motors' torque, which falls to 0 at `no_load_wheel_rate` if there is."""
-    reserve = np.full(len(torques[0]), np.inf)
+def _motors(climber: Climber, torques: tuple[Array, Array], rates: tuple[Array, Array]) -> Any:
+    """Reserve (..., n) of the motors' torque, which falls to 0 at `no_load_wheel_rate` if any."""
+    sides = []
     for torque, rate in zip(torques, rates, strict=True):
-        allowed = np.full(len(torque), climber.max_wheel_torque)
+        allowed: Any = climber.max_wheel_torque
         if climber.no_load_wheel_rate:
             # what drives the wheel on, not what brakes it
             drives = np.sign(torque) * rate / climber.no_load_wheel_rate
             allowed = allowed * np.clip(1.0 - drives, 0.0, 1.0)
-        asked = np.maximum(np.abs(torque), 1e-9)
-        reserve = np.minimum(reserve, allowed / asked)
-    return {"torque": reserve}
+        sides.append(allowed / np.maximum(np.abs(torque), 1e-9))
+    return np.minimum(*sides)

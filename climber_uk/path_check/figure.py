@@ -1,5 +1,6 @@
 """The picture of a path: where on it how much is left of what limits it most."""
 
+from math import dist
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from climber_uk.path_check.demands import Demands
 from climber_uk.report.plotting import plt, saved
 
 ENOUGH = 5.0  # of a reserve: more is not told apart
+LABELS_APART = 0.05  # of the path's size, below which places share one
 
 
 def draw(found: Demands, path: Path) -> Path:
@@ -17,8 +19,10 @@ def draw(found: Demands, path: Path) -> Path:
     drawn = above.scatter(*found.pose[:, :2].T, c=least, s=6, cmap="RdYlGn", vmin=0.0, vmax=ENOUGH)
     figure.colorbar(drawn, ax=above, label="least reserve: allowed by asked for")
     named: dict[tuple[float, float], list[str]] = {}
+    apart = LABELS_APART * np.ptp(found.pose[:, :2])
     for at in found.least():
-        named.setdefault(at.place, []).append(at.name)
+        near = next((place for place in named if dist(place, at.place) < apart), at.place)
+        named.setdefault(near, []).append(at.name)
     for place, names in named.items():
         above.annotate("; ".join(names), place, fontsize=8)
     above.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")

@@ -1,11 +1,15 @@
 """A path that comes from outside, while another is driven, as a trajectory."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.fastest_law import TabulatedLaw
 from climber_uk.mechanics.summary import Summary, summary
-from climber_uk.mechanics.time_laws import TimeLaw
+from climber_uk.mechanics.time_laws import TIME_LAWS, TimeLaw
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.trajectory_parameters import TrajectoryParameters
 from climber_uk.mechanics.waypoints import Polyline, Rounding
 
 
@@ -16,6 +20,15 @@ class Manner:
     rounding: Rounding
     law: TimeLaw
     reverse_gear: bool = False
+
+    @classmethod
+    def by(cls, read: Callable[..., Any], reverse_gear: bool) -> "Manner":
+        """As waypoints are driven by the parameters that `read(class, prefix)` gives."""
+        law = read(TrajectoryParameters).time_law
+        if issubclass(TIME_LAWS[law], TabulatedLaw):
+            law = "rest_to_rest"  # a table is of its own path
+        rounding = read(Rounding, "waypoints.")
+        return cls(rounding, read(TIME_LAWS[law], f"{law}."), reverse_gear)
 
 
 def planned(places: Array, manner: Manner) -> tuple[Trajectory, Summary]:

@@ -34,6 +34,8 @@ class Journey(Generic[Row]):
         self.next = PATH
         self.waits_for_rest = False  # of what is under way, for the next to begin
         self.is_paused, self.speed = False, 1.0
+        self.is_halted = False  # paused until something else begins; nothing starts until then
+        self._stays_paused = False  # after that, too
         self._options, self._hand_options, self._make = options, hand, make
         self._left = 0.0  # [s] own time at which a stick took over from the course
 
@@ -52,6 +54,8 @@ class Journey(Generic[Row]):
         What is under way is at `position` [ns]; if it is not driven, nothing moves along it.
         """
         self.next, under_way = what, self.under_way
+        if self.is_halted:
+            self.is_halted, self.is_paused = False, self.is_paused and self._stays_paused
         self.waits_for_rest = bool(under_way and is_driven and not under_way.rests(position))
         if not self.waits_for_rest:
             return True, STARTS
@@ -86,6 +90,18 @@ class Journey(Generic[Row]):
 
     def pause(self, position: int) -> Said:
         """Come to rest, on the path if it is driven."""
+        self._stays_paused = True
+        return self._pause(position)
+
+    def halt(self, position: int) -> None:
+        """Come to rest, as `pause` does, until something is begun."""
+        if self.is_halted:
+            return
+        self.is_halted, self._stays_paused, self.waits_for_rest = True, self.is_paused, False
+        self._pause(position)
+        self.is_paused = True
+
+    def _pause(self, position: int) -> Said:
         if self.hand is not None:
             self.hand.stop()
             return True, "brakes; a stick that is moved drives on"
@@ -97,6 +113,7 @@ class Journey(Generic[Row]):
 
     def go_on(self, position: int) -> Said:
         """Go on along the path, or with what is to begin."""
+        self.is_halted = False
         if self.course is None:
             return NOT_STARTED
         self.is_paused = False

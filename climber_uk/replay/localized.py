@@ -14,7 +14,9 @@ from climber_uk.localization.models import (
     FORWARD_BIAS,
     HEADING,
     LEFT_BIAS,
+    PIVOT,
     SCALE,
+    SCRUB,
 )
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.smoother import smoothed
@@ -29,6 +31,8 @@ TOLD = {
     LEFT_BIAS: "bias of the accelerometer, left [m/s²]",
     SCALE: "scale error of the encoders, at the end",
     CREEP: "creep",
+    SCRUB: "scrub [m]",
+    PIVOT: "pivot [m]",
 }
 
 
@@ -36,8 +40,8 @@ TOLD = {
 class Estimates:
     """Estimates at n times."""
 
-    mean: Array  # (n, 8) as in `localization.models`
-    covariance: Array  # (n, 8, 8)
+    mean: Array  # (n, 10) as in `localization.models`
+    covariance: Array  # (n, 10, 10)
 
     @classmethod
     def of(cls, estimates: Sequence[Estimate]) -> "Estimates":
@@ -49,7 +53,7 @@ class Estimates:
 
     @property
     def deviation(self) -> Array:
-        """Standard deviations (n, 8)."""
+        """Standard deviations (n, 10)."""
         variances = np.diagonal(self.covariance, axis1=1, axis2=2)
         return np.sqrt(np.maximum(variances, 0.0))
 

@@ -34,6 +34,13 @@ class SimulationOptions:
     push_timeout: float = parameter(
         0.5, "s", "age at which a push ends; 0: only with the next one", at_least=0
     )
+    setpoint_timeout: float = parameter(
+        0.0,
+        "s",
+        "age of a suction_setpoint after which the pump has suction_pressure; 0: it heeds none",
+        at_least=0,
+        plausible=(0.1, 5),
+    )
     lockstep_timeout: float = parameter(
         5.0, "s", "wall-clock wait for a torque, then a warning", above=0
     )

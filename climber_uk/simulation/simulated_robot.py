@@ -86,6 +86,7 @@ class SimulatedRobot:
         self.torques: Array = np.zeros(2)  # [N m] at the wheels: right, left
         self.angles: Array = np.zeros(2)  # [rad] of the wheels: right, left
         self.push = UNPUSHED
+        self.setpoint: float | None = None  # [Pa] of the pump, from outside; None: that of `parts`
         self.plant = self._at_pressure(parts.plant, self._final_pressure())
         self.rates = self.plant.wheel_rates(start)  # [rad/s] of the wheels: right, left
         self.rates_before = self.rates  # a step ago
@@ -151,8 +152,10 @@ class SimulatedRobot:
     def _pump(self) -> float:
         """Pressure that the pump could reach without a leak, now [Pa]."""
         physics = self.parts.physics
+        full = self.parts.plant.climber.suction_pressure
+        pump = full if self.setpoint is None else min(self.setpoint, full)
         lost = 0 < physics.pressure_loss_time <= self.time + 1e-9
-        return physics.pressure_loss_level if lost else self.parts.plant.climber.suction_pressure
+        return physics.pressure_loss_level if lost else pump
 
     def _final_pressure(self) -> float:
         plant = self.parts.plant

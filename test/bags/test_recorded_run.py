@@ -213,3 +213,17 @@ def test_points_are_where_they_were_written(tmp_path):
     made.add_reference()
     run = read_run(made.write(tmp_path / "bag"))
     np.testing.assert_allclose(run.reference, on_circle(run.time)[0], atol=1e-11)
+
+
+def test_a_line_of_the_log_that_came_while_time_stood_still_is_before_what_came_then(tmp_path):
+    made, stood = a_run(N), 3.0
+    since, later = made.arrival(made.stamps[1]), round(stood * SECOND)
+    made.messages = [
+        (*topic_and_type, came + later * (came >= since), sent)
+        for *topic_and_type, came, sent in made.messages
+    ]
+    made.add_log(made.time[1] + stood / 2, 30, "waits")
+    (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert [(time, event.text) for time, event in run.events] == [
+        (pytest.approx(made.time[1], abs=1e-9), "waits")
+    ]

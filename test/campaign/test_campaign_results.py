@@ -8,8 +8,9 @@ import pytest
 from climber_uk.campaign import counting, figures, parts
 from climber_uk.campaign.limits import Limit, verdicts
 from climber_uk.campaign.parts import Store, computed
-from climber_uk.campaign.results import report, wilson
+from climber_uk.campaign.results import report
 from climber_uk.closed_loop.outcome import Outcome
+from climber_uk.report.proportion import wilson
 
 
 def by_hand(count, number):

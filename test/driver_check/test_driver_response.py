@@ -247,16 +247,15 @@ def test_a_torque_that_does_not_end_fails():
 
 
 @pytest.mark.parametrize(
-    ("trouble", "hint"),
+    ("how", "hint"),
     [
-        ("odometry came late in 20 of 20 pulses", "too busy"),
-        ("it moves already, with 0.20 m/s and 0.00 rad/s", "hold it"),
-        ("/uk_torque_controller publishes wheel_torques", "stop all that commands it"),
-        ("it turned 0.700 rad, more than max_turn", "look what has moved it"),
+        ({"bounds": Bounds(max_turn=0.05)}, "look what has moved it"),
+        ({"start": State.rolling(START.pose, 0.0, 0.3)}, "hold it"),
     ],
+    ids=["too far", "moves already"],
 )
-def test_the_hint_is_for_what_has_stopped_the_trial(trouble, hint):
-    seen = tried(RIGHT, bounds=Bounds(max_turn=0.05))
-    found = reacting.trial(replace(seen, trial=replace(seen.trial, trouble=trouble)))
-    assert (found.verdict, found.said) == (Verdict.FAIL, f"stopped: {trouble}")
+def test_the_hint_is_for_what_has_stopped_the_trial(how, hint):
+    seen = tried(RIGHT, **how)
+    found = reacting.trial(seen)
+    assert (found.verdict, found.said) == (Verdict.FAIL, f"stopped: {seen.trial.trouble}")
     assert hint in found.hint

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from climber_uk.localization.history import History, Sample
 from climber_uk.localization.imu import Weight
 from climber_uk.localization.kalman import Estimate, corrected
-from climber_uk.localization.models import Travel
+from climber_uk.localization.models import SIZE, Travel
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import SECOND
 
@@ -27,7 +27,7 @@ def sample(random):
 def fix(x, y):
     def correction(estimate):
         off = np.array([x, y]) - estimate.mean[:2]
-        return corrected(estimate, off, np.eye(8)[:2], 1e-3 * np.eye(2))
+        return corrected(estimate, off, np.eye(SIZE)[:2], 1e-3 * np.eye(2))
 
     return correction
 

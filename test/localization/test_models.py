@@ -21,6 +21,8 @@ STATES = st.tuples(
     st.floats(-0.2, 0.2),
     st.floats(-0.5, 0.5),
     st.floats(-0.5, 0.5),
+    st.floats(-0.3, 0.3),
+    st.floats(-0.3, 0.3),
 ).map(np.array)
 TRAVELS = st.builds(
     Travel,
@@ -29,6 +31,7 @@ TRAVELS = st.builds(
     path=st.floats(0, 0.2),
     yaw_rate=st.floats(-3, 3),
     is_gyro=st.booleans(),
+    scrubbed=st.floats(0, 0.3),
 )
 STEP = 1e-6
 
@@ -68,13 +71,13 @@ def test_the_jacobian_of_a_fix_is_its_derivative(state, lever):
 
 
 def test_a_climber_that_rolls_up_a_vertical_wall_sags_by_its_creep():
-    state = np.array([1.0, 2.0, math.pi / 2, 0.0, 0.1, 0.03, 0, 0])
+    state = np.array([1.0, 2.0, math.pi / 2, 0.0, 0.1, 0.03, 0, 0, 0, 0])
     after = models.advanced(state, Travel(0.1, 0.2, 0.2, 0.0, True), pull=1.0)
     np.testing.assert_allclose(after[:3], [1.0, 2.0 + 0.2 * 0.9 - 0.2 * 0.03, math.pi / 2])
 
 
 def test_a_climber_that_turns_on_the_spot_sags_too_and_a_gyros_bias_is_no_turn():
-    state = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.03, 0, 0])
+    state = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.03, 0, 0, 0, 0])
     travel = Travel(0.1, 0.0, 0.2, 0.5, True)
     np.testing.assert_allclose(models.advanced(state, travel, 1.0)[:3], [0, -0.006, 0], atol=1e-15)
     by_wheels = models.advanced(state, travel._replace(is_gyro=False), 1.0)
@@ -83,7 +86,7 @@ def test_a_climber_that_turns_on_the_spot_sags_too_and_a_gyros_bias_is_no_turn()
 
 def test_gravity_is_forwards_where_the_climber_looks_up_and_to_the_left_where_it_looks_along_x():
     for heading, force in ((math.pi / 2, (9.81, 0)), (0.0, (0, 9.81)), (math.pi, (0, -9.81))):
-        state = np.array([0, 0, heading, 0, 0, 0, 0, 0])
+        state = np.array([0, 0, heading, *[0] * 7])
         np.testing.assert_allclose(models.gravity(state, Late(0, 0), 9.81), force, atol=1e-12)
 
 
@@ -91,7 +94,7 @@ def test_gravity_is_forwards_where_the_climber_looks_up_and_to_the_left_where_it
 def test_on_floor_and_ceiling_gravity_and_creep_weigh_nothing(inclination):
     options = LocalizationOptions(inclination=inclination)
     assert models.share_along_wall(options) == pytest.approx(0, abs=1e-15)
-    state, late = np.array([0, 0, 1.0, 0, 0, 0, 0, 0]), Late(0, 0)
+    state, late = np.array([0, 0, 1.0, *[0] * 7]), Late(0, 0)
     jacobian = models.gravity_jacobian(state, late, options.gravity_along_wall)
     np.testing.assert_allclose(jacobian[:, : models.FORWARD_BIAS], 0, atol=1e-14)
 

@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from rclpy.serialization import serialize_message
 
-from climber_uk.messages.reading_path import path_points
+from climber_uk.messages.reading_path import message_points, path_points
 
 PLACES = st.lists(st.tuples(*[st.floats(-1e5, 1e5)] * 2), min_size=2, max_size=9)
 
@@ -32,6 +32,7 @@ def message(places, frame="odom", frames=None):
 def test_it_reads_what_was_written_whatever_the_frames_length(places, frame, mixed):
     path = message(places, frame, [frame, ""] if mixed else None)
     np.testing.assert_array_equal(path_points(serialize_message(path), frame), places)
+    np.testing.assert_array_equal(message_points(path, frame), places)
 
 
 @pytest.mark.parametrize(
@@ -49,6 +50,8 @@ def test_it_reads_what_was_written_whatever_the_frames_length(places, frame, mix
 def test_what_is_wrong_is_said_with_place_and_number(path, why):
     with pytest.raises(ValueError, match=why):
         path_points(serialize_message(path), "odom")
+    with pytest.raises(ValueError, match=why):
+        message_points(path, "odom")
 
 
 @given(st.integers(0, 300), st.binary(max_size=40))

@@ -15,7 +15,9 @@ from world import CONFIG, TIMEOUT, World, executable, inhabitants
 from climber_uk.bags.recorded_run import read_run
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
+from climber_uk.messages.topics import PRESSURE
 from climber_uk.report import export_tum
+from climber_uk.report.metrics import Case, evaluate
 from climber_uk.report.trajectory_errors import absolute_errors, relative_errors
 
 pytestmark = pytest.mark.nodes
@@ -32,7 +34,9 @@ def demo(world, output, config, *arguments, **how):
 def finished(world):
     """What a demonstration has said, once it has ended well."""
     process = world.processes["run_demo"]
-    assert process.wait(300) == 0, world.log("run_demo")
+    if process.wait(300):
+        logs = sorted(world.directory.rglob("*.log"))
+        raise AssertionError("\n".join(f"{log}:\n{log.read_text()}" for log in logs))
     return world.log("run_demo")
 
 
@@ -85,15 +89,15 @@ SMALL = {  # a fifth of the size of climber.yaml's lap, in a fifth of its time
 DURATION = 14.0  # [s] of that lap, and of rest after it
 
 
-def small_bag(runs, name, duration, changed=SMALL):
+def small_bag(runs, name, duration, changed=SMALL, called=""):
     """Bag of a run with a configuration, of which some text is changed."""
     text = (CONFIG / name).read_text()
     for before, after in changed.items():
         assert before in text
         text = text.replace(before, after)
-    config = runs.directory / f"small_{name}"
+    config = runs.directory / f"small_{called}{name}"
     config.write_text(text)
-    output = runs.directory / f"run_of_{name}"
+    output = runs.directory / f"run_of_{called}{name}"
     demo(runs, output, config, "--duration", str(duration))
     finished(runs)
     return output / "bag"
@@ -148,6 +152,28 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     assert run.time[-1] >= DURATION
     assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
+
+
+def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_its_path(runs):
+    pump = "\n    suction:\n      pump_time: 0.1"
+    asked = (
+        "\n    least_suction:\n      enabled: true\n      slip_margin: 2.5\n      fall_rate: 1500.0"
+    )
+    changed = {
+        "max_heading: 0.3": f"max_heading: 0.3{asked}{pump}",
+        "integration_step: 0.0025": f"integration_step: 0.0025\n    setpoint_timeout: 0.5{pump}",
+    }
+    run = read_run(small_bag(runs, "climber.yaml", 6.0, SMALL | changed, "least_suction_"))
+    assert run.time[-1] >= 6.0
+    pressure = run.recorded[PRESSURE].values[:, 0]
+    assert pressure[0] == 8000.0  # at rest
+    assert 5160.0 <= pressure.min() < 6500.0
+    assert run.margins.values[:, 0].min() >= 2.5
+    assert np.abs(run.error[:, 1]).max() < 2e-3
+    numbers = evaluate(Case(run))
+    assert 65.0 < numbers["mean_suction"] < 95.0
+    assert 0.0 < numbers["seal_work_share"] < numbers["mean_suction"]  # it rests with all of it
+    assert numbers["errors"] == 0
 
 
 def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):

@@ -56,9 +56,12 @@ class Operated(Waiting):
         }
 
     def is_told_to_be(self, state):
+        """Wait until progress is in a state, and until odometry of then has come as well."""
         self.progress.clear()
         self.world.wait(lambda: self.progress and self.told()[0] == state, state)
-        return self.told()[1]
+        told, then = self.told()[1], stamp_of(self.progress[-1])
+        self.world.wait(lambda: stamp_of(self.odometry[-1]) >= then, "odometry of then")
+        return told
 
     def drives(self, low, high):
         """Wait until its speed [m/s] is between these for 0.5 s."""
@@ -72,6 +75,10 @@ class Operated(Waiting):
     def largest_jump(self):
         efforts = np.array([m.effort for m in self.torques])
         return np.abs(np.diff(efforts, axis=0)).max()
+
+
+def stamp_of(message):
+    return reading.nanoseconds(message.header.stamp)
 
 
 def path(places, frame="odom"):
@@ -167,8 +174,8 @@ def test_tags_of_a_path_are_told_as_the_climber_reaches_them(world):
     assert [e.status[0].message for e in events][-3:] == ["begin", "photo", "end"]
     where = {pair.key: float(pair.value) for pair in events[-2].status[0].values}
     assert (where["x"], where["y"]) == pytest.approx((0.4, 3.0), abs=1e-6)
-    at = reading.nanoseconds(events[-2].header.stamp)
-    stamps = [reading.nanoseconds(m.header.stamp) for m in climb.odometry]
+    at = stamp_of(events[-2])
+    stamps = [stamp_of(m) for m in climb.odometry]
     then = climb.odometry[int(np.searchsorted(stamps, at))]
     assert then.pose.pose.position.x == pytest.approx(0.4, abs=0.01)
 

@@ -10,7 +10,7 @@ from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from world import TIMEOUT
@@ -361,6 +361,33 @@ def test_suction_lost_it_slides_then_falls_says_so_and_reset_revives_it(world):
     world.wait(lambda: answering.answer() and max(answering.states) > last, "odometry")
     assert answering.states[max(answering.states)].pose.pose.position.y == 0.0
     assert "climber: ok again" in world.log("plant_simulator")
+
+
+def test_the_pump_follows_a_setpoint_until_that_is_stale_and_never_above_its_full_pressure(world):
+    world.start_node(
+        "plant_simulator",
+        *("simulated_time:=true", "suction.pump_time:=0.02", "setpoint_timeout:=0.2"),
+    )
+    answering = Answering(world)
+    told = world.listen(FluidPressure, "suction_pressure")
+    setpoint = world.speak(FluidPressure, "suction_setpoint")
+
+    def comes_to(pressure):
+        def is_there():
+            answering.answer()
+            return told and abs(told[-1].fluid_pressure - pressure) < 1.0
+
+        world.wait(is_there, f"{pressure} Pa")
+
+    for number in (-1.0, float("nan")):
+        setpoint.publish(FluidPressure(fluid_pressure=number))
+    world.wait(lambda: "must be from 0" in world.log("plant_simulator"), "the refusal")
+    for number in (2400.0, 9000.0, 2450.0):
+        setpoint.publish(FluidPressure(fluid_pressure=number))
+        comes_to(min(number, 2500.0))
+    comes_to(2500.0)
+    assert "suction setpoint: stale; full pressure instead" in world.log("plant_simulator")
+    assert max(message.fluid_pressure for message in told) <= 2500.0
 
 
 def test_the_lowest_margins_are_told_20_times_a_second_and_alarm_in_diagnostics(world):

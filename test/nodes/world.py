@@ -11,12 +11,14 @@ from pathlib import Path
 
 import rclpy
 from ament_index_python import PackageNotFoundError, get_package_prefix
+from forking import FORKED, Forked
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from climber_uk.ros.transport import reserved
 
+DOMAIN = {"ROS_DOMAIN_ID": ""}
 OPTION = {False: "-p", True: "-r"}
 TIMEOUT = 120.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
@@ -62,12 +64,17 @@ def inhabitants(domain):
                 yield int(process.name), (process / "cmdline").read_bytes().decode()
 
 
+def installation():
+    """Where colcon has installed executables; None if it has not."""
+    try:
+        return Path(get_package_prefix("climber_uk")) / "lib" / "climber_uk"
+    except (PackageNotFoundError, OSError):  # OSError: there is no installation at all
+        return None
+
+
 def executable(name):
     """Where `ros2 run` finds an executable after colcon, else beside this Python."""
-    try:
-        return Path(get_package_prefix("climber_uk")) / "lib" / "climber_uk" / name
-    except (PackageNotFoundError, OSError):  # OSError: there is no installation at all
-        return Path(sys.executable).parent / name
+    return (installation() or Path(sys.executable).parent) / name
 
 
 def command(name):
@@ -92,11 +99,16 @@ class World:
 
     def start(self, name, *arguments):
         """Start an executable of the package; its output is `log(name)`."""
-        return self.run(name, *command(name), *arguments)
+        is_as_here = {**self.environment, **DOMAIN} == {**os.environ, **DOMAIN}
+        if name not in FORKED or not is_as_here or installation():
+            return self.run(name, *command(name), *arguments)
+        self.log_file(name).write_text("")
+        self.processes[name] = Forked(name, arguments, self.log_file(name), self.domain)
+        return self.processes[name]
 
     def run(self, name, *words, **how):
         """Start a command as `Popen` does; its output is `log(name)`."""
-        with (self.directory / f"{name}.log").open("wb") as log:
+        with self.log_file(name).open("wb") as log:
             self.processes[name] = subprocess.Popen(
                 words,
                 stdout=log,
@@ -114,8 +126,11 @@ class World:
         ]
         return self.start(name, "--ros-args", *file, *given)
 
+    def log_file(self, name):
+        return self.directory / f"{name}.log"
+
     def log(self, name):
-        return (self.directory / f"{name}.log").read_text()
+        return self.log_file(name).read_text()
 
     def wait(self, condition, what):
         """Spin until `condition()` holds, and return what it gave."""
@@ -183,6 +198,7 @@ class World:
         for process in self.processes.values():
             with suppress(subprocess.TimeoutExpired):
                 process.wait(TIMEOUT)
+            process.kill()
         for number, _ in inhabitants(self.domain):
             with suppress(ProcessLookupError):
                 os.kill(number, signal.SIGKILL)

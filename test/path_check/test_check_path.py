@@ -8,14 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from climber_uk.mechanics.adhesion import Attachment, Grip, Suction
+from climber_uk.mechanics.adhesion import Attachment, Grip, Magnetic, Suction
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import Cone, Cylinder, Plane, Sphere, Tank
 from climber_uk.path_check import check_path
-from climber_uk.path_check.demands import demands
+from climber_uk.path_check.demands import demands, reserves
 from climber_uk.path_check.fastest import fastest
+from climber_uk.path_check.path_limits import Limits
+from climber_uk.path_check.time_optimal import time_optimal
+from climber_uk.simulation.plant import Plant
 
 CONFIG = Path(__file__).parents[2] / "config"
 CLIMBER = Climber(
@@ -29,6 +35,13 @@ CLIMBER = Climber(
     suction_area=0.06,
     max_wheel_torque=4.0,
 )
+WALLS = {
+    "tilted": Plane(20.0),
+    "pipe": Cylinder(3.0),
+    "tank": Tank(-5.0),
+    "roof": Cone(6.0),
+    "sphere": Sphere(5.0),
+}
 HELD = Attachment(adhesion=Suction(), grip=Grip())
 FRICTION = 0.6 * 0.2 * 8000 * 0.06  # [N] of the seal, by hand
 
@@ -144,7 +157,51 @@ def test_what_is_wrong_is_said_in_one_line(monkeypatch, capsys, tmp_path, text, 
 
 def test_margins_are_those_that_the_nodes_tell():
     """The paper's: 0.54 to 0.53, as the controller publishes them."""
-    trajectory, climber, attachment = check_path.read(CONFIG / "paper.yaml", {}, [])
+    trajectory, climber, attachment, _ = check_path.read(CONFIG / "paper.yaml", {}, [])
     found = demands(trajectory, climber, attachment, 1.0)
     slip = next(iter(found.reserves.values()))
     assert np.min(slip) == pytest.approx(0.53, abs=0.02)
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_on_a_wall_that_is_told_torques_and_margins_are_the_plants(name):
+    """On a circle far from the origin: what the plant needs for a steady speed, and tells."""
+    wall, climber = WALLS[name], replace(CLIMBER, inclination=70.0)
+    circle = Trajectory(Circle(1.0), ConstantRate(0.4), origin=(1.5, 1.0))
+    found = demands(circle, climber, HELD, 1.0, wall)
+    slip, tip, _ = found.reserves.values()
+    plant = Plant(climber, 0.0025, Contact(), wall)
+    for k in np.random.default_rng(2).integers(1, len(found.time), 10):
+        at = circle.at(found.time[k])
+        state, torques = State(at.pose, at.velocity), found.torques[k]
+        assert plant.margins(state, torques) == pytest.approx((slip[k], tip[k]))
+        after = plant.advance(state, torques, 1)
+        assert after.forward_speed == pytest.approx(0.4, abs=2e-5)  # 0.008 m/s²
+
+
+def test_the_command_takes_the_wall_of_the_controller(monkeypatch, capsys, tmp_path):
+    """A roof whose apex is 2 m uphill of the origin; the eight goes around it at 3 m."""
+    told = []
+    for wall in ("plane", "cone"):
+        file = tmp_path / f"{wall}.yaml"
+        text = (CONFIG / "climber.yaml").read_text()
+        words = f"inclination: 60.0\n    wall: {wall}\n    cone.distance: 6.0"
+        file.write_text(text.replace("inclination: 90.0", words, 1))
+        told.append(run(monkeypatch, capsys, "--params", file)[1].splitlines()[1])
+    assert told[0] != told[1]
+
+
+def test_the_fastest_law_keeps_its_margin_on_a_sphere_which_would_throw_it_off():
+    """Outside of one of 2 m; v²/R takes from what presses it on, up to lifting it off."""
+    sphere, held = Sphere(-2.0), Attachment(adhesion=Magnetic(force_at_contact=150.0))
+    circle = Trajectory(Circle(1.0), RestToRest(rate=0.2))
+    free = replace(CLIMBER, seal_friction_coefficient=0.0, inclination=0.0)
+    law = time_optimal(circle, free, held, Limits(margin=1.5), wall=sphere).trajectory
+    reference = law.at(np.linspace(0.01, law.duration - 0.01, 2000))
+    left = reserves(reference, free, held, wall=sphere)
+    assert np.min(left.slip) > 1.5
+    assert np.median(left.slip) < 1.6
+    on_plane = reserves(reference, free, held)
+    lifts = 5 * np.max(reference.speed) ** 2 / 2
+    assert lifts > 15  # N of 199
+    assert np.min(left.normal) < np.min(on_plane.normal) - 0.9 * lifts

@@ -8,6 +8,7 @@ from under_way import UnderWay
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.waypoints import Rounding
+from climber_uk.parameters.parameter_file import Values
 from climber_uk.planning.given_path import Manner, planned
 
 RATE, TOLERANCE, LIMIT = 0.2, 0.02, 4.0
@@ -106,3 +107,11 @@ def test_a_hundred_random_paths():
 def test_what_cannot_be_driven_is_refused_in_words(places, law, why):
     with pytest.raises(ValueError, match=why):
         planned(np.array(places, float), Manner(MANNER.rounding, law))
+
+
+def test_a_path_from_outside_is_driven_by_its_own_ramps_where_the_law_is_a_table_of_another():
+    given = {"time_law": "fastest", "fastest.file": "x.csv", "rest_to_rest.rate": 0.3}
+    manner = Manner.by(Values(given).read, reverse_gear=True)
+    assert (manner.law, manner.reverse_gear) == (RestToRest(rate=0.3), True)
+    given["time_law"] = "constant_rate"
+    assert isinstance(Manner.by(Values(given).read, False).law, ConstantRate)

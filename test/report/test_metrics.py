@@ -394,6 +394,22 @@ def test_what_no_suction_holds_has_no_lowest_pressure(tmp_path, adhesion, lowest
     assert bool(re.search("pressure|suction|seal", told)) == (adhesion == "suction")
 
 
+def test_what_a_pump_that_is_given_a_setpoint_saves_is_that_by_hand(tmp_path):
+    """4 kPa of 8 kPa for the first half, then a ramp up to all of it; at a steady speed."""
+    made = Made(401)
+    made.add_odometry()
+    made.add_parameters(suction_pressure=8000.0)
+    for stamp, pressure in zip(made.stamps, np.linspace(0.0, 8000.0, 401), strict=True):
+        kind = "sensor_msgs/msg/FluidPressure"
+        for topic in "suction_pressure", "suction_setpoint":
+            told = message(kind, stamp, fluid_pressure=max(float(pressure), 4000.0))
+            made.add(topic, kind, made.arrival(stamp), told)
+    (run,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    got = evaluate(Case(run))
+    full = Climber(suction_pressure=8000.0).seal_friction * RADIUS * RATE * 400 * 0.005
+    same(got, mean_suction=62.5, seal_work_share=62.5, seal_work=0.625 * full)
+
+
 def test_without_a_reference_all_else_is_told(tmp_path):
     made = Made()
     made.add_odometry()

@@ -3,6 +3,8 @@
 m Δv = ∫ (τR + τL)/r dt - m g_t ∫ sinθ dt - f ∫ σ dt        (11), integrated
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from climber_uk.mechanics import Array
@@ -62,6 +64,50 @@ def has_suction(case: Case) -> bool:
     return case.run.parameters.get("adhesion", SUCTION) == SUCTION
 
 
+def is_saved(case: Case) -> bool:
+    """Whether less than the full suction was asked of the pump, as far as is known."""
+    return has_suction(case) and len(case.run.recorded[topics.SETPOINT]) > 0
+
+
+def pressure(case: Case) -> Array:
+    """Pressure (n,) [Pa] at the stamps of the odometry, nan if it was not measured."""
+    run, measured = case.run, case.run.recorded[topics.PRESSURE]
+    if not len(measured):
+        return np.full(len(run.time), NAN)
+    return np.interp(run.time, run.seconds(measured), measured.values[:, 0])
+
+
+def full_pressure(case: Case) -> float:
+    """Pressure [Pa] of the controller's parameters, nan if they are unknown."""
+    return NAN if case.run.climber is None else case.run.climber.suction_pressure
+
+
+def mean_suction(case: Case) -> float:
+    """Mean of the pressure over time, by the full one [%]."""
+    return 100 * _integral(case, pressure(case)) / _integral(case, full_pressure(case))
+
+
+def seal_work(case: Case) -> float:
+    """Work of the seal's friction [J], ∫ (1 - k) μ P S |v| dt."""
+    climber, speed = case.run.climber, np.abs(case.run.rates[:, 0])
+    if climber is None:
+        return NAN
+    return _integral(
+        case, replace(climber, suction_pressure=1.0).seal_friction * pressure(case) * speed
+    )
+
+
+def seal_work_share(case: Case) -> float:
+    """The same, by what it were at the full pressure [%]."""
+    speed = np.abs(case.run.rates[:, 0])
+    whole = _integral(case, full_pressure(case) * speed)
+    return 100 * _integral(case, pressure(case) * speed) / whole if whole > 0 else NAN
+
+
+def _integral(case: Case, values: Array | float) -> float:
+    return float(np.trapezoid(values + 0 * case.run.time, case.run.time))
+
+
 METRICS = (
     Metric(
         "lowest_slip_margin",
@@ -93,6 +139,29 @@ METRICS = (
         "least pressure difference of the suction",
         lambda case: lowest(case.run.recorded[topics.PRESSURE].values),
         has_suction,
+    ),
+    Metric(
+        "mean_suction",
+        "%",
+        "mean of the measured pressure over time, by `suction_pressure`, where the pump was given "
+        "a setpoint; of the pump's power no more than this is known: a leak's flow is not measured",
+        mean_suction,
+        is_saved,
+    ),
+    Metric(
+        "seal_work",
+        "J",
+        "work of the seal's friction, by the measured pressure and the parameters, where the pump "
+        "was given a setpoint: what wears the seal",
+        seal_work,
+        is_saved,
+    ),
+    Metric(
+        "seal_work_share",
+        "%",
+        "the same, by what it were at `suction_pressure` throughout",
+        seal_work_share,
+        is_saved,
     ),
     Metric(
         "max_side_slip",

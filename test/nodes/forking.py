@@ -1,0 +1,59 @@
+"""Programs of the package in processes of their own that need not import everything again.
+
+A node spends half a second of the processor on importing rclpy, its messages, and the package, and
+tests of nodes would spend most of theirs on that. Here a server imports them once, and forks; what
+runs in the forked process is what the installed script calls, with its words and its domain.
+"""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+from importlib.metadata import entry_points
+
+FORKED = {
+    script.name: script
+    for script in entry_points(group="console_scripts")
+    if script.module.startswith(("climber_uk.nodes.", "climber_uk.recording."))
+}
+SERVER = multiprocessing.get_context("forkserver")
+SERVER.set_forkserver_preload([script.module for script in FORKED.values()])
+
+
+def main(name, words, log, domain, directory):
+    """Be the program of a name, from here on."""
+    file = os.open(log, os.O_WRONLY | os.O_APPEND)
+    os.dup2(file, sys.stdout.fileno())
+    os.dup2(file, sys.stderr.fileno())
+    os.environ["ROS_DOMAIN_ID"] = domain
+    os.chdir(directory)
+    sys.argv = [name, *words]
+    FORKED[name].load()()
+
+
+class Forked:
+    """A process with a program of `FORKED`: as much of `subprocess.Popen` as the tests use."""
+
+    def __init__(self, name, words, log, domain):
+        arguments = name, [str(word) for word in words], str(log), str(domain), os.getcwd()
+        self.process = SERVER.Process(target=main, args=arguments, daemon=True)
+        self.process.start()
+        self.pid = self.process.pid
+        self.terminate, self.kill = self.process.terminate, self.process.kill
+
+    @property
+    def returncode(self):
+        return self.process.exitcode
+
+    def poll(self):
+        return self.returncode
+
+    def wait(self, timeout=None):
+        self.process.join(timeout)
+        if self.returncode is None:
+            raise subprocess.TimeoutExpired(self.process.name, timeout)
+        return self.returncode
+
+    def send_signal(self, number):
+        if self.returncode is None:
+            os.kill(self.pid, number)
