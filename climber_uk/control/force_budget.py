@@ -9,7 +9,7 @@ told too late shows while nothing drives.
 
 import math
 
-from climber_uk.control.control_law import CUT, Command
+from climber_uk.control.control_law import CUT, Command, ControlLaw
 from climber_uk.control.estimator import Acting, Observed
 from climber_uk.control.model import SLOW
 from climber_uk.control.safety import Mode, Trouble
@@ -19,6 +19,7 @@ from climber_uk.mechanics.quantities import Torques, Wrench
 FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
 GROWS = 1.4  # from one push to the next
 MOST, PUSHES = 1.1, 6  # times what is allowed, and pushes, after which it is stalled
+TRIED = 2  # pushes, from which on a climber off its path is stalled
 SPENT = 0.8  # of it, from which it is used up
 FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing drives
 HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
@@ -73,7 +74,7 @@ class ForceBudget:
         if self._rests:
             self._rests, self.paused, self._slid, self.pushes = False, None, 0.0, self.pushes // 2
         self._slid += time
-        resists = _push(climber, observed.torques, after.sine)
+        resists = _push(climber, observed.torques, _weight(climber, observed))
         resists -= climber.driven_mass * (after.speed - before.speed) / time
         new = max(1 - math.exp(-time / MEMORY), time / self._slid)
         self._friction += new * (math.copysign(1.0, after.speed) * resists - self._friction)
@@ -91,7 +92,7 @@ class ForceBudget:
             self._lives = True
         if self._lives and self.paused is None:
             return None
-        push = _push(climber, observed.torques, after.sine)
+        push = _push(climber, observed.torques, _weight(climber, observed))
         self.speed = self._rolled(climber, push, time)
         if self.pushes:
             _, moment = climber.wrench(*observed.torques)
@@ -103,9 +104,14 @@ class ForceBudget:
                 self.paused = None
         elif abs(self.speed) > SPENT * self.most:
             self.paused, self.pushes = 0.0, self.pushes + 1
-        if self.pushes > PUSHES:
-            return Mode.STALLED, f"{self.pushes} pushes moved nothing"
-        return None
+        return self.unanswered if self.pushes > PUSHES else None
+
+    @property
+    def unanswered(self) -> Trouble | None:
+        """Trouble if odometry stands exactly, whatever was pushed."""
+        if self.pushes < TRIED or self._lives:
+            return None
+        return Mode.STALLED, f"{self.pushes} pushes moved nothing"
 
     def _holds(self, climber: Climber) -> float:
         """Friction [N] that is known to hold it."""
@@ -121,19 +127,19 @@ class ForceBudget:
         end = speed + time * push / climber.driven_mass
         return 0.0 if speed * end < 0 else end
 
-    def within(self, command: Command, climber: Climber, period: float, pending: Acting) -> Command:
+    def within(self, command: Command, law: ControlLaw, period: float, pending: Acting) -> Command:
         """A command, or what of it is in the budget; `pending` torques act before it."""
         if not self._rests or (self._lives and self.paused is None):
             return command
-        sine = command.motion.sine
-        push, (_, moment) = _push(climber, command.wheels, sine), climber.wrench(*command.wheels)
+        climber, weight = law.climber, law.weight(command.motion)
+        push, (_, moment) = _push(climber, command.wheels, weight), climber.wrench(*command.wheels)
         if self.paused is not None:
             most = 0.0 if self.speed else HELD * climber.seal_friction
             lowest, highest = -most, most
         else:
             speed = self.speed
             for torques, time in pending:
-                self.speed = self._rolled(climber, _push(climber, torques, sine), time)
+                self.speed = self._rolled(climber, _push(climber, torques, weight), time)
             speed, self.speed = self.speed, speed
             holds, to_force = self._holds(climber), climber.driven_mass / period
             lowest = -holds - to_force * max(self.most + speed, 0.0)
@@ -158,10 +164,15 @@ class ForceBudget:
         return min(max(moment, lowest), to_moment * max(self.first - self.turn, 0.0))
 
 
-def _push(climber: Climber, torques: Torques, sine: float) -> float:
+def _push(climber: Climber, torques: Torques, weight: float) -> float:
     """Drive force [N] beside the one that carries the weight."""
     force, _ = climber.wrench(*torques)
-    return force - climber.weight_along_wall * sine
+    return force - weight
+
+
+def _weight(climber: Climber, observed: Observed) -> float:
+    """Drive [N] that carries the weight."""
+    return climber.weight_along_wall * observed.after.sine - observed.pull
 
 
 def _falls(climber: Climber) -> bool:

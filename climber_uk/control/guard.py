@@ -155,7 +155,8 @@ class Guard:
     def _watch_budget(
         self, climber: Climber, observed: Observed, expected: Expected
     ) -> Trouble | None:
-        if self.options.stall_time == 0 or expected.wanted.speed < RESTS:
+        is_to_rest = expected.wanted.speed < RESTS and not expected.waits
+        if self.options.stall_time == 0 or is_to_rest:
             self.budget.pause()
             return None
         return self.budget.see(climber, observed, expected.allowed.speed)
@@ -277,7 +278,8 @@ class Guard:
     def is_for_good(self) -> bool:
         """Whether it ends only by ~/enable, once the climber has been looked after."""
         many = len(self.faults) >= self.options.attempts
-        return many or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
+        is_stuck = self._is(Mode.STALLED) and self.budget.unanswered is not None
+        return many or is_stuck or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
 
     @property
     def trouble(self) -> Trouble | None:
