@@ -89,8 +89,8 @@ class RimStop:
 
     def add(self, rim: float, other: float, asked: float) -> None:
         """Add speeds [m/s] of this rim, of the other, and what the reference asks of the slower."""
-        if abs(rim) >= STANDS or abs(other) <= GOES:
-            self._stands = 0
+        if abs(rim) >= STANDS or (abs(other) <= GOES and not self._at_once):
+            self._stands, self._at_once = 0, False
         else:
             if self._stands == 0:
                 self._at_once = max(map(abs, self._seen)) > WENT

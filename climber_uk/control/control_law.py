@@ -291,14 +291,14 @@ class ControlLaw:
     def braking(self, situation: ControlInput, braking: Braking) -> Torques:
         """Torques that carry the weight and brake what moves."""
         climber, motion = self.climber, situation.motion
-        weight = self._weight(motion) if braking.carries else 0.0
+        weight = self.weight(motion) if braking.carries else 0.0
         shaken, shaken_yaw = braking.shaking
         force = weight + climber.driven_mass * (shaken - braking.drive * motion.speed)
         turning = shaken_yaw / climber.half_track - braking.yaw * motion.yaw_rate
         moment = climber.driven_inertia * turning
         return Torques(*climber.saturate(force, moment, *self._bounds(situation))[2:4])
 
-    def _weight(self, motion: Motion) -> Any:
+    def weight(self, motion: Motion) -> Any:
         """Drive [N] that carries the weight."""
         on_plane = self.climber.weight_along_wall * motion.sine
         if self.wall is None:

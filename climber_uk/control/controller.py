@@ -291,7 +291,8 @@ class Controller:
             return None
         expected = self.active.expected(self._stamp, target, self._law.constraints)
         fault = self.guard.watch(self._law.climber, observed, expected)
-        fault = fault or self.active.strayed(observed.before, target)
+        if fault is None and (strayed := self.active.strayed(observed.before, target)):
+            fault = self.guard.budget.unanswered or strayed
         if fault is not None and fault[0] is Mode.TOO_FAST:
             least = OPPOSED_IF_TOO_FAST * self.safety.max_twist_error
             sign = self._twist.opposed(least, is_sure=True)
@@ -390,6 +391,8 @@ class Controller:
                     target, lost / law.climber.driven_mass, target_time, ahead.period
                 )
                 command = law.command(ahead, target.point or point)
+            pending = estimator.pending(ahead.begins)
+            command = self.guard.budget.within(command, law, ahead.period, pending)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None

@@ -170,6 +170,10 @@ class Estimator:
         aside = self.slip.speed(self.climber, motion) if self.slip is not NO_SLIP else 0.0
         return ControlInput(motion, held, disturbance, self.period, begins, *resistance, aside)
 
+    def pending(self, begins: int) -> Acting:
+        """Torques that act from the last odometry until `begins` [ns]."""
+        return self._sent.between(self.stamp, begins)
+
     def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
         timing = self.timing

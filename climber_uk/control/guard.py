@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from climber_uk.control.actuator_check import ActuatorCheck
 from climber_uk.control.estimator import Observed
+from climber_uk.control.force_budget import ForceBudget
 from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics import SECOND
@@ -21,6 +22,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 TOO_FAST_IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
+RESTS = 1e-3  # [m/s] of a reference that does
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: a limit cycle
@@ -116,7 +118,7 @@ class Guard:
         self._rests_at: Motion | None = None
         self._followed = math.inf  # [s] since the last fault
         self.faults: deque[int] = deque()  # [ns] stamps
-        self._actuators = ActuatorCheck()
+        self._actuators, self.budget = ActuatorCheck(), ForceBudget()
         self.restart()
 
     def forgive(self) -> None:
@@ -131,6 +133,7 @@ class Guard:
         self._swings = Swings(), Swings()
         self._since_rest = math.inf  # [s]
         self._actuators.restart()
+        self.budget.restart()
 
     def watch(self, climber: Climber, observed: Observed, expected: Expected) -> Trouble | None:
         """What is wrong with what is observed; None if all is well."""
@@ -138,6 +141,7 @@ class Guard:
         self._followed += observed.time
         asked = expected.wanted.speed - climber.half_track * expected.wanted.yaw_rate
         self._actuators.add(climber, observed, self.options.response_time, asked)
+        given = self._watch_budget(climber, observed, expected)
         too_fast = self._watch_rates(climber, observed, expected)
         return (
             self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
@@ -145,7 +149,17 @@ class Guard:
             or self._watch_limit(climber, observed, expected, torques)
             or self._watch_swings(climber, observed, torques)
             or self._watch_disturbance(climber, observed.disturbance)
+            or given
         )
+
+    def _watch_budget(
+        self, climber: Climber, observed: Observed, expected: Expected
+    ) -> Trouble | None:
+        is_to_rest = expected.wanted.speed < RESTS and not expected.waits
+        if self.options.stall_time == 0 or is_to_rest:
+            self.budget.pause()
+            return None
+        return self.budget.see(climber, observed, expected.allowed.speed)
 
     def _watch_rates(
         self, climber: Climber, observed: Observed, expected: Expected
@@ -264,7 +278,8 @@ class Guard:
     def is_for_good(self) -> bool:
         """Whether it ends only by ~/enable, once the climber has been looked after."""
         many = len(self.faults) >= self.options.attempts
-        return many or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
+        is_stuck = self._is(Mode.STALLED) and self.budget.unanswered is not None
+        return many or is_stuck or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
 
     @property
     def trouble(self) -> Trouble | None:

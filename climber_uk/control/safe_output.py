@@ -107,8 +107,11 @@ class SafeOutput:
         if doubtful is None or doubted is None:
             drive, yaw = (rate * (sign or 1) for sign in self.polarities.signs)
             # the other wheel can brake a turn, while the seal holds what it drives
-            one = mode is Mode.DEAD_WHEEL and not law.falls
-            return Braking(0.0, yaw, carries=False) if one else Braking(drive, yaw)
+            holds = not law.falls
+            if mode is Mode.DEAD_WHEEL and holds:
+                return Braking(0.0, yaw, carries=False)
+            # nobody knows its heading where odometry is stuck
+            return Braking(drive, yaw, carries=not (mode is Mode.STALLED and holds))
         if law.falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
             doubtful = doubtful[0] or 1, doubtful[1] or 1
         rims = motion.speed, law.climber.half_track * motion.yaw_rate

@@ -45,6 +45,7 @@ class Mode(Enum):
     STALLED = "torque at its limit without effect"
     DISTURBED = "a disturbance that nothing explains"
     DEAD_WHEEL = "a wheel does not answer its torque"
+    LATE = "odometry is older than its stamps say"
 
     @property
     def is_fault(self) -> bool:

@@ -1,0 +1,180 @@
+"""How much force is given on trust: what goes beyond known friction while no motion is told.
+
+A seal that sticks looks like odometry that is late, or stuck: torque is given, and no motion is
+told. The climber may move in truth, at a speed that is the excess force's integral over the mass.
+So that speed is bounded. Where it is used up, the climber is let come to rest, as its seal makes
+it; then it is pushed again, a little more. A seal that sticks breaks loose by that, and what was
+told too late shows while nothing drives.
+"""
+
+import math
+
+from climber_uk.control.control_law import CUT, Command, ControlLaw
+from climber_uk.control.estimator import Acting, Observed
+from climber_uk.control.model import SLOW
+from climber_uk.control.safety import Mode, Trouble
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import Torques, Wrench
+
+FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
+GROWS = 1.4  # from one push to the next
+MOST, PUSHES = 1.1, 6  # times what is allowed, and pushes, after which it is stalled
+TRIED = 2  # pushes, from which on a climber off its path is stalled
+SPENT = 0.8  # of it, from which it is used up
+FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing drives
+HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
+LATE = 0.035  # [s] into a pause, from which on a motion that begins comes too late
+MEMORY = 0.1  # [s] in which friction is learnt
+KNOWN = 0.2  # [s] of sliding, after which it is known
+MOST_FRICTION = 2.0  # times that of the model
+
+
+class ForceBudget:
+    """What a climber may do by its torques, while odometry tells that it rests."""
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Know nothing of a climber."""
+        self.pause()
+        self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
+
+    def pause(self) -> None:
+        """Watch nothing for now: it need not move."""
+        self._rests = False  # as it is told
+        self.speed = self.turn = 0.0  # [m/s] that it may have, and a rim by turning
+        self.pushes = 0  # without an answer
+        self.paused: float | None = None  # [s] for which nothing drives
+        self._allowed = math.inf  # [m/s]
+        self._lives = False  # odometry, that has changed at all since the first push
+
+    @property
+    def first(self) -> float:
+        """Speed [m/s] that is given at first."""
+        return FIRST + FIRST_SHARE * self._allowed
+
+    @property
+    def most(self) -> float:
+        """Speed [m/s] that may be given now."""
+        return min(self.first * GROWS**self.pushes, MOST * self._allowed)
+
+    def see(self, climber: Climber, observed: Observed, allowed: float) -> Trouble | None:
+        """Take what an odometry tells; `allowed` [m/s] is what the reference may ask for."""
+        self._allowed = allowed
+        before, after, time = observed.before, observed.after, observed.time
+        gone = math.hypot(after.x - before.x, after.y - before.y)
+        if max(abs(after.speed), gone / time) >= SLOW or _falls(climber):
+            return self._slide(climber, observed)
+        return self._rest(climber, observed)
+
+    def _slide(self, climber: Climber, observed: Observed) -> Trouble | None:
+        before, after, time = observed.before, observed.after, observed.time
+        late = self.paused
+        if self._rests:
+            self._rests, self.paused, self._slid, self.pushes = False, None, 0.0, self.pushes // 2
+        self._slid += time
+        resists = _push(climber, observed.torques, _weight(climber, observed))
+        resists -= climber.driven_mass * (after.speed - before.speed) / time
+        new = max(1 - math.exp(-time / MEMORY), time / self._slid)
+        self._friction += new * (math.copysign(1.0, after.speed) * resists - self._friction)
+        if late is not None and late > LATE + observed.reaction:
+            return Mode.LATE, f"it moves {late:.2f} s after a push has ended"
+        return None
+
+    def _rest(self, climber: Climber, observed: Observed) -> Trouble | None:
+        before, after, time = observed.before, observed.after, observed.time
+        if not self._rests:
+            self._friction *= self._slid > KNOWN
+            self._rests, self.speed, self.turn = True, before.speed, 0.0
+            self._lives = False
+        elif self.pushes and after[:3] != before[:3]:
+            self._lives = True
+        if self._lives and self.paused is None:
+            return None
+        push = _push(climber, observed.torques, _weight(climber, observed))
+        self.speed = self._rolled(climber, push, time)
+        if self.pushes:
+            _, moment = climber.wrench(*observed.torques)
+            self.turn += climber.half_track * moment / climber.driven_inertia * time
+        if self.paused is not None:
+            self.paused += time
+            pause = FIRST_PAUSE if self.pushes == 1 else PAUSE
+            if self.paused > pause + observed.reaction and self.speed == 0:
+                self.paused = None
+        elif abs(self.speed) > SPENT * self.most:
+            self.paused, self.pushes = 0.0, self.pushes + 1
+        return self.unanswered if self.pushes > PUSHES else None
+
+    @property
+    def unanswered(self) -> Trouble | None:
+        """Trouble if odometry stands exactly, whatever was pushed."""
+        if self.pushes < TRIED or self._lives:
+            return None
+        return Mode.STALLED, f"{self.pushes} pushes moved nothing"
+
+    def _holds(self, climber: Climber) -> float:
+        """Friction [N] that is known to hold it."""
+        model = climber.seal_friction
+        return min(max(model, self._friction), MOST_FRICTION * model)
+
+    def _rolled(self, climber: Climber, push: float, time: float) -> float:
+        """The speed [m/s] that it may have, a time [s] later."""
+        speed, friction = self.speed, self._holds(climber)
+        if speed == 0 and abs(push) <= friction:
+            return 0.0
+        push -= math.copysign(friction, speed or push)
+        end = speed + time * push / climber.driven_mass
+        return 0.0 if speed * end < 0 else end
+
+    def within(self, command: Command, law: ControlLaw, period: float, pending: Acting) -> Command:
+        """A command, or what of it is in the budget; `pending` torques act before it."""
+        if not self._rests or (self._lives and self.paused is None):
+            return command
+        climber, weight = law.climber, law.weight(command.motion)
+        push, (_, moment) = _push(climber, command.wheels, weight), climber.wrench(*command.wheels)
+        if self.paused is not None:
+            most = 0.0 if self.speed else HELD * climber.seal_friction
+            lowest, highest = -most, most
+        else:
+            speed = self.speed
+            for torques, time in pending:
+                self.speed = self._rolled(climber, _push(climber, torques, weight), time)
+            speed, self.speed = self.speed, speed
+            holds, to_force = self._holds(climber), climber.driven_mass / period
+            lowest = -holds - to_force * max(self.most + speed, 0.0)
+            highest = holds + to_force * max(self.most - speed, 0.0)
+        cut = push - min(max(push, lowest), highest)
+        turned = moment - self._turning(climber, moment, period) if self.pushes else 0.0
+        if abs(cut) + abs(turned) <= CUT:
+            return command
+        limit, less = climber.max_wheel_torque, climber.torques(cut, turned)
+        right, left = (
+            min(max(it - off, -limit), limit) for it, off in zip(command.wheels, less, strict=True)
+        )
+        lost = Wrench(command.lost.force + cut, command.lost.moment + turned)
+        return command._replace(wheels=Torques(right, left), lost=lost)
+
+    def _turning(self, climber: Climber, moment: float, period: float) -> float:
+        """A moment [N m], or what of it is given while no motion is told: none in a pause."""
+        if self.paused is not None:
+            return 0.0
+        to_moment = climber.driven_inertia / climber.half_track / period
+        lowest = -to_moment * max(self.first + self.turn, 0.0)
+        return min(max(moment, lowest), to_moment * max(self.first - self.turn, 0.0))
+
+
+def _push(climber: Climber, torques: Torques, weight: float) -> float:
+    """Drive force [N] beside the one that carries the weight."""
+    force, _ = climber.wrench(*torques)
+    return force - weight
+
+
+def _weight(climber: Climber, observed: Observed) -> float:
+    """Drive [N] that carries the weight."""
+    return climber.weight_along_wall * observed.after.sine - observed.pull
+
+
+def _falls(climber: Climber) -> bool:
+    """Whether its weight is more than its seal holds: it does not come to rest by itself."""
+    return climber.seal_friction < climber.weight_along_wall
