@@ -2,11 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from climbs import PERIOD, Climb
 from test_lies import frozen
 
 from climber_uk.control.safety import Mode
+from climber_uk.mechanics.quantities import State
+
+CIRCLE = {
+    **{"shape": "ellipse", "ellipse.semi_axis_x": 0.8, "ellipse.semi_axis_y": 0.8},
+    **{"rest_to_rest.rate": 0.25, "rest_to_rest.ramp_time": 3.0},
+}
 
 pytestmark = pytest.mark.slow
 
@@ -16,6 +23,43 @@ def test_odometry_that_is_stuck_from_the_start_stalls_and_lets_nothing_run_away(
     assert climb.controller.mode is Mode.STALLED
     assert "pushes moved nothing" in climb.controller.detail
     assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
+    assert climb.fastest(climb.time - 0.5) < 0.01
+
+
+class Encoders:
+    """Odometry made of two encoders, which stand from some times [s] on; of `every` few, one."""
+
+    def __init__(self, right, left, every):
+        self.stands, self.every, self.calls, self.pose = (right, left), every, 0, None
+
+    def __call__(self, time, state):
+        turn = 0.3 * state.yaw_rate
+        rims = state.forward_speed + turn, state.forward_speed - turn
+        right, left = (
+            rim if time < at - 1e-9 else 0.0 for rim, at in zip(rims, self.stands, strict=True)
+        )
+        speed, yaw_rate = (right + left) / 2, (right - left) / 0.6
+        if self.pose is None:
+            self.pose = state.pose
+        heading = self.pose[2] + yaw_rate * PERIOD / 2
+        self.pose = self.pose + PERIOD * np.array(
+            [speed * np.cos(heading), speed * np.sin(heading), yaw_rate]
+        )
+        self.calls += 1
+        return None if self.calls % self.every else State.rolling(self.pose, speed, yaw_rate)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("planner", [{}, CIRCLE], ids=["eight", "circle"])
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize("since", [0.0, 1.0, 4.0])
+@pytest.mark.parametrize("later", [0.0, 0.01, 0.1])
+def test_two_encoders_that_are_stuck_do_not_drive_it_away(planner, every, since, later):
+    climb = Climb(planner=planner)
+    climb.run(since + 5.0, odometry=Encoders(since, since + later, every))
+    print(f"{climb.fastest(since):.2f} m/s, {climb.controller.mode.name}")
+    assert climb.controller.mode in {Mode.STALLED, Mode.DEAD_WHEEL}
+    assert climb.fastest(since) < 0.9
     assert climb.fastest(climb.time - 0.5) < 0.01
 
 
