@@ -19,6 +19,8 @@ from climber_uk.mechanics.quantities import Torques, Wrench
 FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
 GROWS = 1.4  # from one push to the next
 MOST, PUSHES = 1.1, 6  # times what is allowed, and pushes, after which it is stalled
+# [m/s] of a reference that goes on while the climber stops, and pushes, after which it is stalled
+STOPPED, STOPPED_PUSHES = 0.05, 1
 TRIED = 2  # pushes, from which on a climber off its path is stalled
 SPENT = 0.8  # of it, from which it is used up
 FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing drives
@@ -46,8 +48,9 @@ class ForceBudget:
         self.speed = self.turn = 0.0  # [m/s] that it may have, and a rim by turning
         self.pushes = 0  # without an answer
         self.paused: float | None = None  # [s] for which nothing drives
-        self._allowed = math.inf  # [m/s]
+        self._wanted, self._allowed = 0.0, math.inf  # [m/s]
         self._lives = False  # odometry, that has changed at all since the first push
+        self._most_pushes = PUSHES
 
     @property
     def first(self) -> float:
@@ -59,9 +62,11 @@ class ForceBudget:
         """Speed [m/s] that may be given now."""
         return min(self.first * GROWS**self.pushes, MOST * self._allowed)
 
-    def see(self, climber: Climber, observed: Observed, allowed: float) -> Trouble | None:
-        """Take what an odometry tells; `allowed` [m/s] is what the reference may ask for."""
-        self._allowed = allowed
+    def see(
+        self, climber: Climber, observed: Observed, wanted: float, allowed: float
+    ) -> Trouble | None:
+        """Take what an odometry tells; [m/s] that the reference asks for, and may ask for."""
+        self._wanted, self._allowed = wanted, allowed
         before, after, time = observed.before, observed.after, observed.time
         gone = math.hypot(after.x - before.x, after.y - before.y)
         if max(abs(after.speed), gone / time) >= SLOW or _falls(climber):
@@ -88,6 +93,8 @@ class ForceBudget:
             self._friction *= self._slid > KNOWN
             self._rests, self.speed, self.turn = True, before.speed, 0.0
             self._lives = False
+            stops = self._wanted > STOPPED and self._slid > KNOWN
+            self._most_pushes = STOPPED_PUSHES if stops else PUSHES
         elif self.pushes and after[:3] != before[:3]:
             self._lives = True
         if self._lives and self.paused is None:
@@ -104,7 +111,7 @@ class ForceBudget:
                 self.paused = None
         elif abs(self.speed) > SPENT * self.most:
             self.paused, self.pushes = 0.0, self.pushes + 1
-        return self.unanswered if self.pushes > PUSHES else None
+        return self.unanswered if self.pushes > self._most_pushes else None
 
     @property
     def unanswered(self) -> Trouble | None:

@@ -159,7 +159,7 @@ class Guard:
         if self.options.stall_time == 0 or is_to_rest:
             self.budget.pause()
             return None
-        return self.budget.see(climber, observed, expected.allowed.speed)
+        return self.budget.see(climber, observed, expected.wanted.speed, expected.allowed.speed)
 
     def _watch_rates(
         self, climber: Climber, observed: Observed, expected: Expected

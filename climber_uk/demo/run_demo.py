@@ -157,7 +157,8 @@ class Demo(ClimberNode):
 
     def run(self) -> None:
         """Wait for the duration, or a fall, and show the progress; raises as `wait` does."""
-        self.wait(lambda: self.time is not None, "the plant")
+        # one that fell before this was heard of tells no time any more
+        self.wait(lambda: self.time is not None or bool(self.fall), "the plant")
         first = self.time or 0.0
         begin = shown = time.monotonic()
         in_place, due = sys.stdout.isatty(), 0.0  # where it is no terminal, ten lines in all
