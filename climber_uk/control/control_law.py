@@ -321,9 +321,9 @@ class ControlLaw:
     def falls(self) -> bool:
         """Whether its weight may be more than its seal holds."""
         climber = self.climber
-        is_plane = self.wall is None
-        most = climber.weight_along_wall if is_plane else climber.mass * GRAVITY
-        return climber.seal_friction < most
+        if self.wall is None:
+            return climber.falls
+        return climber.seal_friction < climber.mass * GRAVITY
 
     @cached_property
     def _solve(self) -> Solve:

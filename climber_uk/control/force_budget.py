@@ -46,6 +46,8 @@ class ForceBudget:
         """Watch nothing for now: it need not move."""
         self._rests = False  # as it is told
         self.speed = self.turn = 0.0  # [m/s] that it may have, and a rim by turning
+        self._turns = False  # as it is told
+        self._astray = 0.0  # [rad] that its heading may be off
         self.pushes = 0  # without an answer
         self.paused: float | None = None  # [s] for which nothing drives
         self._wanted, self._allowed = 0.0, math.inf  # [m/s]
@@ -69,7 +71,7 @@ class ForceBudget:
         self._wanted, self._allowed = wanted, allowed
         before, after, time = observed.before, observed.after, observed.time
         gone = math.hypot(after.x - before.x, after.y - before.y)
-        if max(abs(after.speed), gone / time) >= SLOW or _falls(climber):
+        if max(abs(after.speed), gone / time) >= SLOW or climber.falls:
             return self._slide(climber, observed)
         return self._rest(climber, observed)
 
@@ -91,7 +93,7 @@ class ForceBudget:
         before, after, time = observed.before, observed.after, observed.time
         if not self._rests:
             self._friction *= self._slid > KNOWN
-            self._rests, self.speed, self.turn = True, before.speed, 0.0
+            self._rests, self.speed, self.turn, self._astray = True, before.speed, 0.0, 0.0
             self._lives = False
             stops = self._wanted > STOPPED and self._slid > KNOWN
             self._most_pushes = STOPPED_PUSHES if stops else PUSHES
@@ -100,10 +102,12 @@ class ForceBudget:
         if self._lives and self.paused is None:
             return None
         push = _push(climber, observed.torques, _weight(climber, observed))
-        self.speed = self._rolled(climber, push, time)
-        if self.pushes:
-            _, moment = climber.wrench(*observed.torques)
-            self.turn += climber.half_track * moment / climber.driven_inertia * time
+        self.speed = self._rolled(climber, self.speed, push, time)
+        rim, (_, moment) = climber.half_track * after.yaw_rate, climber.wrench(*observed.torques)
+        self._turns = abs(rim) >= SLOW
+        self.turn += climber.half_track * moment / climber.driven_inertia * time
+        self.turn = rim if self._turns else self.turn
+        self._astray += 0.0 if self._turns else abs(self.turn) / climber.half_track * time
         if self.paused is not None:
             self.paused += time
             pause = FIRST_PAUSE if self.pushes == 1 else PAUSE
@@ -121,13 +125,14 @@ class ForceBudget:
         return Mode.STALLED, f"{self.pushes} pushes moved nothing"
 
     def _holds(self, climber: Climber) -> float:
-        """Friction [N] that is known to hold it."""
+        """Friction [N] that is known to hold it, but for what its weight may pull beside."""
         model = climber.seal_friction
-        return min(max(model, self._friction), MOST_FRICTION * model)
+        friction = min(max(model, self._friction), MOST_FRICTION * model)
+        return max(friction - climber.weight_along_wall * min(self._astray, 1.0), 0.0)
 
-    def _rolled(self, climber: Climber, push: float, time: float) -> float:
-        """The speed [m/s] that it may have, a time [s] later."""
-        speed, friction = self.speed, self._holds(climber)
+    def _rolled(self, climber: Climber, speed: float, push: float, time: float) -> float:
+        """The speed [m/s] that it may have after a `push` [N] for a time [s]."""
+        friction = self._holds(climber)
         if speed == 0 and abs(push) <= friction:
             return 0.0
         push -= math.copysign(friction, speed or push)
@@ -136,23 +141,23 @@ class ForceBudget:
 
     def within(self, command: Command, law: ControlLaw, period: float, pending: Acting) -> Command:
         """A command, or what of it is in the budget; `pending` torques act before it."""
-        if not self._rests or (self._lives and self.paused is None):
+        if law.falls or not self._rests or (self._lives and self.paused is None):
             return command
         climber, weight = law.climber, law.weight(command.motion)
         push, (_, moment) = _push(climber, command.wheels, weight), climber.wrench(*command.wheels)
         if self.paused is not None:
-            most = 0.0 if self.speed else HELD * climber.seal_friction
+            held = HELD * min(climber.seal_friction, self._holds(climber))
+            most = 0.0 if self.speed else held
             lowest, highest = -most, most
         else:
             speed = self.speed
             for torques, time in pending:
-                self.speed = self._rolled(climber, _push(climber, torques, weight), time)
-            speed, self.speed = self.speed, speed
+                speed = self._rolled(climber, speed, _push(climber, torques, weight), time)
             holds, to_force = self._holds(climber), climber.driven_mass / period
             lowest = -holds - to_force * max(self.most + speed, 0.0)
             highest = holds + to_force * max(self.most - speed, 0.0)
         cut = push - min(max(push, lowest), highest)
-        turned = moment - self._turning(climber, moment, period) if self.pushes else 0.0
+        turned = moment - self._turning(climber, moment, period)
         if abs(cut) + abs(turned) <= CUT:
             return command
         limit, less = climber.max_wheel_torque, climber.torques(cut, turned)
@@ -163,12 +168,14 @@ class ForceBudget:
         return command._replace(wheels=Torques(right, left), lost=lost)
 
     def _turning(self, climber: Climber, moment: float, period: float) -> float:
-        """A moment [N m], or what of it is given while no motion is told: none in a pause."""
+        """A moment [N m], or what of it is given while no turn is told: none in a pause."""
         if self.paused is not None:
             return 0.0
+        if self._turns:
+            return moment
         to_moment = climber.driven_inertia / climber.half_track / period
-        lowest = -to_moment * max(self.first + self.turn, 0.0)
-        return min(max(moment, lowest), to_moment * max(self.first - self.turn, 0.0))
+        lowest = -to_moment * max(FIRST + self.turn, 0.0)
+        return min(max(moment, lowest), to_moment * max(FIRST - self.turn, 0.0))
 
 
 def _push(climber: Climber, torques: Torques, weight: float) -> float:
@@ -180,8 +187,3 @@ def _push(climber: Climber, torques: Torques, weight: float) -> float:
 def _weight(climber: Climber, observed: Observed) -> float:
     """Drive [N] that carries the weight."""
     return climber.weight_along_wall * observed.after.sine - observed.pull
-
-
-def _falls(climber: Climber) -> bool:
-    """Whether its weight is more than its seal holds: it does not come to rest by itself."""
-    return climber.seal_friction < climber.weight_along_wall

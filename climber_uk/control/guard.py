@@ -22,7 +22,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 TOO_FAST_IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
-RESTS = 1e-3  # [m/s] of a reference that does
+RESTS = 1e-9  # [m/s] of a reference that does: one that begins is slow at first
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: a limit cycle

@@ -123,6 +123,11 @@ class Climber:
         weight: float = self.mass * GRAVITY * sin(self.inclination * DEGREE)
         return weight
 
+    @property
+    def falls(self) -> bool:
+        """Whether its weight is more than its seal holds: it does not come to rest by itself."""
+        return self.seal_friction < self.weight_along_wall
+
     @cached_property
     def gravity_into_wall(self) -> float:
         """g_n of a flat wall, below 0 where it pulls the climber off [m/s²]."""

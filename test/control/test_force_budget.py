@@ -26,6 +26,20 @@ def test_odometry_that_is_stuck_from_the_start_stalls_and_lets_nothing_run_away(
     assert climb.fastest(climb.time - 0.5) < 0.01
 
 
+@pytest.mark.parametrize(
+    "offset", [(0.03, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, 0.2), (0.03, -0.03, -0.15)], ids=str
+)
+@pytest.mark.parametrize("planner", [{}, pytest.param(CIRCLE, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("scrubs", [False, pytest.param(True, marks=pytest.mark.soak)])
+def test_odometry_that_is_stuck_turns_nothing_away_that_is_to_be_elsewhere(offset, planner, scrubs):
+    climb = Climb(planner=planner, offset=offset, scrubs=scrubs)
+    climb.run(3.0, odometry=frozen(pose=True, twist=True)())
+    print(f"{climb.fastest():.2f} m/s, {climb.fastest_turn():.2f} rad/s")
+    assert climb.controller.mode is Mode.STALLED
+    assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
+    assert climb.fastest_turn() < 0.5
+
+
 class Encoders:
     """Odometry made of two encoders, which stand from some times [s] on; of `every` few, one."""
 
