@@ -37,12 +37,12 @@ SCRUBS: dict[str, Any] = {
     "acceleration_noise": 0.02,
     "output_frequency": 100.0,
 }
-BAG = {"scrub_deviation": 0.02, "initial_scrub": 0.08, "initial_pivot": 0.027}
+SLIP = {"scrub_deviation": 0.02, "initial_scrub": 0.08, "initial_pivot": 0.027}
 # rows: robot, and what the filter is told of it
 TOLD: dict[str, tuple[str, dict[str, Any]]] = {
     "two wheels": ("two wheels", {"way_noise": 0.002}),
     "four wheels": ("four wheels", SCRUBS),
-    "four wheels, known from a bag": ("four wheels", {**SCRUBS, **BAG}),
+    "four wheels, λ and a told": ("four wheels", {**SCRUBS, **SLIP}),
 }
 # fixes move poses to a side as well: the controller learns its side slip the slower
 GIVEN = {"two wheels": {}, "four wheels": {"observer.side_slip_bandwidth": 2.0}}

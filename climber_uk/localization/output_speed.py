@@ -42,9 +42,8 @@ class OutputSpeed:
     def __init__(self, frequency: float, scrubs: bool = False) -> None:
         """With a filter's W [rad/s], of wheels that roll or scrub."""
         self._speed, self._yaw_rate = Rate(frequency), Rate(frequency)
-        self._lag = Mean(
-            SCRUBBING_TIME if scrubs else GYRO_TIME
-        )  # [rad/s] by which the wheels' yaw rate is below the gyro's
+        # [rad/s] by which the wheels' yaw rate is below the gyro's
+        self._lag = Mean(SCRUBBING_TIME if scrubs else GYRO_TIME)
 
     def go_on(
         self, distance: float, wheels: float, gyro: float, duration: float

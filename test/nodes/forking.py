@@ -11,13 +11,13 @@ import subprocess
 import sys
 from importlib.metadata import entry_points
 
-FORKED = {
+PROGRAMS = {
     script.name: script
     for script in entry_points(group="console_scripts")
     if script.module.startswith(("climber_uk.nodes.", "climber_uk.recording."))
 }
 SERVER = multiprocessing.get_context("forkserver")
-SERVER.set_forkserver_preload([script.module for script in FORKED.values()])
+SERVER.set_forkserver_preload([script.module for script in PROGRAMS.values()])
 
 
 def main(name, words, log, domain, directory):
@@ -28,11 +28,11 @@ def main(name, words, log, domain, directory):
     os.environ["ROS_DOMAIN_ID"] = domain
     os.chdir(directory)
     sys.argv = [name, *words]
-    FORKED[name].load()()
+    PROGRAMS[name].load()()
 
 
 class Forked:
-    """A process with a program of `FORKED`: as much of `subprocess.Popen` as the tests use."""
+    """A process with a program of `PROGRAMS`: as much of `subprocess.Popen` as the tests use."""
 
     def __init__(self, name, words, log, domain):
         arguments = name, [str(word) for word in words], str(log), str(domain), os.getcwd()

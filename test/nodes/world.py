@@ -11,7 +11,7 @@ from pathlib import Path
 
 import rclpy
 from ament_index_python import PackageNotFoundError, get_package_prefix
-from forking import FORKED, Forked
+from forking import PROGRAMS, Forked
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -100,7 +100,7 @@ class World:
     def start(self, name, *arguments):
         """Start an executable of the package; its output is `log(name)`."""
         is_as_here = {**self.environment, **DOMAIN} == {**os.environ, **DOMAIN}
-        if name not in FORKED or not is_as_here or installation():
+        if name not in PROGRAMS or not is_as_here or installation():
             return self.run(name, *command(name), *arguments)
         self.log_file(name).write_text("")
         self.processes[name] = Forked(name, arguments, self.log_file(name), self.domain)
