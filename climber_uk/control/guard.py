@@ -26,7 +26,7 @@ RESTS = 1e-9  # [m/s] of a reference that does: one that begins is slow at first
 AT_LIMIT = 0.98  # of the largest torque
 STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: a limit cycle
-SWING_MEMORY = 0.4  # [s] of them
+MEMORY = 0.4  # [s] of them, and of strong torques that move nothing
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
@@ -101,7 +101,7 @@ class Swings:
 
     def add(self, load: float, time: float) -> None:
         """Take a share (-1 to 1) of the largest torque, that acted for `time` [s]."""
-        self.number *= math.exp(-time / SWING_MEMORY)
+        self.number *= math.exp(-time / MEMORY)
         if abs(load) < STRONG:
             return
         self.number += load * self._side < 0
@@ -211,7 +211,7 @@ class Guard:
         largest = max(abs(torques.right), abs(torques.left))
         load = largest / climber.max_wheel_torque
         if wanted.speed > MOVES:
-            stands = abs(motion.speed) < STANDS * wanted.speed
+            stands = motion.speed * math.copysign(1.0, expected.speed) < STANDS * wanted.speed
         else:  # it turns in place, or rests
             turns = climber.half_track * wanted.yaw_rate > MOVES
             stands = turns and abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
@@ -220,7 +220,9 @@ class Guard:
             effort = load / STRONG  # it shows the sooner, the stronger it is
         elif expected.waits and load >= AT_LIMIT:
             effort = 1.0
-        self._stalled = self._stalled + effort * observed.time if effort else 0.0
+        # one that trembles is pushed and let go in turns
+        kept = 1.0 if effort else stands * math.exp(-observed.time / MEMORY)
+        self._stalled = kept * self._stalled + effort * observed.time
         if not 0 < self.options.stall_time < self._stalled:
             return None
         return Mode.STALLED, f"{largest:.2f} N m"

@@ -10,6 +10,7 @@ from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.control_law import ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller, Settings
 from climber_uk.control.exact import Exact
+from climber_uk.control.guard import UNGUARDED
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import Observer
 from climber_uk.control.safety import Safety
@@ -82,7 +83,8 @@ def alone(case, i, duration):
     settings = Settings(law, observer, timing, pacing)
     link = Link(step=0.005 / steps, delay=0.005 * delay)
     state = State.moving(Motion(*(float(number) for number in indexed(start, i))))
-    controller = Controller(settings, Safety(max_jump=1e9))
+    # nor is there a guard, and its budget of force, over many
+    controller = Controller(settings, Safety(max_jump=1e9), guard=UNGUARDED)
     return simulate(trajectory, state, duration, controller, as_floats(true, i), link)
 
 

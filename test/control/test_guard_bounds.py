@@ -77,12 +77,26 @@ def test_a_climber_is_stalled_if_it_stands_or_its_reference_waits(what, periods)
     assert Watched().periods_until(Mode.STALLED, **what) == periods
 
 
-def test_a_stall_that_was_interrupted_counts_from_the_beginning():
+def test_a_stall_counts_from_the_beginning_once_the_climber_has_moved():
     climb = Watched()
     for _ in range(5):
-        assert climb.finds(speed=0.0, torques=(2.41, 2.41)) is None
-    assert climb.finds(speed=0.0) is None
-    assert climb.periods_until(Mode.STALLED, speed=0.0, torques=(2.41, 2.41)) == 6
+        assert climb.finds(speed=0.0, torques=(2.41, -2.41)) is None
+    assert climb.finds(speed=0.021, torques=(2.41, -2.41)) is None
+    assert climb.periods_until(Mode.STALLED, speed=0.0, torques=(2.41, -2.41)) == 6
+
+
+@pytest.mark.parametrize(
+    ("strong", "weak", "periods"), [(1, 1, 14), (2, 1, 10), (1, 3, 48), (1, 4, None)]
+)
+def test_a_climber_that_trembles_is_stalled(strong, weak, periods):
+    """It is driven for some periods and let go for others, in which it swings back."""
+    climb = Watched()
+    for number in range(1, 101):
+        drives = number % (strong + weak) < strong
+        torque = 2.41 if drives else 0.0
+        if climb.finds(speed=0.0 if drives else -0.1, torques=(torque, -torque)):
+            break
+    assert (number if number < 100 else None) == periods
 
 
 @pytest.mark.parametrize(
