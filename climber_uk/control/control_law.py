@@ -165,7 +165,8 @@ class ControlLaw:
         climber = self.climber
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
-        right, left = self._fixed_bounds or self._bounds(situation)
+        bounds = self._fixed_bounds or climber.bounds(motion)
+        near = None if everywhere(self.options.max_torque_rate == 0) else self._bounds(situation)
         solve, comes = self._solve, self.comes(target)
         drive, yaw_moment = climber.wrench(held.right, held.left)
         wall, push, left_pull = self.wall, r_F, 0.0
@@ -181,8 +182,10 @@ class ControlLaw:
                 forward_pull, left_pull = weight_beyond(wall, climber, predicted)
                 force = force - forward_pull
             force, moment = force - r_F, moment - r_N
-            drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, right, left)
-        lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
+            drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, *bounds)
+            lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
+            if near is not None:  # a change that is yet to come is not lost
+                drive, yaw_moment, tau_r, tau_l, _ = climber.saturate(drive, yaw_moment, *near)
         lateral = climber.lateral_reaction(predicted) - left_pull
         demanded, wheels = Wrench(force, moment), Torques(tau_r, tau_l)
         return Command(wheels, demanded, lateral, lost, predicted, v_1, yaw_rate)
@@ -335,7 +338,7 @@ class ControlLaw:
     def _fixed_bounds(self) -> tuple[Bounds, Bounds] | None:
         """Those of `_bounds`, unless they depend on the situation."""
         climber = self.climber
-        if not everywhere((climber.no_load_wheel_rate == 0) & (self.options.max_torque_rate == 0)):
+        if not everywhere(climber.no_load_wheel_rate == 0):
             return None
         bounds = -climber.max_wheel_torque, climber.max_wheel_torque
         return bounds, bounds

@@ -27,8 +27,10 @@ FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing d
 HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
 LATE = 0.035  # [s] into a pause, from which on a motion that begins comes too late
 MEMORY = 0.1  # [s] in which friction is learnt
+CREEPS = 1e-3  # [m/s] of a motion that pose and twist tell alike, from which on it is one
 KNOWN = 0.2  # [s] of sliding, after which it is known
 MOST_FRICTION = 2.0  # times that of the model
+BREAKS_LOOSE = 1.2  # times what a turn meets, until it begins
 
 
 class ForceBudget:
@@ -41,12 +43,14 @@ class ForceBudget:
         """Know nothing of a climber."""
         self.pause()
         self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
+        # [N m] that is turned against, of late, and what a turn is known to meet
+        self._resisted = self._scrubs = 0.0
 
     def pause(self) -> None:
         """Watch nothing for now: it need not move."""
         self._rests = False  # as it is told
         self.speed = self.turn = 0.0  # [m/s] that it may have, and a rim by turning
-        self._turns = False  # as it is told
+        self._turns = self._creeps = False  # as it is told, by pose and twist
         self._astray = 0.0  # [rad] that its heading may be off
         self.pushes = 0  # without an answer
         self.paused: float | None = None  # [s] for which nothing drives
@@ -71,9 +75,24 @@ class ForceBudget:
         self._wanted, self._allowed = wanted, allowed
         before, after, time = observed.before, observed.after, observed.time
         gone = math.hypot(after.x - before.x, after.y - before.y)
-        if max(abs(after.speed), gone / time) >= SLOW or climber.falls:
+        is_fast = max(abs(after.speed), gone / time) >= SLOW
+        is_told = after[:3] != before[:3]
+        self._turns = is_told and abs(climber.half_track * after.yaw_rate) >= SLOW
+        way = abs(after.speed) * time
+        self._creeps = abs(after.speed) >= CREEPS and abs(gone - way) < way / 2
+        if self._turns or (is_told and is_fast):
+            self._scrub(climber, observed)
+        if is_fast or climber.falls:
             return self._slide(climber, observed)
         return self._rest(climber, observed)
+
+    def _scrub(self, climber: Climber, observed: Observed) -> None:
+        """Learn what resists turning: what scrubs, all of it while it turns."""
+        before, after, time = observed.before, observed.after, observed.time
+        _, moment = climber.wrench(*observed.torques)
+        moment -= climber.driven_inertia * (after.yaw_rate - before.yaw_rate) / time
+        self._resisted += (1 - math.exp(-time / MEMORY)) * (moment - self._resisted)
+        self._scrubs = max(abs(self._resisted), 0.0 if self._turns else self._scrubs)
 
     def _slide(self, climber: Climber, observed: Observed) -> Trouble | None:
         before, after, time = observed.before, observed.after, observed.time
@@ -99,14 +118,15 @@ class ForceBudget:
             self._most_pushes = STOPPED_PUSHES if stops else PUSHES
         elif self.pushes and after[:3] != before[:3]:
             self._lives = True
-        if self._lives and self.paused is None:
+        if self._is_told:
+            self.speed, self.turn = before.speed, climber.half_track * after.yaw_rate
             return None
         push = _push(climber, observed.torques, _weight(climber, observed))
-        self.speed = self._rolled(climber, self.speed, push, time)
-        rim, (_, moment) = climber.half_track * after.yaw_rate, climber.wrench(*observed.torques)
-        self._turns = abs(rim) >= SLOW
-        self.turn += climber.half_track * moment / climber.driven_inertia * time
-        self.turn = rim if self._turns else self.turn
+        holds = self._holds(climber)
+        self.speed = _rolled(self.speed, push, holds, time / climber.driven_mass)
+        _, moment = climber.wrench(*observed.torques)
+        holds = BREAKS_LOOSE * self._scrubs
+        self.turn = _rolled(self.turn, moment, holds, time * _rims(climber))
         self._astray += 0.0 if self._turns else abs(self.turn) / climber.half_track * time
         if self.paused is not None:
             self.paused += time
@@ -116,6 +136,11 @@ class ForceBudget:
         elif abs(self.speed) > SPENT * self.most:
             self.paused, self.pushes = 0.0, self.pushes + 1
         return self.unanswered if self.pushes > self._most_pushes else None
+
+    @property
+    def _is_told(self) -> bool:
+        """Whether odometry lives, so that nothing is given on trust."""
+        return self.paused is None and (self._lives or self._turns or self._creeps)
 
     @property
     def unanswered(self) -> Trouble | None:
@@ -130,18 +155,9 @@ class ForceBudget:
         friction = min(max(model, self._friction), MOST_FRICTION * model)
         return max(friction - climber.weight_along_wall * min(self._astray, 1.0), 0.0)
 
-    def _rolled(self, climber: Climber, speed: float, push: float, time: float) -> float:
-        """The speed [m/s] that it may have after a `push` [N] for a time [s]."""
-        friction = self._holds(climber)
-        if speed == 0 and abs(push) <= friction:
-            return 0.0
-        push -= math.copysign(friction, speed or push)
-        end = speed + time * push / climber.driven_mass
-        return 0.0 if speed * end < 0 else end
-
     def within(self, command: Command, law: ControlLaw, period: float, pending: Acting) -> Command:
         """A command, or what of it is in the budget; `pending` torques act before it."""
-        if law.falls or not self._rests or (self._lives and self.paused is None):
+        if law.falls or not self._rests or self._is_told:
             return command
         climber, weight = law.climber, law.weight(command.motion)
         push, (_, moment) = _push(climber, command.wheels, weight), climber.wrench(*command.wheels)
@@ -150,10 +166,11 @@ class ForceBudget:
             most = 0.0 if self.speed else held
             lowest, highest = -most, most
         else:
-            speed = self.speed
+            speed, holds = self.speed, self._holds(climber)
             for torques, time in pending:
-                speed = self._rolled(climber, speed, _push(climber, torques, weight), time)
-            holds, to_force = self._holds(climber), climber.driven_mass / period
+                push_then = _push(climber, torques, weight)
+                speed = _rolled(speed, push_then, holds, time / climber.driven_mass)
+            to_force = climber.driven_mass / period
             lowest = -holds - to_force * max(self.most + speed, 0.0)
             highest = holds + to_force * max(self.most - speed, 0.0)
         cut = push - min(max(push, lowest), highest)
@@ -171,11 +188,23 @@ class ForceBudget:
         """A moment [N m], or what of it is given while no turn is told: none in a pause."""
         if self.paused is not None:
             return 0.0
-        if self._turns:
-            return moment
-        to_moment = climber.driven_inertia / climber.half_track / period
-        lowest = -to_moment * max(FIRST + self.turn, 0.0)
-        return min(max(moment, lowest), to_moment * max(FIRST - self.turn, 0.0))
+        holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
+        lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
+        return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))
+
+
+def _rolled(speed: float, push: float, friction: float, by_time: float) -> float:
+    """The speed [m/s] that it may have after a `push`, of which `friction` takes its part."""
+    if speed == 0 and abs(push) <= friction:
+        return 0.0
+    push -= math.copysign(friction, speed or push)
+    end = speed + by_time * push
+    return 0.0 if speed * end < 0 else end
+
+
+def _rims(climber: Climber) -> float:
+    """Acceleration [m/s²] of a rim by a moment of 1 N m."""
+    return climber.half_track / climber.driven_inertia
 
 
 def _push(climber: Climber, torques: Torques, weight: float) -> float:

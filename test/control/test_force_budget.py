@@ -1,14 +1,18 @@
 """Torque is given and no motion is told: a seal sticks, or odometry is stuck, or late."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from climbs import PERIOD, Climb
 from test_lies import frozen
 
+from climber_uk.control.control_law import Command
+from climber_uk.control.estimator import Observed
+from climber_uk.control.force_budget import BREAKS_LOOSE, ForceBudget
 from climber_uk.control.safety import Mode
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench
 
 CIRCLE = {
     **{"shape": "ellipse", "ellipse.semi_axis_x": 0.8, "ellipse.semi_axis_y": 0.8},
@@ -97,3 +101,33 @@ def test_a_seal_that_holds_more_than_believed_is_followed():
     climb = Climb(truth=truth).run(4.0)
     assert not any(mode.is_fault for mode in climb.modes)
     assert climb.fastest() > 0.1
+
+
+@pytest.mark.parametrize("met", [0.0, 30.0])
+def test_a_turn_is_given_on_trust_what_turns_have_met_and_a_fifth_more(met):
+    """It turns at a steady rate against a moment [N m]; then no motion is told any more."""
+    law, budget, nothing = Climb().controller._law, ForceBudget(), Wrench(0.0, 0.0)
+    climber, rests = law.climber, Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+    def see(before, after, moment):
+        acted = [(climber.torques(0.0, moment), PERIOD)]
+        budget.see(climber, Observed(before, after, PERIOD, acted, nothing, 0.01), 0.1, 0.2)
+
+    turning = [rests._replace(heading=0.8 * PERIOD * i, yaw_rate=0.8) for i in range(200)]
+    for before, after in pairwise(turning):
+        see(before, after, met)
+    see(rests, rests, 0.0)
+    asked = Command(climber.torques(0.0, 80.0), nothing, 0.0, nothing, rests, 0.0)
+    _, given = climber.wrench(*budget.within(asked, law, PERIOD, []).wheels)
+    assert given == pytest.approx(BREAKS_LOOSE * met, rel=1e-3)
+
+
+def test_what_creeps_as_pose_and_twist_tell_alike_is_not_held():
+    law, budget, nothing = Climb().controller._law, ForceBudget(), Wrench(0.0, 0.0)
+    climber, speed = law.climber, 2e-3
+    places = [Motion(i * speed * PERIOD, 0.0, 0.0, 1.0, 0.0, speed, 0.0) for i in range(400)]
+    asked = Command(Torques(2.0, 0.0), nothing, 0.0, nothing, places[0], 0.0)
+    for before, after in pairwise(places):
+        acted = [(asked.wheels, PERIOD)]
+        budget.see(climber, Observed(before, after, PERIOD, acted, nothing, 0.01), 0.1, 0.2)
+        assert budget.within(asked, law, PERIOD, []) is asked

@@ -33,16 +33,20 @@ def preview(rows):
 class UnderWay:
     """Odometry every 5 ms, torques that act at once, previews every 0.1 s."""
 
-    def __init__(self, trajectory, *, state=None, options=None, **parameters):
+    def __init__(
+        self, trajectory, *, state=None, options=None, config=CONFIG, plant_of=None, **parameters
+    ):
         self.options = options or CourseOptions()
-        given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
+        given = {**read_file(config, "/uk_torque_controller"), **parameters}
         self.controller = build_controller(Values(given), None)
-        self.plant = Plant(self.controller.law.climber, STEP)
         self.now, self.torques = SECOND, np.zeros(2)
         self.times, self.states, self.sent, self.positions, self.modes = [], [], [], [], []
+        self.targets = []  # where it should have been, None while nothing is followed
         self.begin(trajectory)
         reference = trajectory.at(0.0)
         self.state = state or State(reference.pose, reference.velocity)
+        own = Plant(self.controller.law.climber, STEP)
+        self.plant = plant_of(self.state) if plant_of else own
 
     def begin(self, trajectory, **how):
         start = self.now
@@ -61,6 +65,7 @@ class UnderWay:
             if self.period % PUBLISHED_EVERY == 0:
                 self.controller.on_reference(self.now, preview(self.course.preview(self.position)))
             answer = self.controller.on_odometry(self.now, self.now, self.state.motion)
+            self.targets.append(self.controller.active.at(self.now))
             if answer is not None:
                 self.torques = answer.torques
             if self.period % TOLD_EVERY == 0:
@@ -91,11 +96,11 @@ class UnderWay:
 class Travelling(UnderWay):
     """The same with a stick, paths from outside and starts in mid-course, as the planner has it."""
 
-    def __init__(self, trajectory):
+    def __init__(self, trajectory, **how):
         hand = HandOptions(input="twist", speed=0.2)
         make = lambda reference, time: (time, reference)  # noqa: E731
         self.journey = Journey(trajectory, CourseOptions(), hand, make)
-        super().__init__(trajectory)
+        super().__init__(trajectory, **how)
 
     def begin(self, trajectory, **_):
         self.position, self.period, self.course = 0, 0, self
