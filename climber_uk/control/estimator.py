@@ -167,7 +167,7 @@ class Estimator:
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
         held, resistance = self._sent.last, (learnt.friction, learnt.turning)
-        aside = self.slip.speed(self.climber, motion) if self.slip is not NO_SLIP else 0.0
+        aside = self._aside(motion)
         return ControlInput(motion, held, disturbance, self.period, begins, *resistance, aside)
 
     def pending(self, begins: int) -> Acting:
@@ -216,12 +216,16 @@ class Estimator:
             return self.motion
         return self._rolled(self.motion, self._sent.between(self.stamp, stamp))
 
+    def _aside(self, motion: Motion) -> float:
+        """Speed [m/s] at which wheels give way to the left."""
+        slip = self.slip
+        return slip.speed(self.climber, motion, self.wall) if slip is not NO_SLIP else 0.0
+
     def _rolled(self, motion: Motion, acting: Acting) -> Motion:
         """Motion after torques have acted, each for some time [s]."""
         climber, learnt = self.climber, self.learnt
         r_F, r_N, resisting = learnt.force, learnt.moment, (learnt.friction, learnt.turning)
-        aside = self.slip.speed(climber, motion) if self.slip is not NO_SLIP else 0.0
-        wall = self.wall
+        wall, aside = self.wall, self._aside(motion)
         for torques, time in acting:
             force, moment = climber.wrench(*torques)
             if wall is not None:
@@ -242,7 +246,7 @@ class Estimator:
         # speeds that come from poses share their noise, which would be learnt
         if self._last_pose is not None and has_twist and bandwidth > 0:
             poses = self._last_pose, motion
-            self.slip = self.slip.learnt(self.climber, *poses, time, bandwidth)
+            self.slip = self.slip.learnt(self.climber, *poses, time, bandwidth, self.wall)
         self._last_pose = motion
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)

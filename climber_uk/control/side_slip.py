@@ -2,6 +2,8 @@
 
     v_y = ρ |v| - λ |ω| Y / (m g)        Y = m v ω + m g_t cosθ, what the wheels take to the left
 
+on a plane; on a wall that is told, Y has the weight as it pulls there.
+
 ρ is creep. λ is what scrubbing wheels lack: a contact that is dragged round holds sideways like
 something viscous, and gives way the more, the faster it is dragged (docs/theory.md, §8.5).
 """
@@ -13,6 +15,7 @@ from typing import NamedTuple
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import clipped, wrapped
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
+from climber_uk.mechanics.wall import Wall, weight
 
 CREEP, SCRUB = 0.06, 0.1  # ρ, and λ [m], as large as they may well be
 LARGEST = 10.0  # times as large as that, at most
@@ -63,12 +66,18 @@ class SideSlip(NamedTuple):
     creep_rate: float = 0.0  # of ρ [1/s]
     offset: float = 0.0  # [m] of poses to the left of where they were expected, filtered
 
-    def speed(self, climber: Climber, motion: Motion) -> float:
+    def speed(self, climber: Climber, motion: Motion, wall: Wall | None = None) -> float:
         """v_y [m/s] of a climber in `motion`."""
-        return self.creep * abs(motion.speed) + self.scrub * _scrubbing(climber, motion)
+        return self.creep * abs(motion.speed) + self.scrub * _scrubbing(climber, motion, wall)
 
     def learnt(
-        self, climber: Climber, before: Motion, now: Motion, time: float, bandwidth: float
+        self,
+        climber: Climber,
+        before: Motion,
+        now: Motion,
+        time: float,
+        bandwidth: float,
+        wall: Wall | None = None,
     ) -> "SideSlip":
         """As two odometry messages teach, `time` [s] apart; with both poles at a bandwidth [1/s].
 
@@ -80,7 +89,7 @@ class SideSlip(NamedTuple):
         # an arc that is driven ever faster, or bends ever more, is not even about its middle
         faster, tighter = now.speed - before.speed, now.yaw_rate - before.yaw_rate
         aside -= time / 12 * (rate * faster - mean * tighter)
-        v, scrubbing = abs(mean), _scrubbing(climber, now)
+        v, scrubbing = abs(mean), _scrubbing(climber, now, wall)
         error = aside - self.creep * v - self.scrub * scrubbing
         by_creep, by_scrub = CREEP**2 * v, SCRUB**2 * scrubbing
         size = by_creep * v + by_scrub * scrubbing + (CREEP * SLOW_TO_LEARN) ** 2
@@ -93,15 +102,17 @@ class SideSlip(NamedTuple):
         scrub = clipped(self.scrub + time * gain * by_scrub, 0.0, LARGEST * SCRUB)
         return SideSlip(creep, scrub, gain * by_creep, offset * math.exp(-2 * poles * time))
 
-    def course(self, climber: Climber, target: ReferencePoint, at: At) -> Course | None:
+    def course(
+        self, climber: Climber, target: ReferencePoint, at: At, wall: Wall | None = None
+    ) -> Course | None:
         """Course of a climber on its reference; None where its wheels hold.
 
         `at` gives the reference at a time [s] after the one of `target`.
         """
         v, omega = target.speed, target.yaw_rate
         fade = v / (v * v + FADE_SPEED * FADE_SPEED)
-        reaction = climber.mass * v * omega + climber.weight_along_wall * math.cos(target.heading)
-        arm = self.scrub * reaction / (climber.mass * GRAVITY)  # [m] -v_y / |ω|
+        there = Motion.at(target.x, target.y, target.heading, v, omega)
+        arm = self.scrub * _reaction(climber, there, wall)  # [m] -v_y / |ω|
         angle, rate = math.atan(self.creep * abs(v) * fade), self.creep_rate * abs(v) * fade
         if abs(angle) + abs(fade * arm * omega) < NEGLIGIBLE:
             return None
@@ -119,18 +130,24 @@ def _ahead(target: ReferencePoint, at: At, lead: float) -> tuple[float, float, f
     """
     lead = clipped(lead, -MOST_LEAD, MOST_LEAD)
     angle = rate = acceleration = 0.0
-    for node, weight in NODES:
+    for node, share in NODES:
         later = at(clipped(lead * node, -HINDSIGHT, FORESIGHT))
-        angle += weight * wrapped(later.heading - target.heading)
-        rate += weight * (later.yaw_rate - target.yaw_rate)
-        acceleration += weight * (later.yaw_acceleration - target.yaw_acceleration)
+        angle += share * wrapped(later.heading - target.heading)
+        rate += share * (later.yaw_rate - target.yaw_rate)
+        acceleration += share * (later.yaw_acceleration - target.yaw_acceleration)
     return angle, rate, acceleration
 
 
-def _scrubbing(climber: Climber, motion: Motion) -> float:
+def _scrubbing(climber: Climber, motion: Motion, wall: Wall | None) -> float:
     """What λ is multiplied by [rad/s]."""
-    reaction = climber.lateral_reaction(motion) / (climber.mass * GRAVITY)
-    return -float(reaction) * abs(motion.yaw_rate)
+    return -_reaction(climber, motion, wall) * abs(motion.yaw_rate)
+
+
+def _reaction(climber: Climber, motion: Motion, wall: Wall | None) -> float:
+    """Y, by the weight."""
+    _, pulled = weight(wall, climber, motion)
+    turned = climber.mass * motion.speed * motion.yaw_rate
+    return float(turned - pulled) / (climber.mass * GRAVITY)
 
 
 NO_SLIP = SideSlip()
