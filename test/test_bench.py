@@ -60,7 +60,6 @@ def test_magnets_hold_a_robot_in_mujoco_on_what_is_round(monkeypatch, wall):
     monkeypatch.setitem(physics.PATHS, path, (physics.PATHS[path][0], 4.0))
     row = physics.run(f"magnets, {wall}", path, MujocoClimber)
     assert row.largest < 1  # mm
-    assert row.half_track == pytest.approx(0.18, abs=0.005)
 
 
 def test_ways_are_measured_in_turns_and_compared_within_a_round(monkeypatch, capsys):

@@ -169,11 +169,12 @@ class SideSlip(NamedTuple):
         one, other = self._leads(climber, target, wall)
         if abs(angle) + (abs(one) + abs(other)) * abs(target.yaw_rate) < NEGLIGIBLE:
             return None
+
         # it sags, whichever way it turns: of both ways to turn, the heading that is higher
-        ways = [
-            _ahead(target, at, lambda of, i=way: self._leads(climber, of, wall)[i])
-            for way in (0, 1)
-        ]
+        def lead(way: int) -> Callable[[ReferencePoint], float]:
+            return lambda of: self._leads(climber, of, wall)[way]
+
+        ways = [_ahead(target, at, lead(way)) for way in (0, 1)]
         turned, faster, sooner = max(ways) if one > other else min(ways)
         return Course.at(angle - turned, rate - faster, -sooner)
 
