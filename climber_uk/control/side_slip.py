@@ -12,7 +12,8 @@ how much the point that it turns about is shifted: the weight loads the wheels t
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from climber_uk.mechanics.climber import GRAVITY, Climber
@@ -166,20 +167,17 @@ class SideSlip(NamedTuple):
         """
         v, fade = abs(target.speed), _fade(target.speed)
         angle, rate = math.atan(self.creep * v * fade), self.creep_rate * v * fade
-        one, other = self._leads(climber, target, wall)
+        one, other = self._leads(climber, wall, target)
         if abs(angle) + (abs(one) + abs(other)) * abs(target.yaw_rate) < NEGLIGIBLE:
             return None
-
         # it sags, whichever way it turns: of both ways to turn, the heading that is higher
-        def lead(way: int) -> Callable[[ReferencePoint], float]:
-            return lambda of: self._leads(climber, of, wall)[way]
-
-        ways = [_ahead(target, at, lead(way)) for way in (0, 1)]
+        leads = partial(self._leads, climber, wall)
+        ways = [_ahead(target, at, leads, way) for way in (0, 1)]
         turned, faster, sooner = max(ways) if one > other else min(ways)
         return Course.at(angle - turned, rate - faster, -sooner)
 
     def _leads(
-        self, climber: Climber, target: ReferencePoint, wall: Wall | None
+        self, climber: Climber, wall: Wall | None, target: ReferencePoint
     ) -> tuple[float, float]:
         """Times T [s] by which its heading is ahead of its course, while it turns left, and right.
 
@@ -202,18 +200,20 @@ def _fade(speed: float) -> float:
 
 
 def _ahead(
-    target: ReferencePoint, at: At, lead: Callable[[ReferencePoint], float]
+    target: ReferencePoint, at: At, leads: Callable[[ReferencePoint], Sequence[float]], way: int
 ) -> tuple[float, float, float]:
     """How far the heading has to be ahead of a reference, and its derivatives.
+
+    `leads` gives T [s] of a reference, for each way to turn.
 
     θ - T θ̇ = θ_d, so that θ is the mean of what θ_d will be (was, of T < 0), with weights that fade
     exponentially by ∫ dt / T: the only solution that does not grow. T changes about evenly until
     then; what is later than can be seen goes on as it does there.
     """
-    now = lead(target)
+    now = leads(target)[way]
     angle = rate = acceleration = 0.0
     for node, share in NODES:
-        mean = lead(at(clipped(now * node / 2, -HINDSIGHT, FORESIGHT)))
+        mean = leads(at(clipped(now * node / 2, -HINDSIGHT, FORESIGHT)))[way]
         stretched = clipped(2 * mean / now - 1, 0.0, 3.0) if now else 1.0  # T then by T now
         mean = mean if mean * now > 0 else 0.0
         seen = clipped(mean * node, -HINDSIGHT, FORESIGHT)

@@ -177,7 +177,7 @@ def turning(*coefficients):
 
 def is_ahead(at, lead, slope=0.0):
     """How far θ, with its derivatives, is from T θ̇ [rad], [rad/s], [rad/s²]."""
-    angle, rate, acceleration = _ahead(at(0.0), at, lambda of: lead + slope * of.x)
+    angle, rate, acceleration = _ahead(at(0.0), at, lambda of: [lead + slope * of.x], 0)
     wanted = at(0.0)
     rate, acceleration = rate + wanted.yaw_rate, acceleration + wanted.yaw_acceleration
     return angle - lead * rate, rate - wanted.yaw_rate - slope * rate - lead * acceleration
