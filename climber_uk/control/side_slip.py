@@ -4,6 +4,8 @@
 
     Y = m v ω + m g_t cosθ, what the wheels take to the left        X = m g_t sinθ
 
+on a plane; on a wall that is told, with the weight as it pulls there.
+
 ρ is creep. λ is what scrubbing wheels lack: a contact that is dragged round holds sideways like
 something viscous, and gives way the more, the faster it is dragged (docs/theory.md, §8.5). p is by
 how much the point that it turns about is shifted: the weight loads the wheels that are lower.
@@ -17,6 +19,7 @@ from typing import NamedTuple
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import clipped, wrapped
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
+from climber_uk.mechanics.wall import Wall, weight
 
 SIZES = 0.06, 0.1, 0.03  # of ρ, λ [m] and p [m], as large as they may well be
 LARGEST = 10.0  # times as large as that, at most
@@ -109,13 +112,19 @@ class SideSlip(NamedTuple):
     offset: float = 0.0  # [m] of poses to the left of where they were expected, filtered
     covariance: Covariance = NOTHING_KNOWN
 
-    def speed(self, climber: Climber, motion: Motion) -> float:
+    def speed(self, climber: Climber, motion: Motion, wall: Wall | None = None) -> float:
         """v_y [m/s] of a climber in `motion`."""
-        v, scrubbing, shifting = _rates(climber, motion)
+        v, scrubbing, shifting = _rates(climber, motion, wall)
         return self.creep * v + self.scrub * scrubbing + self.pivot * shifting
 
     def learnt(
-        self, climber: Climber, before: Motion, now: Motion, time: float, bandwidth: float
+        self,
+        climber: Climber,
+        before: Motion,
+        now: Motion,
+        time: float,
+        bandwidth: float,
+        wall: Wall | None = None,
     ) -> "SideSlip":
         """As two odometry messages teach, `time` [s] apart; with both poles at a bandwidth [1/s].
 
@@ -127,7 +136,7 @@ class SideSlip(NamedTuple):
         # an arc that is driven ever faster, or bends ever more, is not even about its middle
         faster, tighter = now.speed - before.speed, now.yaw_rate - before.yaw_rate
         aside -= time / 12 * (rate * faster - mean * tighter)
-        v, scrubbing, shifting = _rates(climber, now)
+        v, scrubbing, shifting = _rates(climber, now, wall)
         error = aside - self.creep * v - self.scrub * scrubbing - self.pivot * shifting
         by_creep, by_scrub, by_pivot = by = self.covariance.times(v, scrubbing, shifting)
         large = math.hypot(SIZES[0] * v, SIZES[1] * scrubbing, SIZES[2] * shifting)
@@ -149,32 +158,35 @@ class SideSlip(NamedTuple):
             self.covariance.after(by, time * poles * per, time / FORGOTTEN),
         )
 
-    def course(self, climber: Climber, target: ReferencePoint, at: At) -> Course | None:
+    def course(
+        self, climber: Climber, target: ReferencePoint, at: At, wall: Wall | None = None
+    ) -> Course | None:
         """Course of a climber on its reference; None where its wheels hold.
 
         `at` gives the reference at a time [s] after the one of `target`.
         """
         v, fade = abs(target.speed), _fade(target.speed)
         angle, rate = math.atan(self.creep * v * fade), self.creep_rate * v * fade
-        one, other = self._leads(climber, target)
+        one, other = self._leads(climber, wall, target)
         if abs(angle) + (abs(one) + abs(other)) * abs(target.yaw_rate) < NEGLIGIBLE:
             return None
         # it sags, whichever way it turns: of both ways to turn, the heading that is higher
-        leads = partial(self._leads, climber)
+        leads = partial(self._leads, climber, wall)
         ways = [_ahead(target, at, leads, way) for way in (0, 1)]
         turned, faster, sooner = max(ways) if one > other else min(ways)
         return Course.at(angle - turned, rate - faster, -sooner)
 
-    def _leads(self, climber: Climber, target: ReferencePoint) -> tuple[float, float]:
+    def _leads(
+        self, climber: Climber, wall: Wall | None, target: ReferencePoint
+    ) -> tuple[float, float]:
         """Times T [s] by which its heading is ahead of its course, while it turns left, and right.
 
         Creep apart, β = v_y / v = -T ω.
         """
-        v, omega, heading = target.speed, target.yaw_rate, target.heading
-        weight = climber.mass * GRAVITY
-        reaction = climber.mass * v * omega + climber.weight_along_wall * math.cos(heading)
-        sags = self.scrub * reaction / weight  # [m] -v_y / |ω|
-        shifts = self.pivot * climber.weight_along_wall * math.sin(heading) / weight
+        v = target.speed
+        there = Motion.at(target.x, target.y, target.heading, v, target.yaw_rate)
+        reaction, uphill = _pulls(climber, there, wall)
+        sags, shifts = self.scrub * reaction, self.pivot * uphill  # [m] -v_y / |ω|, v_y / ω
         fade = _fade(v)
         return (
             clipped(fade * (sags - shifts), -MOST_LEAD, MOST_LEAD),
@@ -200,7 +212,7 @@ def _ahead(
     """
     now = leads(target)[way]
     angle = rate = acceleration = 0.0
-    for node, weight in NODES:
+    for node, share in NODES:
         mean = leads(at(clipped(now * node / 2, -HINDSIGHT, FORESIGHT)))[way]
         stretched = clipped(2 * mean / now - 1, 0.0, 3.0) if now else 1.0  # T then by T now
         mean = mean if mean * now > 0 else 0.0
@@ -208,20 +220,25 @@ def _ahead(
         beyond, later = mean * node - seen, at(seen)
         heading = wrapped(later.heading - target.heading) + beyond * later.yaw_rate
         yaw_rate = stretched * (later.yaw_rate + beyond * later.yaw_acceleration)
-        angle += weight * heading
-        rate += weight * (yaw_rate - target.yaw_rate)
-        acceleration += weight * (
+        angle += share * heading
+        rate += share * (yaw_rate - target.yaw_rate)
+        acceleration += share * (
             stretched * stretched * later.yaw_acceleration - target.yaw_acceleration
         )
     return angle, rate, acceleration
 
 
-def _rates(climber: Climber, motion: Motion) -> tuple[float, float, float]:
+def _rates(climber: Climber, motion: Motion, wall: Wall | None) -> tuple[float, float, float]:
     """What ρ [m/s], λ and p [rad/s] are multiplied by."""
-    weight, turning = climber.mass * GRAVITY, motion.yaw_rate
-    reaction = float(climber.lateral_reaction(motion)) / weight
-    uphill = climber.weight_along_wall * motion.sine / weight
+    (reaction, uphill), turning = _pulls(climber, motion, wall), motion.yaw_rate
     return abs(motion.speed), -reaction * abs(turning), uphill * turning
+
+
+def _pulls(climber: Climber, motion: Motion, wall: Wall | None) -> tuple[float, float]:
+    """Y and X, by the weight."""
+    (forward, left), whole = weight(wall, climber, motion), climber.mass * GRAVITY
+    turned = climber.mass * motion.speed * motion.yaw_rate
+    return float(turned - left) / whole, float(-forward) / whole
 
 
 NO_SLIP = SideSlip()

@@ -21,6 +21,7 @@ from climber_uk.mechanics.quantities import Motion, ReferencePoint, State, Torqu
 from climber_uk.mechanics.shapes import Circle, Line
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import Plane
 from climber_uk.simulation.sensors import Sensors
 
 CLIMBER = Climber(
@@ -230,6 +231,34 @@ def test_noise_of_poses_is_no_side_slip_and_no_missing_twist(noise, most):
     run = simulate(LINE, start, 8.0, controlling, CLIMBER, link)
     assert modes == {Mode.FOLLOWING}
     assert run.rms() < most
+
+
+@given(*(st.floats(-1, 1) for _ in range(4)), st.floats(-3, 3), st.floats(-180, 180))
+def test_on_a_tilted_wall_it_slips_as_upright_on_one_that_is_not(
+    v, v_1, omega, aside, heading, tilt
+):
+    """Learnt and followed, both seen from where downhill is."""
+
+    def seen(tilted):
+        turned = np.radians(tilt) if tilted else 0.0
+        wall = Plane(tilt) if tilted else None
+        before = Motion.at(0.0, 0.0, heading + turned, v, omega)
+        middle = heading + turned + omega * PERIOD / 2
+        x, y = PERIOD * np.array(
+            [
+                v * np.cos(middle) - aside * np.sin(middle),
+                v * np.sin(middle) + aside * np.cos(middle),
+            ]
+        )
+        end = Motion.at(float(x), float(y), heading + turned + omega * PERIOD, v + v_1, omega)
+        slip = SideSlip(scrub=0.1).learnt(CLIMBER, before, end, PERIOD, 6.0, wall)
+        speeds = v * np.cos(heading + turned), v * np.sin(heading + turned)
+        point = ReferencePoint(0.0, 0.0, heading + turned, *speeds, omega, *np.zeros(5).tolist())
+        course = slip.course(CLIMBER, point, lambda _: point, wall)
+        parts = *slip[:-1], *slip.covariance, *(course or ())
+        return *parts, slip.speed(CLIMBER, end, wall)
+
+    assert seen(tilted=True) == pytest.approx(seen(tilted=False), abs=1e-9)
 
 
 def test_resisted_turns_end_and_do_not_begin_below_the_resistance():
