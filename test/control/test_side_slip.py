@@ -162,19 +162,43 @@ def test_on_a_course_the_closed_form_is_what_the_rows_give(constraints, motion, 
     np.testing.assert_allclose(one.demanded, other.demanded, rtol=1e-9, atol=1e-9)
 
 
-@given(st.floats(-0.29, 0.2), st.tuples(numbers, numbers, numbers))
-def test_a_heading_that_has_to_be_ahead_solves_its_equation(lead, coefficients):
-    heading = np.polynomial.Polynomial([0.0, *coefficients]) * 0.1
+def turning(*coefficients):
+    """A reference by its time, whose heading is this polynomial of it [rad]."""
+    heading = np.polynomial.Polynomial([0.0, *coefficients])
 
     def at(later):
         derivatives = (heading.deriv(n)(later) if n else heading(later) for n in range(3))
         angle, rate, acceleration = (float(each) for each in derivatives)
-        return ReferencePoint(0.0, 0.0, angle, 0.0, 0.0, rate, 0.0, 0.0, acceleration, 0.0, 0.0)
+        return ReferencePoint(later, 0.0, angle, 0.0, 0.0, rate, 0.0, 0.0, acceleration, 0.0, 0.0)
 
-    angle, rate, acceleration = _ahead(at(0.0), at, lead)
+    return at
+
+
+def is_ahead(at, lead, slope=0.0):
+    """How far θ, with its derivatives, is from T θ̇ [rad], [rad/s], [rad/s²]."""
+    angle, rate, acceleration = _ahead(at(0.0), at, lambda of: [lead + slope * of.x], 0)
     wanted = at(0.0)
-    assert angle - lead * (rate + wanted.yaw_rate) == pytest.approx(0.0, abs=1e-9)
-    assert rate - lead * (acceleration + wanted.yaw_acceleration) == pytest.approx(0.0, abs=1e-9)
+    rate, acceleration = rate + wanted.yaw_rate, acceleration + wanted.yaw_acceleration
+    return angle - lead * rate, rate - wanted.yaw_rate - slope * rate - lead * acceleration
+
+
+@given(st.floats(-0.29, 0.2), st.tuples(numbers, numbers, numbers))
+def test_a_heading_that_has_to_be_ahead_solves_its_equation(lead, coefficients):
+    off = is_ahead(turning(*0.1 * np.array(coefficients)), lead)
+    assert off == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+@given(st.floats(-0.7, 0.7), numbers, numbers)
+def test_a_heading_ahead_goes_on_turning_beyond_what_is_seen(lead, rate, acceleration):
+    assert is_ahead(turning(rate), lead) == pytest.approx((0.0, 0.0), abs=1e-9)
+    off, _ = is_ahead(turning(rate, acceleration), lead)
+    assert abs(off) <= 0.42 * abs(acceleration) + 1e-9
+
+
+@given(st.sampled_from([-1, 1]), st.floats(0.02, 0.2), st.floats(-0.3, 0.3), numbers)
+def test_a_heading_is_as_far_ahead_as_scrubbing_will_be(sign, lead, slope, rate):
+    off = is_ahead(turning(rate), sign * lead, slope)
+    assert off == pytest.approx((0.0, 0.0), abs=1.1 * slope**2 * abs(rate) + 1e-9)
 
 
 @given(st.floats(-0.5, 0.5))
