@@ -26,6 +26,7 @@ from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.reference import tracking_error
+from climber_uk.mechanics.shapes import Lemniscate
 from climber_uk.simulation.field_sensors import EncoderErrors, FieldSensors, FixErrors, ImuErrors
 from climber_uk.simulation.motors import Motors
 from climber_uk.simulation.plant import Plant
@@ -67,6 +68,7 @@ class Case:
     gap: tuple[float, float] = (0.0, 0.0)  # [s] without fixes
     moved: tuple[float, float] = (math.inf, 0.0)  # [s] from which fixes are so much off [m]
     duration: float = 57.0  # [s]
+    size: float = 1.0  # of the figure of eight, by that of config/climber.yaml
     rests: bool = False  # at any heading, without a controller
     believes_truth: bool = False  # whether the controller gets perfect odometry
     is_drawn: bool = False  # whether place, biases and creep are chance, as the filter believes
@@ -75,7 +77,7 @@ class Case:
         """The same with a start, biases and creep drawn from the filter's own deviations."""
         if not self.is_drawn:
             return self
-        options, chance = self.options, np.random.default_rng(seed).normal(size=6).tolist()
+        options, chance = self.options, np.random.default_rng(seed).normal(size=7).tolist()
         place = options.initial_position_deviation
         force = options.acceleration_bias_deviation
         imu = replace(
@@ -84,12 +86,15 @@ class Case:
             forward_bias=chance[1] * force,
             left_bias=chance[2] * force,
         )
+        heading = options.initial_heading_deviation
         options = replace(
             options,
             initial_x=options.initial_x + chance[3] * place,
             initial_y=options.initial_y + chance[4] * place,
+            initial_heading=options.initial_heading
+            + chance[6] * heading * (heading <= options.initial_heading_limit),
         )
-        creep = abs(chance[5]) * options.creep_deviation
+        creep = abs(options.initial_creep + chance[5] * options.creep_deviation)
         return replace(self, imu=imu, options=options, creep=creep)
 
 
@@ -124,7 +129,8 @@ class Loop:
         physics = Physics(creep=case.creep)
         parts = Parts(Plant(believed, PERIOD), Motors(), Sensors(), physics)
         self.robot: Any = SimulatedRobot(parts, start, PERIOD)
-        self.trajectory = RUN.trajectory
+        shape = Lemniscate(1.5 * case.size, 0.75 * case.size)
+        self.trajectory = replace(RUN.trajectory, shape=shape)
         self.sense(start, seed)
 
     def sense(self, start: State, seed: int) -> None:
@@ -195,6 +201,7 @@ ROWS = {
     "fixes of 25 mm at 1 Hz, 100 ms late": Case(fixes=FixErrors(1.0, 0.1, 0.025)),
     "no fixes from 20 to 50 s": Case(gap=(20.0, 50.0)),
     "no fixes at all, 1 % creep": Case(fixes=NO_FIXES, creep=0.01),
+    "no fixes at all, 1 % creep, 2 m by 1 m": Case(fixes=NO_FIXES, creep=0.01, size=2 / 3),
     "no fixes, 1 % creep, known from a bag": Case(
         fixes=NO_FIXES,
         creep=0.01,
@@ -237,7 +244,7 @@ def figures(loops: list[Loop]) -> str:
     bounds = chi2.ppf((0.025, 0.975), 3 * len(loops)) / len(loops)
     mean = nees.mean(axis=0)
     distance = np.hypot(off[..., 0], off[..., 1])
-    desired = RUN.trajectory.at(now)
+    desired = loops[0].trajectory.at(now)
     along, across, _ = tracking_error(pose, desired)
     away = np.hypot(along, across)
     sent = np.array([loop.sent for loop in loops])
@@ -273,10 +280,14 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=int, default=20, help="runs of each row (default: 20)")
     parser.add_argument("--only", default="", help="rows whose name contains this")
+    parser.add_argument(
+        "--drawn", action="store_true", help="start, biases and creep of each row as is believed"
+    )
     options = parser.parse_args()
     print(f"{'':<42}{HEAD}")
     for name, case in ROWS.items():
         if options.only in name:
+            case = replace(case, is_drawn=case.is_drawn or options.drawn)
             loops = [Loop(case, seed).run() for seed in range(options.seeds)]
             print(f"{name:<42}{figures(loops)}", flush=True)
 

@@ -1,7 +1,8 @@
 """`python bench/physics.py`: our plant beside MuJoCo, driven by the same controller over paths.
 
-The robots of config/climber.yaml and four_wheels.yaml, by torques, and the one of velocity.yaml on
-four wheels, by speeds, with `slip: true`. Both are made from the same parameters. The distance from
+The robots of config/climber.yaml and four_wheels.yaml, by torques, the one of velocity.yaml on four
+wheels, by speeds, and the magnetic crawler of magnetic.yaml on round walls, which the controller is
+told; all with `slip: true`. Both are made from the same parameters. The distance from
 the reference, RMS and largest [mm], the largest side slip [mm/s], and the half track that wheels
 show while it turns [m]. MuJoCo is not installed with the package: `make physics` does it.
 """
@@ -24,6 +25,7 @@ from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.ros import plant_parts
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.simulated_robot import SimulatedRobot
 
 ROOT = Path(__file__).parents[1]
@@ -68,6 +70,18 @@ ROBOTS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
+# the wall that plant and controller have in place of their file's
+WALLS: dict[str, dict[str, Any]] = {
+    "magnets, plane": {"wall": "plane"},
+    "magnets, upright tank": {"wall": "tank", "tank.radius": -5.0},
+    "magnets, inside it": {"wall": "tank", "tank.radius": 5.0},
+    "magnets, lying tank": {"wall": "cylinder", "cylinder.radius": -5.0},
+    "magnets, sphere": {"wall": "sphere", "sphere.radius": -5.0},
+    "magnets, roof": {"wall": "cone", "cone.distance": 6.0, "inclination": 70.0},
+}
+ROBOTS |= {name: ("magnetic.yaml", {"wheel_inertia": 8e-4}) for name in WALLS}
+
+
 class Row(NamedTuple):
     """A run: errors [mm], side slip [mm/s], half track [m]."""
 
@@ -105,8 +119,8 @@ def trajectory(path: str) -> Trajectory:
 def run(robot: str, path: str, kind: Any) -> Row:
     """A run of a kind of robot: our plant, or the engine's."""
     config, more = ROBOTS[robot]
-    file = ROOT / "config" / config
-    values = Values({**read_file(file, f"/{PLANT}"), **more})
+    file, wall = ROOT / "config" / config, WALLS.get(robot, {})
+    values = Values({**read_file(file, f"/{PLANT}"), **more, **wall})
     parts = plant_parts.parts(values)
     robots: list[Watched] = []
 
@@ -115,10 +129,11 @@ def run(robot: str, path: str, kind: Any) -> Row:
         return robots[-1]
 
     reference, (_, duration) = trajectory(path), PATHS[path]
-    controller = build_controller(Values(read_file(file, f"/{CONTROLLER}")), None)
+    controller = build_controller(Values({**read_file(file, f"/{CONTROLLER}"), **wall}), None)
     start = State(reference.at(0.0).pose, np.zeros(3))
     servo = parts.motors if parts.motors.take_speeds else None
-    link = replace(Link(), step=parts.plant.step, servo=servo)
+    period = values.read(SimulationOptions).control_period
+    link = replace(Link(), step=parts.plant.step, period=period, servo=servo)
     course = reference, start, duration, controller, parts.plant.climber, link
     driven = simulate(*course, robot_of=make)
     shown = float(np.median(robots[0].shown)) if robots[0].shown else float("nan")
@@ -145,9 +160,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    speeds = "four wheels, by speeds"
-    pairs = [(robot, path) for robot in ROBOTS if robot != speeds for path in PATHS]
-    pairs += [(speeds, "circle, radius 0.5 m"), (speeds, "line, 2 m")]
+    pairs = [(robot, path) for robot in ("two wheels", "four wheels") for path in PATHS]
+    pairs += [("four wheels, by speeds", path) for path in ("circle, radius 0.5 m", "line, 2 m")]
+    pairs += [(robot, "eight, 1.6 m by 0.8 m") for robot in WALLS]
     header = "robot", "path", "our plant", "MuJoCo", "side slip: ours, MuJoCo's", "half track"
     print(f"| {' | '.join(header)} |\n{'|---' * len(header)}|", flush=True)
     with ProcessPoolExecutor(2) as pool:

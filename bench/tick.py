@@ -106,7 +106,7 @@ def tick(controller: Controller, stamp: int, motion: Motion) -> Command:
     target = active.target(ahead.motion, ahead.begins, target_time)
     assert target.point is not None
     at = partial(active.around, target, target_time)
-    course = estimator.slip.course(controller.law.climber, target.point, at)
+    course = estimator.slip.course(controller.law.climber, target.point, at, controller.law.wall)
     command = controller.law.command(ahead._replace(course=course), target.point)
     check_finite(command.wheels)
     active.go_on(target)

@@ -1,9 +1,11 @@
 """A climber in MuJoCo, made from the parameters of plant_simulator: `pip install mujoco`.
 
-A free body on wheels with contact friction. The adhesion presses it onto the wall, z = 0; of a
-suction, pads carry the seal's share and rub. Gravity pulls along -y and into the wall, as
-`inclination` says. Two wheels have skids without friction ahead and behind; of four, a belt couples
-front and rear.
+A free body on wheels with contact friction. The adhesion presses its wheels onto the wall; of a
+suction, pads carry the seal's share and rub. Two wheels have skids without friction ahead and
+behind; of four, a belt couples front and rear. Gravity pulls as `inclination` says.
+
+On a round wall, whatever touches it has a plane of its own, which is kept tangent to the wall
+under it (`mujoco_wall`). Poses are those on the wall unrolled, as the plant's.
 
 It stands in the place of a `SimulatedRobot`, with motors and sensors that are the plant's.
 """
@@ -15,6 +17,7 @@ from itertools import product
 
 import mujoco
 import numpy as np
+from mujoco_wall import Flat, Surface, surface
 
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import DEGREE, GRAVITY
@@ -33,6 +36,8 @@ RIM_WIDTH, SKID, PAD_SIZE = 0.01, 0.01, 0.005  # [m]
 CLEARANCE = 3e-4  # [m] of a skid over the wall
 SETTLING = 0.5  # [s] until tyres and pads bear their loads
 LIFTED = 0.02  # [m] off the wall: the climber has fallen
+SEEN = 8  # [m] of the wall in pictures, each way
+INSTANT = 1e-5  # [s] for what is differentiated
 
 SIDES = 1, -1  # left and right: the sign of y
 NAMES = {1: "left", -1: "right"}
@@ -49,7 +54,6 @@ class Model:
         for name, chosen, known in (
             ("friction", contact.friction, Coulomb),
             ("locomotion", contact.locomotion, Wheeled | FourWheeled),
-            ("wall", plant.wall, Plane),
         ):
             if not isinstance(chosen, known):
                 raise ValueError(f"{name}: {type(chosen).__name__} is not in this model of MuJoCo")
@@ -106,10 +110,15 @@ class Model:
             inertia -= share * climber.mass * sum(x * x + y * y for x, y in places)
         return inertia
 
-    def mjcf(self, radius: float) -> str:
-        """The model, with tyres of a `radius` [m] without load."""
+    @property
+    def surface(self) -> Surface:
+        """The wall in space."""
+        return surface(self.parts.plant.wall, self.parts.plant.climber.inclination)
+
+    def mjcf(self, radius: float, on: Surface) -> str:
+        """The model `on` a surface, with tyres of a `radius` [m] without load."""
         climber, grip = self.parts.plant.climber, self.parts.plant.contact.grip
-        parts = [*self.tyres(radius), *self.seal(), *self.skids()]
+        parts = [*self.tyres(radius), *self.seal(), *self.skids(on)]
         height = (grip.centre_height - climber.wheel_radius) * climber.mass / self.body_mass
         tilting = self.body_mass * (grip.wheelbase**2 + 4 * climber.half_track**2) / 12
         return f"""<mujoco>
@@ -120,25 +129,27 @@ class Model:
   <asset>
     <texture name="squares" type="2d" builtin="checker" width="64" height="64"
       rgb1="0.8 0.8 0.75" rgb2="0.7 0.7 0.65"/>
-    <material name="squares" texture="squares" texrepeat="2 2" texuniform="true"/>
+    <material name="squares" texture="squares"/>
+    {_seen(on)}
   </asset>
   <worldbody>
-    <geom name="wall" type="plane" size="10 10 1" material="squares"/>
+    <geom type="mesh" mesh="wall" material="squares"/>
+    {"".join(wall for *_, wall in parts)}
     <body name="climber" pos="0 0 {climber.wheel_radius}">
       <freejoint/>
       <inertial pos="0 0 {height}" mass="{self.body_mass}"
         diaginertia="{tilting} {tilting} {self.body_inertia}"/>
       <geom type="box" size="{grip.wheelbase / 2} {climber.half_track * 0.8} 0.01"
         pos="0 0 0.03" rgba="0.2 0.4 0.7 1"/>
-      {"".join(body for body, _ in parts)}
+      {"".join(body for body, *_ in parts)}
     </body>
   </worldbody>
-  <contact>{"".join(contact for _, contact in parts)}</contact>
+  <contact>{"".join(contact for _, contact, _ in parts)}</contact>
   <equality>{"".join(self.belts())}</equality>
 </mujoco>"""
 
-    def tyres(self, radius: float) -> Iterator[tuple[str, str]]:
-        """Wheels, and their contacts."""
+    def tyres(self, radius: float) -> Iterator[tuple[str, str, str]]:
+        """Wheels, their contacts, and what they stand on."""
         climber, grip = self.parts.plant.climber, self.parts.plant.contact.grip
         spin = (grip.wheel_inertia + climber.rotor_inertia) / len(self.footholds)
         mu = grip.wheel_friction_coefficient
@@ -149,10 +160,10 @@ class Model:
                 f' diaginertia="{spin} {spin} {spin}"/><geom name="{name}" type="cylinder"'
                 f' size="{radius} {RIM_WIDTH / 2}" euler="90 0 0"/></body>'
             )
-            yield body, _pair(name, f'condim="4" friction="{mu} {mu} 1e-3 0 0"', TYRE)
+            yield body, *_standing(name, f'condim="4" friction="{mu} {mu} 1e-3 0 0"', TYRE)
 
-    def seal(self) -> Iterator[tuple[str, str]]:
-        """Pads that are pressed onto the wall, and their contacts."""
+    def seal(self) -> Iterator[tuple[str, str, str]]:
+        """Pads that are pressed onto the wall: as `tyres`."""
         climber = self.parts.plant.climber
         mu = climber.seal_friction_coefficient
         for number, (x, y) in enumerate(self.pads):
@@ -162,16 +173,25 @@ class Model:
                 f'<joint name="{name}" type="slide" axis="0 0 1" damping="50"/><geom name="{name}"'
                 f' type="sphere" size="{PAD_SIZE}" mass="{PAD_MASS * climber.mass}"/></body>'
             )
-            yield body, _pair(name, f'condim="3" friction="{mu} {mu} 0 0 0"', PAD)
+            yield body, *_standing(name, f'condim="3" friction="{mu} {mu} 0 0 0"', PAD)
 
-    def skids(self) -> Iterator[tuple[str, str]]:
-        """What keeps two wheels from tipping, without friction."""
-        reach = self.parts.plant.contact.grip.wheelbase / 2
-        z = SKID + CLEARANCE - self.parts.plant.climber.wheel_radius
+    def skids(self, on: Surface) -> Iterator[tuple[str, str, str]]:
+        """What keeps two wheels from tipping, without friction: as `tyres`.
+
+        They clear the wall between the wheels wherever it heads.
+        """
+        climber, reach = self.parts.plant.climber, self.parts.plant.contact.grip.wheelbase / 2
+        angles = np.arange(0, math.pi, math.pi / 16)
+        ahead = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        (at_skids, _), (at_wheels, _) = (
+            on.at(way) for way in (reach * ahead, climber.half_track * ahead[:, ::-1] * [-1, 1])
+        )
+        proud = max(0.0, float((at_skids - at_wheels)[:, 2].max()))
+        z = SKID + CLEARANCE + proud - climber.wheel_radius
         for side in SIDES if len(self.footholds) == 1 else ():
             name = f"skid{side}"
             body = f'<geom name="{name}" type="sphere" size="{SKID}" pos="{side * reach} 0 {z}"/>'
-            yield body, _pair(name, 'condim="1"', TYRE)
+            yield body, *_standing(name, 'condim="1"', TYRE)
 
     def belts(self) -> Iterator[str]:
         """What turns the wheels of a side together."""
@@ -182,8 +202,23 @@ class Model:
             )
 
 
-def _pair(name: str, friction: str, softness: str) -> str:
-    return f'<pair geom1="wall" geom2="{name}" {friction} solref="{softness}"/>'
+def _seen(wall: Surface) -> str:
+    """A mesh of a wall, for pictures, with a texture every metre."""
+    ticks = np.linspace(-SEEN, SEEN, 4 * SEEN + 1)
+    places = np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
+    points, _ = wall.at(places)
+    corner = np.arange(len(places)).reshape(len(ticks), -1)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
+    arrays = {"vertex": points, "texcoord": places, "face": np.stack([a, b, c, a, c, d], axis=-1)}
+    said = (f'{name}="{" ".join(map(str, of.ravel()))}"' for name, of in arrays.items())
+    return f'<mesh name="wall" inertia="shell" {" ".join(said)}/>'
+
+
+def _standing(name: str, friction: str, softness: str) -> tuple[str, str]:
+    """A contact, and the plane that it is on."""
+    contact = f'<pair geom1="under_{name}" geom2="{name}" {friction} solref="{softness}"/>'
+    plane = f'<geom name="under_{name}" type="plane" size="1 1 1" rgba="0 0 0 0"/>'
+    return contact, f'<body name="under_{name}" mocap="true">{plane}</body>'
 
 
 class MujocoClimber:
@@ -194,12 +229,12 @@ class MujocoClimber:
         self.model_of = Model(parts)
         self.substeps = math.ceil(self.plant.step / LONGEST_STEP - 1e-9)
         radius = self.plant.climber.wheel_radius
-        self.load(radius)
-        self.settle()
+        self.load(radius, Flat())
+        self.settle(State.rolling(np.zeros(3), 0.0, 0.0))
         # a tyre that is pressed in by p rolls as one of its radius less p/2
-        self.load(radius + (radius - self.height) / 2)
-        self.settle()
-        self.place(start)
+        self.load(radius + (radius - self.height) / 2, self.model_of.surface)
+        self.settle(start)
+        self.start_moving(start)
         self.torques: Array = np.zeros(2)  # [N m] at the wheels: right, left
         self.rates = self.rates_before = self.turning()
         self.state = start
@@ -207,53 +242,82 @@ class MujocoClimber:
 
     # The model
 
-    def load(self, radius: float) -> None:
-        """Make the engine's model, with tyres of that `radius` [m]."""
-        model = mujoco.MjModel.from_xml_string(self.model_of.mjcf(radius))
+    def load(self, radius: float, on: Surface) -> None:
+        """Make the engine's model `on` a surface, with tyres of that `radius` [m]."""
+        model = mujoco.MjModel.from_xml_string(self.model_of.mjcf(radius, on))
         model.opt.timestep = self.plant.step / self.substeps
-        self.model, self.data = model, mujoco.MjData(model)
+        self.model, self.data, self.surface = model, mujoco.MjData(model), on
         self.joints = [  # of the right and the left wheels, front to rear
             [n for n in self.model_of.wheels if n.startswith(NAMES[side])] for side in (-1, 1)
         ]
         self.places = [[model.joint(n).qposadr[0] for n in names] for names in self.joints]
         self.speeds = [[model.joint(n).dofadr[0] for n in names] for names in self.joints]
+        self.body = model.body("climber").id
+        self.wheels = [model.body(n).id for n in self.model_of.wheels]
+        # what stands on planes, wheels first
+        self.standing = [model.geom(n).id for n in _geoms(model) if f"under_{n}" in _geoms(model)]
 
-    def settle(self) -> None:
-        """Let tyres and pads bear what presses them, without any pull along the wall."""
-        self.pull(along=False)
+    def settle(self, start: State) -> None:
+        """Let tyres and pads bear what presses them at a start, without any pull along the wall."""
+        radius = self.plant.climber.wheel_radius
+        self.data.qpos[:7] = self.posed(start.pose, radius)
+        mujoco.mj_kinematics(self.model, self.data)
+        self.lay()
+        _, [frame] = self.surface.at(start.pose[None, :2])
+        off = frame[:, 2]
+        gravity = self.gravity
+        self.model.opt.gravity[:] = gravity @ off * off
         mujoco.mj_step(self.model, self.data, nstep=round(SETTLING / self.model.opt.timestep))
+        self.model.opt.gravity[:] = gravity
         self.data.qvel[:] = 0.0
-        self.pull(along=True)
+        for places in self.places:
+            self.data.qpos[places] = 0.0
 
-    def pull(self, along: bool) -> None:
-        """Have gravity act, `along` the wall as well, and what holds the climber there."""
-        climber, contact = self.plant.climber, self.plant.contact
-        tilt = self.plant.wall.tilt * DEGREE if isinstance(self.plant.wall, Plane) else 0.0
+    @property
+    def gravity(self) -> Array:
+        """Gravity (3,) [m/s²]; of the climber's mass, though that contains rims: they only turn."""
+        climber, wall = self.plant.climber, self.plant.wall
+        tilt = wall.tilt * DEGREE if isinstance(wall, Plane) else 0.0
         steep = climber.inclination * DEGREE
-        # the climber's weight, though its mass contains rims that turn and weigh nothing here
-        gravity = GRAVITY * climber.mass / (climber.mass - 2 * self.model_of.rim)
-        pulled = gravity * math.sin(steep) * along
-        down = math.sin(tilt), -math.cos(tilt)
-        self.model.opt.gravity[:] = *(pulled * part for part in down), -gravity * math.cos(steep)
-        body = self.model.body("climber").id
-        self.data.xfrc_applied[body, 2] = -contact.adhesion.force(climber)
+        down = math.sin(steep) * math.sin(tilt), -math.sin(steep) * math.cos(tilt)
+        weighed = climber.mass / (climber.mass - 2 * self.model_of.rim)
+        return GRAVITY * weighed * np.array([*down, -math.cos(steep)])
+
+    def lay(self) -> None:
+        """Lay planes under what stands on them, and have it pressed onto them."""
+        climber, contact = self.plant.climber, self.plant.contact
+        points, frames = self.surface.at(self.surface.under(self.data.geom_xpos[self.standing]))
+        self.data.mocap_pos[:] = points
+        for quaternion, frame in zip(self.data.mocap_quat, frames, strict=True):
+            mujoco.mju_mat2Quat(quaternion, frame.ravel())
+        self.off = frames[: len(self.wheels), :, 2]
+        force = contact.adhesion.force(climber)
+        self.data.xfrc_applied[self.wheels, :3] = -force / len(self.wheels) * self.off
         for number, _ in enumerate(self.model_of.pads):
             dof = self.model.joint(f"pad{number}").dofadr[0]
             share = (1 - climber.wheel_load_share) / len(self.model_of.pads)
-            self.data.qfrc_applied[dof] = -share * contact.adhesion.force(climber)
+            self.data.qfrc_applied[dof] = -share * force
 
-    def place(self, start: State) -> None:
-        """Place the climber, in motion if the start is."""
-        x, y, heading = start.pose.tolist()
-        self.data.qpos[:2] = x, y
-        self.data.qpos[3:7] = math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)
-        self.data.qvel[:2], self.data.qvel[5] = start.velocity[:2], start.yaw_rate
+    def posed(self, pose: Array, height: float) -> Array:
+        """Position and quaternion (7,) of a pose on the wall, at a height [m] over it."""
+        points, frames = self.surface.at(pose[None, :2])
+        cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+        turned = frames[0] @ np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, turned.ravel())
+        return np.concatenate([points[0] + height * turned[:, 2], quaternion])
+
+    def start_moving(self, start: State) -> None:
+        """Have the settled climber move as a start does."""
+        here, there, height = self.data.qpos.copy(), self.data.qpos.copy(), self.height
+        here[:7], there[:7] = (
+            self.posed(start.pose + time * start.velocity, height) for time in (-INSTANT, INSTANT)
+        )
+        mujoco.mj_differentiatePos(self.model, self.data.qvel, 2 * INSTANT, here, there)
         rates = self.plant.climber.wheel_rates(start).tolist()
         for rate, dofs in zip(rates, self.speeds, strict=True):
             self.data.qvel[dofs] = rate
-        for places in self.places:
-            self.data.qpos[places] = 0.0
-        self.heading = heading
+        self.pose = start.pose
         mujoco.mj_forward(self.model, self.data)
 
     # As of a `SimulatedRobot`
@@ -273,9 +337,14 @@ class MujocoClimber:
             self.torques = motors.torques(climber, wheels, self.torques, commanded, step)
         for torque, dofs in zip(self.torques.tolist(), self.speeds, strict=True):
             self.data.qfrc_applied[dofs] = torque / len(dofs)
-        f_x, f_y, moment = push.on(self.state).tolist()
-        body = self.model.body("climber").id
-        self.data.xfrc_applied[body, [0, 1, 5]] = f_x, f_y, moment
+        if not isinstance(self.surface, Flat):
+            self.lay()
+        self.data.xfrc_applied[self.body] = 0.0
+        if push is not UNPUSHED:
+            f_x, f_y, moment = push.on(self.state).tolist()
+            _, [frame] = self.surface.at(self.state.pose[None, :2])
+            pushed = frame @ np.array([[f_x, 0.0], [f_y, 0.0], [0.0, moment]])
+            self.data.xfrc_applied[self.body] = pushed.T.ravel()
         mujoco.mj_step(self.model, self.data, nstep=self.substeps)
         self.rates_before, self.rates = self.rates, self.turning()
         self.state = self.told()
@@ -288,8 +357,9 @@ class MujocoClimber:
 
     @property
     def height(self) -> float:
-        """Height of the axles over the wall [m]."""
-        return float(self.data.qpos[2])
+        """Mean height of the wheels' centres over the wall [m]."""
+        over = self.data.xpos[self.wheels] - self.data.mocap_pos[: len(self.wheels)]
+        return float((over * self.off).sum(axis=1).mean())
 
     @property
     def angles(self) -> Array:
@@ -313,11 +383,30 @@ class MujocoClimber:
         return State.rolling(self.state.pose, (right + left) / 2, yaw_rate)
 
     def told(self) -> State:
-        """The state that the engine has."""
-        w, _, _, z = self.data.qpos[3:7].tolist()
-        turned = 2 * math.atan2(z, w) - self.heading
-        self.heading += math.remainder(turned, 2 * math.pi)  # goes on beyond a turn
-        x, y = self.data.qpos[:2].tolist()
+        """The state that the engine has, on the wall unrolled."""
+        point, velocity = self.data.qpos[:3], self.data.qvel[:3]
+        matrix = np.zeros(9)
+        mujoco.mju_quat2Mat(matrix, self.data.qpos[3:7])
+        axes = matrix.reshape(3, 3)
         # a free joint's velocity is in the world's frame, its rate of turning in the body's
-        v_x, v_y, yaw_rate = self.data.qvel[[0, 1, 5]].tolist()
-        return State(np.array([x, y, self.heading]), np.array([v_x, v_y, yaw_rate]))
+        turning = np.cross(axes @ self.data.qvel[3:6], axes[:, 0])
+        times = np.array([[-INSTANT], [0.0], [INSTANT]])
+        before, now, after = self.on_wall(point + times * velocity, axes[:, 0] + times * turning)
+        self.pose = now
+        return State(now, (after - before) / (2 * INSTANT))
+
+    def on_wall(self, points: Array, forwards: Array) -> Iterator[Array]:
+        """Poses (3,) of points (n, 3) [m] that head (n, 3); each goes on from `pose`."""
+        places = self.surface.under(points)
+        _, frames = self.surface.at(places)
+        turns = *self.surface.turn, 2 * math.pi
+        for place, (ahead, aside, _) in zip(
+            places, np.einsum("nij,ni->nj", frames, forwards), strict=True
+        ):
+            pose = *place.tolist(), math.atan2(aside, ahead)
+            goes_on = zip(pose, self.pose.tolist(), turns, strict=True)
+            yield np.array([was + math.remainder(now - was, turn) for now, was, turn in goes_on])
+
+
+def _geoms(model: mujoco.MjModel) -> list[str]:
+    return [model.geom(number).name for number in range(model.ngeom)]

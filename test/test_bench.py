@@ -47,6 +47,21 @@ def test_every_script_starts():
         assert f"{script} 0" in lines
 
 
+@pytest.mark.parametrize("wall", ["upright tank", "inside it", "lying tank", "sphere", "roof"])
+def test_magnets_hold_a_robot_in_mujoco_on_what_is_round(monkeypatch, wall):
+    pytest.importorskip("mujoco", reason="an extra, `physics`, that `make test` does not install")
+    monkeypatch.syspath_prepend(BENCH)
+    import physics
+
+    monkeypatch.syspath_prepend(physics.ROOT / "examples")
+    from mujoco_climber import MujocoClimber
+
+    path = "eight, 1.6 m by 0.8 m"
+    monkeypatch.setitem(physics.PATHS, path, (physics.PATHS[path][0], 4.0))
+    row = physics.run(f"magnets, {wall}", path, MujocoClimber)
+    assert row.largest < 1  # mm
+
+
 def test_ways_are_measured_in_turns_and_compared_within_a_round(monkeypatch, capsys):
     monkeypatch.syspath_prepend(BENCH)
     from side_by_side import in_turns, table

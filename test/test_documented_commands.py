@@ -24,6 +24,7 @@ OURS = {
 NODES = {PLANNER, CONTROLLER, PLANT, LOCALIZATION, "markers", "check_driver"}
 PROGRAMS = {*OURS, "make", "python", "pytest", "climber.launch.py"}
 PLACEHOLDER = re.compile(r"[A-Z]+|…|dev|[a-z]+…|/.*…|run|my_.*|demo.*|again|[a-z]+\.(yaml|png)")
+PARTS = re.compile(r"^ *```(\w*)\n(.*?)^ *```|`([^`]+)`", re.DOTALL | re.MULTILINE)
 PREFIX = re.compile(
     r"^(\$ |\.venv/bin/|[A-Z_]+=\S+ |ros2 run climber_uk |ros2 launch climber_uk )+|[][]|\|\w+"
 )
@@ -34,15 +35,11 @@ class Parsed(BaseException):
 
 
 def commands(page):
-    """Each command of a page, as words, once."""
-    text = page.read_text()
-    lines = [
-        line.partition(" #")[0]
-        for kind, block in re.findall(r"^```(\w*)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
-        if not kind
-        for line in block.replace("\\\n", " ").splitlines()
-    ]
-    lines += re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+    """Each command of a page, as words, once, in the order of the page."""
+    lines = []
+    for kind, block, word in PARTS.findall(page.read_text()):
+        written = block.replace("\\\n", " ").splitlines() if not word and not kind else [word]
+        lines += [line.partition(" #")[0] if block else line for line in written]
     found = {}
     for line in lines:
         bare = PREFIX.sub("", " ".join(line.split()))

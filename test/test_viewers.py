@@ -3,6 +3,7 @@
 import importlib
 import json
 import re
+import subprocess
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -26,20 +27,26 @@ DISPLAYS = {
 }
 
 
-def published():
-    """Type and QoS of every topic by its full name."""
-    found = {name: (kind, "latched") for name, kind in BROUGHT.items()}
+# what a button can have: types.ts of Lichtblick's and Foxglove Studio's CallService and Publish
+OF_BUTTON = {"foxglovePanelTitle", "buttonText", "buttonTooltip", "buttonColor"}
+OF_SERVICE = OF_BUTTON | {"serviceName", "requestPayload", "layout"}
+OF_PUBLISHER = OF_BUTTON | {"topicName", "datatype", "value", "advancedView"}
+
+
+def interfaces(how):
+    """Type and QoS by full name, of all that nodes publish, subscribe or serve."""
+    found = {}
     node = ""
     for line in (ROOT / "docs" / "interfaces.md").read_text().splitlines():
         if line.startswith("## "):
             node = line.removeprefix("## ")
-        elif line.startswith("| publishes |"):
+        elif line.startswith(f"| {how} |"):
             name, kind, quality = (cell.strip(" `") for cell in line.split("|")[2:5])
             found["/" + name.lstrip("/").replace("~", node)] = kind, quality
     return found
 
 
-TOPICS = published()
+TOPICS = {name: (kind, "latched") for name, kind in BROUGHT.items()} | interfaces("publishes")
 
 
 def field_type(topic, path):
@@ -75,27 +82,78 @@ def test_rviz_shows_topics_of_ours_of_the_right_type_and_durability():
         assert (topic["Durability Policy"] == "Transient Local") == ("latched" in quality)
 
 
+LAYOUT = json.loads((CONFIG / "foxglove_layout.json").read_text())
+CONFIGURATIONS = LAYOUT["configById"]
+
+
 def panels(node):
-    """Names of the panels of a layout."""
-    return [node] if isinstance(node, str) else panels(node["first"]) + panels(node["second"])
+    """Names of the panels of a layout, those in tabs included."""
+    if not isinstance(node, str):
+        return panels(node["first"]) + panels(node["second"])
+    tabs = CONFIGURATIONS[node].get("tabs", [])
+    return [node] + [name for tab in tabs for name in panels(tab["layout"])]
+
+
+def test_foxglove_shows_each_panel_once_and_topics_that_exist():
+    assert sorted(panels(LAYOUT["layout"])) == sorted(CONFIGURATIONS)
+    kinds = {name.split("!")[0] for name in CONFIGURATIONS}
+    shown = {"3D", "Plot", "DiagnosticSummary", "RosOut", "Parameters", "Tab"}
+    assert kinds == {*shown, "CallService", "Publish"}
+    wall = CONFIGURATIONS["3D!wall"]
+    assert wall["followTf"] == Names().odom_frame
+    named = [it["topicToRender"] for it in CONFIGURATIONS.values() if "topicToRender" in it]
+    assert len(named) == 2
+    assert {*named, *wall["topics"]} <= set(TOPICS)
 
 
 def test_foxglove_plots_fields_that_exist():
-    layout = json.loads((CONFIG / "foxglove_layout.json").read_text())
-    configurations = layout["configById"]
-    assert sorted(panels(layout["layout"])) == sorted(configurations)
-    kinds = {name.split("!")[0] for name in configurations}
-    assert kinds == {"3D", "Plot", "DiagnosticSummary", "RosOut"}
-    wall = configurations["3D!wall"]
-    assert wall["followTf"] == Names().odom_frame
-    named = [configurations[name]["topicToRender"] for name in panels(layout["layout"])[1:3]]
-    assert {*named, *wall["topics"]} <= set(TOPICS)
-    for name, configuration in configurations.items():
+    for name, configuration in CONFIGURATIONS.items():
         for path in configuration.get("paths", []):
             value = path["value"]
             if not value.isdecimal():  # a number is a horizontal line
                 topic, *fields = re.sub(r"\[\d+\]", "", value).split(".")
                 assert field_type(topic, fields) in NUMBERS, (name, value)
+
+
+def check_payload(kind, content):
+    """Assert that JSON is a message's of this class: its fields, of their types."""
+    given = json.loads(content)
+    types = kind.get_fields_and_field_types()
+    assert set(given) == set(types)  # none is left to a default that nobody sees
+    for field, value in given.items():
+        assert isinstance(value, {"boolean": bool, "double": float}[types[field]]), (field, value)
+
+
+def test_foxglove_has_buttons_for_services_and_a_topic_that_exist():
+    services = interfaces("serves")
+    buttons = [it for name, it in CONFIGURATIONS.items() if name.startswith("CallService!")]
+    assert [button["buttonText"] for button in buttons] == [
+        *("Start", "Pause", "Go on", "Disable", "Enable")
+    ]
+    for button in buttons:
+        assert set(button) <= OF_SERVICE
+        package, name = services[button["serviceName"]][0].split("/")
+        kind = getattr(importlib.import_module(f"{package}.srv"), name)
+        check_payload(kind.Request, button["requestPayload"])
+    speed = CONFIGURATIONS["Publish!speed"]
+    assert set(speed) <= OF_PUBLISHER
+    assert interfaces("subscribes")[speed["topicName"]][0] == speed["datatype"]
+    package, name = speed["datatype"].split("/")
+    kind = getattr(importlib.import_module(f"{package}.msg"), name)
+    check_payload(kind, speed["value"])
+
+
+def test_a_second_climber_s_layout_is_made_as_the_page_says():
+    page = (ROOT / "docs" / "viewing.md").read_text()
+    command = re.search(r"^(sed -E .*\\\n.*foxglove_layout.json) >", page, re.MULTILINE)[1]
+    made = subprocess.run(
+        ["sh", "-c", command], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    names = re.findall(r'"(/[a-z]\w+[\w/]*)', (CONFIG / "foxglove_layout.json").read_text())
+    shared = {"/diagnostics", "/rosout"}
+    expected = [name if name in shared else f"/climber_1{name}" for name in names]
+    assert re.findall(r'"(/[a-z]\w+[\w/]*)', made) == expected
+    assert json.loads(made)["configById"]["3D!wall"]["followTf"] == "climber_1/odom"
 
 
 def check_series(series):

@@ -151,7 +151,7 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
             except (ValueError, OSError) as error:
                 failures.append(f"{file.name}: {_words(error)}")
         if not bag.files:
-            why = "; ".join(failures) or "neither metadata.yaml nor an .mcap or .db3 file in it"
+            why = "; ".join(failures) or "no .mcap or .db3 file in it"
             raise ValueError(one_line(f"{path} is no readable bag: {why}{other_files(path)}"))
         for failure in failures:
             bag.lose(f"{failure}: not read")

@@ -12,7 +12,7 @@ import yaml
 from climber_uk.campaign import names
 from climber_uk.campaign.distributions import Distribution, Uniform, distribution, drawn, extremes
 from climber_uk.campaign.limits import Limit
-from climber_uk.campaign.names import CONSTRAINT_SET, LOSS_TIME, SEED
+from climber_uk.campaign.names import LOSS_TIME, SEED
 from climber_uk.campaign.scenario import Node, Scenario
 from climber_uk.closed_loop.node_parameters import PARAMETERS, read_parameters
 from climber_uk.closed_loop.period import BACKENDS
@@ -113,9 +113,8 @@ def _campaign(tree: Any, directory: Path, instead: dict[str, int]) -> Campaign:
             own[name] = distribution(value)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
-    constraints = shared.get(CONSTRAINT_SET, PARAMETERS[CONSTRAINT_SET].default)
     for name in own:
-        names.check_drawn(name, constraints)
+        names.check_drawn(name, shared)
     scenario = Scenario(shared, size.duration, size.backend)
     return Campaign(base, size, scenario, own, tuple(Limit.read(text) for text in limits))
 

@@ -1,27 +1,35 @@
 """Parameters of the nodes in a campaign: those that can be drawn, or are fixed."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 from climber_uk.closed_loop.node_parameters import PARAMETERS, fields_of
 from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
 from climber_uk.control.stops import StopOptions
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.wall import WALLS
 from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.simulation.sensors import Sensors
 
 SEED, PRESSURE = f"{PLANT}.seed", f"{PLANT}.suction_pressure"
 MEASURED = f"{CONTROLLER}.suction_pressure"
-CONSTRAINT_SET = f"{CONTROLLER}.constraints"
+# parameters that choose one of several kinds with parameters of their own
+VARIANTS: dict[str, Mapping[str, Any]] = {
+    f"{CONTROLLER}.constraints": CONSTRAINTS,
+    **{f"{node}.wall": WALLS for node in (CONTROLLER, PLANT)},
+}
+ON_WALL = [(kind, f"{name}.") for name, kind in WALLS.items()]
 LOSS_TIME = f"{PLANT}.pressure_loss_time"
 # Parameters that may differ from run to run
 VARIED = {
-    *fields_of(PLANT, [(Climber, "")]),
+    *fields_of(PLANT, [(Climber, ""), *ON_WALL]),
     *(f"{PLANT}.{error.name}" for error in Sensors.errors()),
     *(f"{PLANT}.{n}" for n in ("wheel_friction_coefficient", "centre_height", "wheelbase")),
     *(f"{PLANT}.initial_{n}" for n in ("x", "y", "heading", "speed", "yaw_rate")),
     *(LOSS_TIME, f"{PLANT}.pressure_loss_level"),
-    *fields_of(CONTROLLER, [(Climber, ""), *((kind, f"{n}.") for n, kind in CONSTRAINTS.items())]),
+    *fields_of(CONTROLLER, [(Climber, ""), *ON_WALL]),
+    *fields_of(CONTROLLER, [(kind, f"{name}.") for name, kind in CONSTRAINTS.items()]),
     *(f"{CONTROLLER}.{n}" for n in ("friction_speed", "observer.bandwidth")),
 }
 VARIED -= {MEASURED}
@@ -31,8 +39,6 @@ REQUIRED = {
     f"{CONTROLLER}.least_pressure": 0.0,
     **{f"{CONTROLLER}.stops.{f.name}": f.default for f in dataclasses.fields(StopOptions)},
     f"{CONTROLLER}.adhesion": "suction",
-    f"{CONTROLLER}.wall": "plane",
-    f"{CONTROLLER}.plane.tilt": 0.0,
     f"{CONTROLLER}.least_suction.enabled": False,
     f"{CONTROLLER}.controller": UDWADIA_KALABA,
     f"{CONTROLLER}.motors": "torque",
@@ -40,8 +46,6 @@ REQUIRED = {
     f"{PLANT}.friction": "coulomb",
     f"{PLANT}.adhesion": "suction",
     f"{PLANT}.locomotion": "wheeled",
-    f"{PLANT}.wall": "plane",
-    f"{PLANT}.plane.tilt": 0.0,
     f"{PLANT}.slip": False,
     f"{PLANT}.creep": 0.0,
     f"{PLANT}.publish_odometry": True,
@@ -62,14 +66,16 @@ WITHOUT = {
 }
 
 
-def check_drawn(name: str, constraints: str) -> None:
-    """Raise `ValueError` unless a parameter may differ from run to run."""
+def check_drawn(name: str, shared: Mapping[str, Any]) -> None:
+    """Raise `ValueError` unless a parameter may differ from run to run; all share `shared`."""
     _check_known(name)
     if name not in VARIED:
         raise ValueError(f"{name} cannot be drawn: all runs share one value")
-    part = name.split(".")[1]
-    if part in CONSTRAINTS and part != constraints:
-        raise ValueError(f"{name} has no effect with constraints={constraints!r}")
+    node, part, *_ = name.split(".")
+    for choice, kinds in VARIANTS.items():
+        chosen = shared.get(choice, PARAMETERS[choice].default)
+        if choice.startswith(f"{node}.") and part in kinds and part != chosen:
+            raise ValueError(f"{name} has no effect with {choice.split('.')[1]}={chosen!r}")
 
 
 def fixed(name: str, value: Any) -> Any:

@@ -17,6 +17,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
+from climber_uk.mechanics.wall import told
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.parameters.parameter_file import Values
 from climber_uk.simulation.options import SimulationOptions
@@ -78,6 +79,7 @@ class Scenario:
             timing=timing,
             contact=Contact(grip=plant.read(Grip)),
             gauge=GAUGE,
+            wall=told(plant.read, plant.read(Physics).wall),
         )
 
 

@@ -29,6 +29,7 @@ from climber_uk.mechanics.friction import Coulomb
 from climber_uk.mechanics.many import chosen, indexed, keep_what_is_freed
 from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
+from climber_uk.mechanics.wall import Wall
 from climber_uk.simulation.sensors import Sensors
 
 LOOPS_AT_ONCE = 16384  # fastest, by measurement
@@ -55,6 +56,7 @@ class Loops:
     changes: tuple[Change, ...] = ()
     timing: Timing = field(default_factory=Timing)
     contact: Contact = field(default_factory=Contact)  # for the margins
+    wall: Wall | None = None  # the true one, as a `ControlLaw` has it
     gauge: float = 0.0  # [s] period in which controllers are sent the pressure; 0: never
 
     def __post_init__(self) -> None:
@@ -99,7 +101,7 @@ class Loops:
         in_motion = np.any(self.start.speed) or np.any(self.start.yaw_rate)
         return LoopsState(
             Estimator(self.law.climber, self.observer, self.timing, wall=self.law.wall),
-            Tally.begun(number, self.contact),
+            Tally.begun(number, self.contact, self.wall),
             self.sensors,
             self.start,
             None if in_motion else Torques(*np.zeros((2, number))),

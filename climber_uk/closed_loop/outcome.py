@@ -11,6 +11,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, is_pulled_off
 from climber_uk.mechanics.elementary import anywhere, larger, select, smaller
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, Torques
+from climber_uk.mechanics.wall import Wall, gravity, weight
 
 SETTLED = 0.01  # [m] from the reference, within which a loop has settled
 
@@ -47,16 +48,16 @@ class Sums(NamedTuple):
 class Tally:
     """Sums up many loops, period by period."""
 
-    def __init__(self, sums: Sums, contact: Contact) -> None:
-        self.sums, self.contact = sums, contact
+    def __init__(self, sums: Sums, contact: Contact, wall: Wall | None) -> None:
+        self.sums, self.contact, self.wall = sums, contact, wall
         self._climber: Climber | None = None
         self._on_wall: Any = True  # or an array (N,), once one has fallen
 
     @classmethod
-    def begun(cls, number: int, contact: Contact) -> "Tally":
-        """Tally of `number` loops."""
+    def begun(cls, number: int, contact: Contact, wall: Wall | None = None) -> "Tally":
+        """Tally of `number` loops, on a wall; None: an untilted plane."""
         none, most, never = np.zeros(number), np.full(number, MAX_MARGIN), np.full(number, np.inf)
-        return cls(Sums(*(*[none] * 7, most, most, never)), contact)
+        return cls(Sums(*(*[none] * 7, most, most, never)), contact, wall)
 
     def add(
         self,
@@ -68,16 +69,16 @@ class Tally:
         climber: Climber,
     ) -> None:
         """Add a period that begins at `time` [s], with the torques that act on the wheels in it."""
-        if climber is not self._climber:
-            self._update_fallen(time, climber)
+        if climber is not self._climber or self.wall is not None:
+            self._update_fallen(time, climber, motion)
         x, y = motion.x - target.x, motion.y - target.y
         square, on, sums = x * x + y * y, self._on_wall, self.sums
         is_far = square > SETTLED * SETTLED
         cut = select(command.fits, sums.saturated, sums.saturated + 1)
         torque = larger(abs(wheels.right), abs(wheels.left))
-        lateral = climber.lateral_reaction(motion)
+        _, across = weight(self.wall, climber, motion)
+        lateral = climber.mass * motion.speed * motion.yaw_rate - across
         forces = wheels.right / climber.wheel_radius, wheels.left / climber.wheel_radius
-        across = -climber.weight_along_wall * motion.cosine
         margin = self.contact.slip_margin(climber, self._into, forces, lateral, across)
         self.sums = Sums(
             periods=select(on, sums.periods + 1, sums.periods),
@@ -92,17 +93,17 @@ class Tally:
             fell=sums.fell,
         )
 
-    def _update_fallen(self, time: Any, climber: Climber) -> None:
-        """Find the loops that fall at `time` [s], as `climber` becomes the true one."""
+    def _update_fallen(self, time: Any, climber: Climber, motion: Motion) -> None:
+        """Find the loops that fall at `time` [s], in `motion`, if `climber` is the true one."""
         self._climber = climber
-        self._into = climber.gravity_into_wall
+        self._into, along = gravity(self.wall, climber, motion)
         normal = self.contact.normal_force(climber, self._into)
-        along = climber.weight_along_wall / climber.mass
         tip = self.contact.tip_margin(climber, self._into, along)
         falls = is_pulled_off(climber, normal) | (tip < 1)
         sums = self.sums
+        tip = select(sums.fell == np.inf, smaller(sums.tip_margin, tip), sums.tip_margin)
         fell = smaller(sums.fell, select(falls, time, np.inf))
-        self.sums = sums._replace(tip_margin=smaller(sums.tip_margin, tip), fell=fell)
+        self.sums = sums._replace(tip_margin=tip, fell=fell)
         if anywhere(fell < np.inf):
             self._on_wall = fell == np.inf
 

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 from climber_uk.closed_loop.outcome import Tally
-from climber_uk.closed_loop.unicycle import UnicycleModel, advanced_often
+from climber_uk.closed_loop.unicycle import Downhill, UnicycleModel, advanced_often
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.estimator import Estimator
 from climber_uk.mechanics.climber import Climber
@@ -81,7 +81,7 @@ class LoopsState:
     ) -> None:
         """Go through a period; `target_at` has the reference at a stamp [ns]."""
         stamp, time, noise, climber, law, target = given
-        estimator, motion = self.estimator, self.motion
+        estimator, motion, tally = self.estimator, self.motion, self.tally
         if law.climber is not estimator.climber:
             estimator.go_over_to(law.climber)
         estimator.see(stamp, motion if noise is None else self.sensors.corrupted(motion, noise))
@@ -97,9 +97,14 @@ class LoopsState:
         right, left = climber.bounds(motion)
         arriving = self.on_their_way.popleft()
         wheels = Torques(clipped(arriving.right, *right), clipped(arriving.left, *left))
-        self.tally.add(time, motion, target, command, wheels, climber)
-        wrench = Wrench(*climber.wrench(*wheels))
-        self.motion = advance(UnicycleModel.of(climber), motion, wrench)
+        tally.add(time, motion, target, command, wheels, climber)
+        wrench, body = Wrench(*climber.wrench(*wheels)), UnicycleModel.of(climber)
+        if tally.wall is None:
+            self.motion = advance(body, motion, wrench)
+        else:
+            downhill = Downhill.of(tally.wall, climber, motion, estimator.period)
+            end = advance(downhill.body(body, climber), downhill.seen(motion), wrench)
+            self.motion = downhill.back(end, motion)
 
 
 def go_on(state: LoopsState, periods: Iterable[Given], course: BatchRun, preview: Preview) -> None:

@@ -134,7 +134,7 @@ def go_on(
         climber = _stacked([given.climber for given in several], changing, number)
         believed = _stacked([given.law.climber for given in several], changing & {PRESSURE}, number)
         law = replace(law, climber=believed)
-        same = estimator.observer, estimator.timing, state.sensors, tally.contact
+        same = estimator.observer, estimator.timing, state.sensors, tally.contact, tally.wall
         aim = law.target_time(estimator.ahead(0.0)) - estimator.stamp
         rows = _rows(several, preview, aim)
         numbers = _go_through(Arrays((climber, law, *same)), numbers, rows, count, clock)
@@ -177,11 +177,12 @@ def _go_through(
         def now(array: Any) -> Any:
             return array[i] if array.ndim == 2 else array
 
-        climber, law, observer, timing, sensors, contact = mapped(now, constant.of)
+        climber, law, observer, timing, sensors, contact, wall = mapped(now, constant.of)
         time, target, aim, noise = jax.tree.map(lambda row: row[i], rows)
-        estimator = Estimator(climber, observer, timing)  # goes over to the model of `law`
+        # goes over to the model of `law`
+        estimator = Estimator(climber, observer, timing, wall=law.wall)
         estimator.remember(numbers.memory, clock.known, SECOND)
-        tally, on_their_way = Tally(numbers.sums, contact), deque(numbers.on_their_way)
+        tally, on_their_way = Tally(numbers.sums, contact, wall), deque(numbers.on_their_way)
         state = LoopsState(estimator, tally, sensors, numbers.motion, on_their_way=on_their_way)
         given = Given(SECOND + clock.period, time, noise, climber, law, target)
         state.go_through(given, lambda _: aim, advance)

@@ -1,5 +1,7 @@
 """Steps of a unicycle climber: on a plane, with Coulomb friction, and wheels that do not slip.
 
+On another wall, for a period, it is on the plane that has the wall's gravity along it: `Downhill`.
+
     v̇ = (F - f σ)/m - g_t sinθ    ω̇ = N/J    ẋ = v cosθ    ẏ = v sinθ       (11), (15), (12), (17)
 
 Under a constant wrench θ(t) is known; the rest is Simpson's rule, of fourth order as the plant is
@@ -11,16 +13,19 @@ from typing import Any, NamedTuple
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY, Climber
 from climber_uk.mechanics.elementary import (
+    arctan2,
     clipped,
     rotated,
     select,
     sign,
     sin,
+    sqrt,
     swept,
     with_sign_of,
 )
 from climber_uk.mechanics.many import amended, keep_what_is_freed
 from climber_uk.mechanics.quantities import Motion, Wrench
+from climber_uk.mechanics.wall import Wall
 
 ITERATIONS = 5  # of Newton's method to an instant within a step; each squares what is left
 
@@ -46,6 +51,45 @@ class UnicycleModel(NamedTuple):
         return Accelerations(
             wrench.force / mass, wrench.moment / yaw_inertia, friction / mass, gravity
         )
+
+
+class Downhill(NamedTuple):
+    """The way that gravity pulls along a wall, and how much: where the plane's -y is to be."""
+
+    angle: Any  # [rad] from -y, anticlockwise
+    cosine: Any
+    sine: Any
+    steep: Any  # pull, by g
+
+    @classmethod
+    def of(cls, wall: Wall, climber: Climber, motion: Motion, time: float) -> "Downhill":
+        """Where a climber is in the middle of the next `time` [s], at the speed of now."""
+        way = 0.5 * time * motion.speed
+        place = motion.x + way * motion.cosine, motion.y + way * motion.sine
+        s_x, s_y = wall.along(climber.inclination, *place)
+        steep = sqrt(s_x * s_x + s_y * s_y)
+        pulls = select(steep > 0, steep, 1.0)
+        sine, cosine = s_x / pulls, select(steep > 0, -s_y / pulls, 1.0)
+        return cls(arctan2(sine, cosine), cosine, sine, steep)
+
+    def body(self, on_plane: UnicycleModel, climber: Climber) -> UnicycleModel:
+        """A climber with this gravity."""
+        return on_plane._replace(gravity=GRAVITY * self.steep * (climber.mass / on_plane.mass))
+
+    def seen(self, motion: Motion) -> Motion:
+        """A motion in a frame at its place, whose -y is downhill."""
+        _, _, heading, c, s, v, omega = motion
+        _, cosine, sine, _ = self
+        along = c * cosine + s * sine, s * cosine - c * sine
+        return Motion(0.0 * c, 0.0 * c, heading - self.angle, *along, v, omega)
+
+    def back(self, end: Motion, start: Motion) -> Motion:
+        """What was `seen` from a `start`, in the wall's frame."""
+        x, y, heading, c, s, v, omega = end
+        _, cosine, sine, _ = self
+        x, y = start.x + x * cosine - y * sine, start.y + x * sine + y * cosine
+        along = c * cosine - s * sine, s * cosine + c * sine
+        return Motion(x, y, heading + self.angle, *along, v, omega)
 
 
 class Accelerations(NamedTuple):

@@ -17,7 +17,7 @@ LACKS_ELSE = 0.25  # of the same, is missing or too much there
 LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
 LACKS_IN_A_ROW = 3  # odometry messages
 WENT, GOES, STANDS = 0.05, 0.01, 1e-3  # [m/s] of a rim: before, of the other one, of this one
-ASKED = 0.01  # [m/s] of both rims by the reference: neither is to stand
+ASKED = 0.01  # [m/s] of a rim that is not to stand
 # odometry messages for which a rim stands that went before; that never went, or slowly
 STANDS_AT_ONCE, STANDS_ON = 3, 10
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
@@ -88,7 +88,7 @@ class RimStop:
         self.is_stuck = False
 
     def add(self, rim: float, other: float, asked: float) -> None:
-        """Add speeds [m/s] of this rim, of the other, and what the reference asks of the slower."""
+        """Add speeds [m/s] of this rim, of the other, and what is asked of this one at least."""
         if abs(rim) >= STANDS or (abs(other) <= GOES and not self._at_once):
             self._stands, self._at_once = 0, False
         else:
@@ -116,11 +116,17 @@ class ActuatorCheck:
         self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
         self._had_time = False  # to answer
 
-    def add(self, climber: Climber, observed: Observed, response_time: float, asked: float) -> None:
+    def add(
+        self,
+        climber: Climber,
+        observed: Observed,
+        response_time: float,
+        asked: tuple[float, float],
+    ) -> None:
         """Take what an odometry tells of the time since the last: see `Wheel` and `RimStop`.
 
         They have a `response_time` [s] to answer; 0: nothing is compared. `asked` [m/s] is what
-        the reference asks of the slower rim.
+        is asked of the right and the left rim, at least.
         """
         if response_time == 0:
             self.restart()
@@ -128,8 +134,8 @@ class ActuatorCheck:
         before, after, time = observed.before, observed.after, observed.time
         d, (right, left) = climber.half_track, self._rims
         speeds = after.speed + d * after.yaw_rate, after.speed - d * after.yaw_rate
-        right.add(*speeds, asked)
-        left.add(*speeds[::-1], asked)
+        right.add(*speeds, asked[0])
+        left.add(*speeds[::-1], asked[1])
         if min(abs(before.speed), abs(after.speed)) < SLIDES:
             if self._moved:
                 self._begin()

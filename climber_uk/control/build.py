@@ -17,7 +17,7 @@ from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import Timing
 from climber_uk.mechanics.adhesion import ADHESION, with_its_seal
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.wall import WALLS, Plane
+from climber_uk.mechanics.wall import WALLS, Wall, told
 from climber_uk.parameters.declaration import parameter, parameters
 
 T = TypeVar("T")
@@ -60,6 +60,11 @@ KINDS: list[tuple[type, str]] = [
 """All that is read, with the prefix of its parameters."""
 
 
+def known_wall(parameters: ParameterSource) -> Wall | None:
+    """The wall that a controller is told; None if it is all in the climber's inclination."""
+    return told(parameters.read, parameters.read(ControllerChoice).wall)
+
+
 def settings(parameters: ParameterSource, pressure: float | None) -> Settings:
     """Settings by the parameters; a measured `pressure` [Pa] replaces the climber's.
 
@@ -75,9 +80,7 @@ def settings(parameters: ParameterSource, pressure: float | None) -> Settings:
         raise ValueError(f"solver=closed_form must be generic for {name}, which gives rows")
     other = choice.controller
     force_law = read(FORCE_LAWS[other], f"{other}.") if other != UDWADIA_KALABA else None
-    wall = read(WALLS[choice.wall], f"{choice.wall}.")
-    is_known = wall == Plane()  # by the climber's inclination alone
-    law = ControlLaw(climber, constraints, options, force_law, None if is_known else wall)
+    law = ControlLaw(climber, constraints, options, force_law, known_wall(parameters))
     observer, pacing = read(Observer, "observer."), read(Pacing, "pacing.")
     return Settings(law, observer, read(Timing), pacing, read(MotorBoard))
 

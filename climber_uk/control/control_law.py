@@ -30,7 +30,7 @@ from climber_uk.mechanics.quantities import (
     along,
 )
 from climber_uk.mechanics.udwadia_kalaba import constraint_force
-from climber_uk.mechanics.wall import Wall, weight_beyond
+from climber_uk.mechanics.wall import Wall, gravity, weight, weight_beyond
 from climber_uk.parameters.declaration import parameter, parameters
 
 NOTHING = Wrench(0.0, 0.0)
@@ -303,22 +303,12 @@ class ControlLaw:
 
     def weight(self, motion: Motion) -> Any:
         """Drive [N] that carries the weight."""
-        on_plane = self.climber.weight_along_wall * motion.sine
-        if self.wall is None:
-            return on_plane
-        return on_plane - weight_beyond(self.wall, self.climber, motion)[0]
+        return -weight(self.wall, self.climber, motion)[0]
 
     def gravity(self, motion: Motion) -> tuple[Any, Any, Any]:
         """Into the wall and along it [m/s²], and what the weight pulls to the left [N]."""
-        climber, wall = self.climber, self.wall
-        across = -climber.weight_along_wall * motion.cosine
-        if wall is None:
-            return climber.gravity_into_wall, climber.weight_along_wall / climber.mass, across
-        at = climber.inclination, motion.x, motion.y
-        speeds = motion.speed * motion.cosine, motion.speed * motion.sine
-        along_wall = GRAVITY * math.hypot(*wall.along(*at))
-        beyond = weight_beyond(wall, climber, motion)[1]
-        return float(wall.into(*at, *speeds)), along_wall, across + beyond
+        wall, climber = self.wall, self.climber
+        return *gravity(wall, climber, motion), weight(wall, climber, motion)[1]
 
     @property
     def falls(self) -> bool:

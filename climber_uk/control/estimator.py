@@ -42,6 +42,7 @@ class Observed(NamedTuple):
     disturbance: Wrench  # as it was known before
     reaction: float  # [s] in which a torque can answer
     pull: float = 0.0  # [N] forwards, of the weight beyond that on a plane: see `weight_beyond`
+    turning: float = 0.0  # [rad/s] that was wanted last
 
     @property
     def torques(self) -> Torques:
@@ -108,7 +109,8 @@ class Estimator:
         """Forget what was learnt of the disturbance."""
         self.learnt, self.slip = DisturbanceEstimate(), NO_SLIP
         self._direction = 0.0  # of the reference: 1 forwards, -1 backwards, 0 at rest
-        self._turn: Any = 0.0  # as wanted: 1 to the left, -1 to the right, 0 hardly
+        self._turning: Any = 0.0  # [rad/s] as wanted
+        self._turn: Any = 0.0  # of the same: 1 to the left, -1 to the right, 0 hardly
         # whether no limit cut the last answer, so that errors are due to the disturbance:
         # a bool; of many climbers an array (N,) of them
         self._learning: Any = False
@@ -167,7 +169,7 @@ class Estimator:
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
         held, resistance = self._sent.last, (learnt.friction, learnt.turning)
-        aside = self.slip.speed(self.climber, motion) if self.slip is not NO_SLIP else 0.0
+        aside = self._aside(motion)
         return ControlInput(motion, held, disturbance, self.period, begins, *resistance, aside)
 
     def pending(self, begins: int) -> Acting:
@@ -200,6 +202,7 @@ class Estimator:
         self._learning = learning
         if speed is not None:
             self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
+            self._turning = yaw_rate
             self._turn = sign(select(abs(yaw_rate) > SLOW_TURN, yaw_rate, 0.0))
         self._sent.add(begins, torques)
         # without odometry, too, that of long ago is not needed
@@ -216,12 +219,16 @@ class Estimator:
             return self.motion
         return self._rolled(self.motion, self._sent.between(self.stamp, stamp))
 
+    def _aside(self, motion: Motion) -> float:
+        """Speed [m/s] at which wheels give way to the left."""
+        slip = self.slip
+        return slip.speed(self.climber, motion, self.wall) if slip is not NO_SLIP else 0.0
+
     def _rolled(self, motion: Motion, acting: Acting) -> Motion:
         """Motion after torques have acted, each for some time [s]."""
         climber, learnt = self.climber, self.learnt
         r_F, r_N, resisting = learnt.force, learnt.moment, (learnt.friction, learnt.turning)
-        aside = self.slip.speed(climber, motion) if self.slip is not NO_SLIP else 0.0
-        wall = self.wall
+        wall, aside = self.wall, self._aside(motion)
         for torques, time in acting:
             force, moment = climber.wrench(*torques)
             if wall is not None:
@@ -236,13 +243,15 @@ class Estimator:
         time = (stamp - self.stamp) / SECOND
         reaction = self._delay + self.period / 2
         pull = 0.0 if self.wall is None else weight_beyond(self.wall, self.climber, motion)[0]
-        observed = Observed(before, motion, time, acted, self.disturbance, reaction, pull)
+        observed = Observed(
+            before, motion, time, acted, self.disturbance, reaction, pull, self._turning
+        )
         has_twist = self.observer.velocity_source == "odometry" and isinstance(motion.x, float)
         bandwidth = self.observer.side_slip_bandwidth
         # speeds that come from poses share their noise, which would be learnt
         if self._last_pose is not None and has_twist and bandwidth > 0:
             poses = self._last_pose, motion
-            self.slip = self.slip.learnt(self.climber, *poses, time, bandwidth)
+            self.slip = self.slip.learnt(self.climber, *poses, time, bandwidth, self.wall)
         self._last_pose = motion
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)

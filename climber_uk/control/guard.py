@@ -139,8 +139,12 @@ class Guard:
         """What is wrong with what is observed; None if all is well."""
         torques = observed.torques
         self._followed += observed.time
-        asked = expected.wanted.speed - climber.half_track * expected.wanted.yaw_rate
-        self._actuators.add(climber, observed, self.options.response_time, asked)
+        slower = expected.wanted.speed - climber.half_track * expected.wanted.yaw_rate
+        # of the climber's own turning, a rim may stand: wheels that scrub head where it does not go
+        turning = math.copysign(climber.half_track, expected.speed) * observed.turning
+        own = expected.wanted.speed + turning, expected.wanted.speed - turning
+        right, left = (min(slower, rim) for rim in own)
+        self._actuators.add(climber, observed, self.options.response_time, (right, left))
         given = self._watch_budget(climber, observed, expected)
         too_fast = self._watch_rates(climber, observed, expected)
         return (

@@ -1,21 +1,29 @@
 """Wheels that give way sideways: by how much, learnt from poses, and the course that is left.
 
-    v_y = ρ |v| - λ |ω| Y / (m g)        Y = m v ω + m g_t cosθ, what the wheels take to the left
+    v_y = ρ |v| - λ |ω| Y / (m g) + p ω X / (m g)
+
+    Y = m v ω + m g_t cosθ, what the wheels take to the left        X = m g_t sinθ
+
+on a plane; on a wall that is told, with the weight as it pulls there.
 
 ρ is creep. λ is what scrubbing wheels lack: a contact that is dragged round holds sideways like
-something viscous, and gives way the more, the faster it is dragged (docs/theory.md, §8.5).
+something viscous, and gives way the more, the faster it is dragged (docs/theory.md, §8.5). p is by
+how much the point that it turns about is shifted: the weight loads the wheels that are lower.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import clipped, wrapped
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
+from climber_uk.mechanics.wall import Wall, weight
 
-CREEP, SCRUB = 0.06, 0.1  # ρ, and λ [m], as large as they may well be
+SIZES = 0.06, 0.1, 0.03  # of ρ, λ [m] and p [m], as large as they may well be
 LARGEST = 10.0  # times as large as that, at most
+FORGOTTEN = 10.0  # [s] in which what is known of them is known no more
 FADE_SPEED = 0.02  # [m/s] of a reference below which its course is its heading
 SLOW_TO_LEARN = 0.05  # [m/s] below which poses tell less and less of ρ
 MOST_LEAD = 0.7  # [s]
@@ -27,6 +35,45 @@ NEGLIGIBLE = 1e-5  # [rad] of a course off its heading
 # Gauss-Laguerre, of second order: the integral of exp(-u) f(u) from 0 on is about Σ weight f(node)
 NODES = (2 - math.sqrt(2), (2 + math.sqrt(2)) / 4), (2 + math.sqrt(2), (2 - math.sqrt(2)) / 4)
 At = Callable[[float], ReferencePoint]
+
+
+class Covariance(NamedTuple):
+    """How little is known of ρ, λ [m] and p [m]: the upper triangle, row by row."""
+
+    rho: float = SIZES[0] ** 2
+    rho_lambda: float = 0.0
+    rho_p: float = 0.0
+    lambdas: float = SIZES[1] ** 2
+    lambda_p: float = 0.0
+    p: float = SIZES[2] ** 2
+
+    def times(self, rho: float, scrub: float, pivot: float) -> tuple[float, float, float]:
+        """Its product with a vector."""
+        a, b, c, d, e, f = self
+        return (
+            a * rho + b * scrub + c * pivot,
+            b * rho + d * scrub + e * pivot,
+            c * rho + e * scrub + f * pivot,
+        )
+
+    def after(
+        self, times: tuple[float, float, float], known: float, forgotten: float
+    ) -> "Covariance":
+        """Less `known` times the square of a vector; a share of what was known is forgotten."""
+        a, b, c, d, e, f = self
+        rho, scrub, pivot = times
+        kept, unknown = 1 - forgotten, NOTHING_KNOWN
+        return Covariance(
+            kept * a - known * rho * rho + forgotten * unknown.rho,
+            kept * b - known * rho * scrub,
+            kept * c - known * rho * pivot,
+            kept * d - known * scrub * scrub + forgotten * unknown.lambdas,
+            kept * e - known * scrub * pivot,
+            kept * f - known * pivot * pivot + forgotten * unknown.p,
+        )
+
+
+NOTHING_KNOWN = Covariance()
 
 
 class Course(NamedTuple):
@@ -60,19 +107,28 @@ class SideSlip(NamedTuple):
 
     creep: float = 0.0  # ρ
     scrub: float = 0.0  # λ [m]
+    pivot: float = 0.0  # p [m]
     creep_rate: float = 0.0  # of ρ [1/s]
     offset: float = 0.0  # [m] of poses to the left of where they were expected, filtered
+    covariance: Covariance = NOTHING_KNOWN
 
-    def speed(self, climber: Climber, motion: Motion) -> float:
+    def speed(self, climber: Climber, motion: Motion, wall: Wall | None = None) -> float:
         """v_y [m/s] of a climber in `motion`."""
-        return self.creep * abs(motion.speed) + self.scrub * _scrubbing(climber, motion)
+        v, scrubbing, shifting = _rates(climber, motion, wall)
+        return self.creep * v + self.scrub * scrubbing + self.pivot * shifting
 
     def learnt(
-        self, climber: Climber, before: Motion, now: Motion, time: float, bandwidth: float
+        self,
+        climber: Climber,
+        before: Motion,
+        now: Motion,
+        time: float,
+        bandwidth: float,
+        wall: Wall | None = None,
     ) -> "SideSlip":
         """As two odometry messages teach, `time` [s] apart; with both poles at a bandwidth [1/s].
 
-        It is the least change of the parts that explains it, each by how large it may well be.
+        It is the likeliest change of the parts that explains it, as a Kalman filter finds it.
         """
         cosine, sine = (before.cosine + now.cosine) / 2, (before.sine + now.sine) / 2
         aside = ((now.y - before.y) * cosine - (now.x - before.x) * sine) / time
@@ -80,57 +136,109 @@ class SideSlip(NamedTuple):
         # an arc that is driven ever faster, or bends ever more, is not even about its middle
         faster, tighter = now.speed - before.speed, now.yaw_rate - before.yaw_rate
         aside -= time / 12 * (rate * faster - mean * tighter)
-        v, scrubbing = abs(mean), _scrubbing(climber, now)
-        error = aside - self.creep * v - self.scrub * scrubbing
-        by_creep, by_scrub = CREEP**2 * v, SCRUB**2 * scrubbing
-        size = by_creep * v + by_scrub * scrubbing + (CREEP * SLOW_TO_LEARN) ** 2
+        v, scrubbing, shifting = _rates(climber, now, wall)
+        error = aside - self.creep * v - self.scrub * scrubbing - self.pivot * shifting
+        by_creep, by_scrub, by_pivot = by = self.covariance.times(v, scrubbing, shifting)
+        large = math.hypot(SIZES[0] * v, SIZES[1] * scrubbing, SIZES[2] * shifting)
+        share = large / math.hypot(large, SIZES[0] * SLOW_TO_LEARN)
+        variance = by_creep * v + by_scrub * scrubbing + by_pivot * shifting
+        per = share * share / variance if variance > 0 else 0.0
         poles = min(bandwidth, FASTEST / time)
         # a pose that jumps is no side slip; of noise, each difference takes back the last one
         most = (v + climber.half_track * abs(now.yaw_rate)) / (2 * poles)
         offset = clipped(self.offset + time * error, -most, most)
-        gain = poles * poles * offset / size
-        creep = clipped(self.creep + time * gain * by_creep, -LARGEST * CREEP, LARGEST * CREEP)
-        scrub = clipped(self.scrub + time * gain * by_scrub, 0.0, LARGEST * SCRUB)
-        return SideSlip(creep, scrub, gain * by_creep, offset * math.exp(-2 * poles * time))
+        gain = poles * poles * offset * per
+        creeps, scrubs, pivots = (LARGEST * largest for largest in SIZES)
+        return SideSlip(
+            clipped(self.creep + time * gain * by_creep, -creeps, creeps),
+            clipped(self.scrub + time * gain * by_scrub, 0.0, scrubs),
+            clipped(self.pivot + time * gain * by_pivot, -pivots, pivots),
+            gain * by_creep,
+            offset * math.exp(-2 * poles * time),
+            self.covariance.after(by, time * poles * per, time / FORGOTTEN),
+        )
 
-    def course(self, climber: Climber, target: ReferencePoint, at: At) -> Course | None:
+    def course(
+        self, climber: Climber, target: ReferencePoint, at: At, wall: Wall | None = None
+    ) -> Course | None:
         """Course of a climber on its reference; None where its wheels hold.
 
         `at` gives the reference at a time [s] after the one of `target`.
         """
-        v, omega = target.speed, target.yaw_rate
-        fade = v / (v * v + FADE_SPEED * FADE_SPEED)
-        reaction = climber.mass * v * omega + climber.weight_along_wall * math.cos(target.heading)
-        arm = self.scrub * reaction / (climber.mass * GRAVITY)  # [m] -v_y / |ω|
-        angle, rate = math.atan(self.creep * abs(v) * fade), self.creep_rate * abs(v) * fade
-        if abs(angle) + abs(fade * arm * omega) < NEGLIGIBLE:
+        v, fade = abs(target.speed), _fade(target.speed)
+        angle, rate = math.atan(self.creep * v * fade), self.creep_rate * v * fade
+        one, other = self._leads(climber, wall, target)
+        if abs(angle) + (abs(one) + abs(other)) * abs(target.yaw_rate) < NEGLIGIBLE:
             return None
         # it sags, whichever way it turns: of both ways to turn, the heading that is higher
-        ways = _ahead(target, at, fade * arm), _ahead(target, at, -fade * arm)
-        turned, faster, sooner = max(ways) if arm > 0 else min(ways)
+        leads = partial(self._leads, climber, wall)
+        ways = [_ahead(target, at, leads, way) for way in (0, 1)]
+        turned, faster, sooner = max(ways) if one > other else min(ways)
         return Course.at(angle - turned, rate - faster, -sooner)
 
+    def _leads(
+        self, climber: Climber, wall: Wall | None, target: ReferencePoint
+    ) -> tuple[float, float]:
+        """Times T [s] by which its heading is ahead of its course, while it turns left, and right.
 
-def _ahead(target: ReferencePoint, at: At, lead: float) -> tuple[float, float, float]:
+        Creep apart, β = v_y / v = -T ω.
+        """
+        v = target.speed
+        there = Motion.at(target.x, target.y, target.heading, v, target.yaw_rate)
+        reaction, uphill = _pulls(climber, there, wall)
+        sags, shifts = self.scrub * reaction, self.pivot * uphill  # [m] -v_y / |ω|, v_y / ω
+        fade = _fade(v)
+        return (
+            clipped(fade * (sags - shifts), -MOST_LEAD, MOST_LEAD),
+            clipped(fade * (-sags - shifts), -MOST_LEAD, MOST_LEAD),
+        )
+
+
+def _fade(speed: float) -> float:
+    """About 1 / v of a speed v [m/s], and 0 at rest."""
+    return speed / (speed * speed + FADE_SPEED * FADE_SPEED)
+
+
+def _ahead(
+    target: ReferencePoint, at: At, leads: Callable[[ReferencePoint], Sequence[float]], way: int
+) -> tuple[float, float, float]:
     """How far the heading has to be ahead of a reference, and its derivatives.
 
+    `leads` gives T [s] of a reference, for each way to turn.
+
     θ - T θ̇ = θ_d, so that θ is the mean of what θ_d will be (was, of T < 0), with weights that fade
-    exponentially: the only solution that does not grow.
+    exponentially by ∫ dt / T: the only solution that does not grow. T changes about evenly until
+    then; what is later than can be seen goes on as it does there.
     """
-    lead = clipped(lead, -MOST_LEAD, MOST_LEAD)
+    now = leads(target)[way]
     angle = rate = acceleration = 0.0
-    for node, weight in NODES:
-        later = at(clipped(lead * node, -HINDSIGHT, FORESIGHT))
-        angle += weight * wrapped(later.heading - target.heading)
-        rate += weight * (later.yaw_rate - target.yaw_rate)
-        acceleration += weight * (later.yaw_acceleration - target.yaw_acceleration)
+    for node, share in NODES:
+        mean = leads(at(clipped(now * node / 2, -HINDSIGHT, FORESIGHT)))[way]
+        stretched = clipped(2 * mean / now - 1, 0.0, 3.0) if now else 1.0  # T then by T now
+        mean = mean if mean * now > 0 else 0.0
+        seen = clipped(mean * node, -HINDSIGHT, FORESIGHT)
+        beyond, later = mean * node - seen, at(seen)
+        heading = wrapped(later.heading - target.heading) + beyond * later.yaw_rate
+        yaw_rate = stretched * (later.yaw_rate + beyond * later.yaw_acceleration)
+        angle += share * heading
+        rate += share * (yaw_rate - target.yaw_rate)
+        acceleration += share * (
+            stretched * stretched * later.yaw_acceleration - target.yaw_acceleration
+        )
     return angle, rate, acceleration
 
 
-def _scrubbing(climber: Climber, motion: Motion) -> float:
-    """What λ is multiplied by [rad/s]."""
-    reaction = climber.lateral_reaction(motion) / (climber.mass * GRAVITY)
-    return -float(reaction) * abs(motion.yaw_rate)
+def _rates(climber: Climber, motion: Motion, wall: Wall | None) -> tuple[float, float, float]:
+    """What ρ [m/s], λ and p [rad/s] are multiplied by."""
+    (reaction, uphill), turning = _pulls(climber, motion, wall), motion.yaw_rate
+    return abs(motion.speed), -reaction * abs(turning), uphill * turning
+
+
+def _pulls(climber: Climber, motion: Motion, wall: Wall | None) -> tuple[float, float]:
+    """Y and X, by the weight."""
+    (forward, left), whole = weight(wall, climber, motion), climber.mass * GRAVITY
+    turned = climber.mass * motion.speed * motion.yaw_rate
+    return float(turned - left) / whole, float(-forward) / whole
 
 
 NO_SLIP = SideSlip()

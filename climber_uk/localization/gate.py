@@ -49,7 +49,7 @@ class Fix(NamedTuple):
         return np.where(np.array(parts) == HEADING, wrapped(off), off)
 
     def jacobian(self, estimate: Estimate) -> Array:
-        """Derivative (n, 10) of what it measures by the state."""
+        """Derivative (n, 12) of what it measures by the state."""
         return fixed_jacobian(estimate.mean, self.lever)[list(self.parts)]
 
 

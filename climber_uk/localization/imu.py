@@ -1,11 +1,11 @@
 """Yaw rate between two samples of the encoders, and the specific force that the weight makes.
 
-    f_x - v̇ + ω² r_x + ω̇ r_y = g_t sinθ    f_y - v ω + ω² r_y - ω̇ r_x = g_t cosθ
+    f_x - v̇ + u ω + ω² r_x + ω̇ r_y = g_t sinθ    f_y - v ω - u̇ + ω² r_y - ω̇ r_x = g_t cosθ
 
-of an IMU that is at r in the climber's frame. All go through the same low-pass, twice, so that they
-are equally late. A bar for each time: v̇ is (v̄ - v̿) / τ, ω̇ alike, and θ̿ = θ - τ (ω̄ + ω̿). What is
-slower than 1/τ the low-pass leaves as it is: each sample counts as much as it does without. Once
-would leave too much of the encoders' counts in v̇.
+of an IMU that is at r in the climber's frame, which slips to the left at u. All go through the same
+low-pass, twice, so that they are equally late. A bar for each time: v̇ is (v̄ - v̿) / τ, ω̇ and u̇
+alike, and θ̿ = θ - τ (ω̄ + ω̿). What is slower than 1/τ the low-pass leaves as it is: each sample
+counts as much as it does without. Once would leave too much of the encoders' counts in v̇.
 """
 
 from typing import NamedTuple
@@ -72,6 +72,7 @@ class Imu:
         self._forwards, self._left = LowPass(), LowPass()
         self._speed, self._centripetal, self._yaw_rate = LowPass(), LowPass(), LowPass()
         self._square = LowPass()  # of the yaw rate
+        self._aside, self._swung = LowPass(), LowPass()
 
     def add(self, stamp: int, yaw_rate: float, forwards: float, left: float) -> None:
         """Take yaw rate [rad/s] and specific force [m/s²] of a `stamp` [ns], all in the body's."""
@@ -109,23 +110,32 @@ class Imu:
         self._is_used = True
         return yaw_rate, forwards + yaw_rate * yaw_rate * self._place[0]
 
-    def weight(self, rolled: Rolled, yaw_rate: float) -> Weight | None:
-        """Force of the weight after what was `rolled` at a `yaw_rate` [rad/s]; None: not yet."""
+    def weight(self, rolled: Rolled, yaw_rate: float, aside: float = 0.0) -> Weight | None:
+        """Force of the weight after what was `rolled` at a `yaw_rate` [rad/s]; None: not yet.
+
+        The climber slips to the left at a speed `aside` [m/s].
+        """
         speed = rolled.speed
         self._speed.add(speed, rolled.duration)
         self._centripetal.add(speed * yaw_rate, rolled.duration)
         self._yaw_rate.add(yaw_rate, rolled.duration)
         self._square.add(yaw_rate * yaw_rate, rolled.duration)
+        self._aside.add(aside, rolled.duration)
+        self._swung.add(aside * yaw_rate, rolled.duration)
         if self._unused == 0 or self._unused + 1e-9 < min(SPACING, self._known):
             return None
         time, self._unused = self._unused, 0.0
         acceleration = (self._speed.first.value - self._speed.second.value) / TIME
+        acceleration -= self._swung.second.value
+        faster_aside = (self._aside.first.value - self._aside.second.value) / TIME
         faster = (self._yaw_rate.first.value - self._yaw_rate.second.value) / TIME
         turning = self._yaw_rate.first.value + self._yaw_rate.second.value
         (x, y), square = self._place, self._square.second.value
         return Weight(
             self._forwards.second.value - acceleration + square * x + faster * y,
-            self._left.second.value - self._centripetal.second.value + square * y - faster * x,
+            self._left.second.value
+            - (self._centripetal.second.value + faster_aside)
+            + (square * y - faster * x),
             TIME * turning,
             time,
             min(self._known, FILLED),

@@ -36,8 +36,8 @@ LEAST = 1e-18  # variance added to each, so that what is known exactly can be di
 class Estimate:
     """What is believed of the state, and how far that may be off."""
 
-    mean: Array  # (10,) as in `models`
-    covariance: Array  # (10, 10)
+    mean: Array  # (12,) as in `models`
+    covariance: Array  # (12, 12)
 
     def deviation(self, part: int) -> float:
         """Standard deviation of a part of the state."""
@@ -54,8 +54,9 @@ class Estimate:
         deviations[SCALE], deviations[CREEP] = o.scale_deviation, o.creep_deviation
         deviations[models.FORCE_BIASES] = o.acceleration_bias_deviation
         deviations[[SCRUB, PIVOT]] = o.scrub_deviation
+        deviations[models.SLIPS] = o.slip_deviation if o.scrubs else 0.0
         pose = o.initial_x, o.initial_y, o.initial_heading
-        scrub = o.initial_scrub, o.initial_pivot
+        scrub = o.initial_scrub, o.initial_pivot, o.initial_drag_slip, o.initial_weight_slip
         mean = np.array([*pose, 0.0, 0.0, o.initial_creep, 0.0, 0.0, *scrub])
         return cls(mean, np.diag(deviations**2))
 
@@ -83,7 +84,7 @@ def predicted(estimate: Estimate, travel: Travel, options: LocalizationOptions) 
 def predicted_with_jacobian(
     estimate: Estimate, travel: Travel, options: LocalizationOptions
 ) -> tuple[Estimate, Array]:
-    """The same, and the derivative (10, 10) of its mean by the one before."""
+    """The same, and the derivative (12, 12) of its mean by the one before."""
     pull = models.share_along_wall(options)
     mean = models.advanced(estimate.mean, travel, pull)
     jacobian = models.advanced_jacobian(estimate.mean, travel, pull)
@@ -98,7 +99,7 @@ def predicted_with_jacobian(
 def corrected(
     estimate: Estimate, innovation: Array, jacobian: Array, noise: Array, limit: float = math.inf
 ) -> Estimate:
-    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 10).
+    """Estimate after a measurement that is `innovation` (n,) off, by `jacobian` (n, 12).
 
     One whose χ² is above `limit` counts for less, by as much as it is above.
     """

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from climber_uk.localization import models
 from climber_uk.localization.doubts import Doubts
 from climber_uk.localization.encoders import Encoders, Rolled
 from climber_uk.localization.gate import Fix, Gate, corrected_by, told_anew
@@ -12,11 +13,13 @@ from climber_uk.localization.history import History, Sample
 from climber_uk.localization.imu import DELAY, Imu, Weight
 from climber_uk.localization.kalman import LARGEST_KNOCK, Estimate
 from climber_uk.localization.models import (
+    ASIDE,
     BIAS,
     FORCE_BIASES,
     FORWARD_BIAS,
     HEADING,
     SCALE,
+    SLIPS,
     Travel,
     X,
     Y,
@@ -28,6 +31,7 @@ from climber_uk.localization.output_speed import OutputSpeed
 from climber_uk.localization.scrubbing import Push, Scrubbing
 from climber_uk.localization.smoothing import Smoothing
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.climber import GRAVITY
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
 
@@ -133,23 +137,41 @@ class Localizer:
         is_gyro = self.imu.is_there(self.stamp)
         yaw_rate, forwards = self.imu.means() if is_gyro else (rolled.yaw_rate, None)
         travel = Travel(rolled.duration, rolled.distance, rolled.path, yaw_rate, is_gyro)
+        aside = 0.0
         if self.options.scrubs:
-            travel = self._scrubbed(rolled, travel, forwards)
-        weight = self.imu.weight(rolled, yaw_rate) if is_gyro else None
+            travel, rolled, aside = self._scrubbed(rolled, travel, forwards)
+        weight = self.imu.weight(rolled, yaw_rate, aside) if is_gyro else None
         if self._scrubbing.breaks_away:
             weight = None
         counts = weight is not None and self.knows_heading and not weight.has_only_begun
         return Sample(travel, weight if counts else None, rolled.rests), weight
 
-    def _scrubbed(self, rolled: Rolled, travel: Travel, forwards: float | None) -> Travel:
-        """The travel of wheels that scrub, by the specific force forwards where there is one."""
-        options, mean, push = self.options, self.estimate.mean, None
-        yaw_rate = turn(float(mean[BIAS]), travel) / travel.duration
-        if forwards is not None and self.knows_heading:
-            weight = options.gravity_along_wall * math.sin(float(mean[HEADING]))
-            push = Push(forwards - float(mean[FORWARD_BIAS]) - weight, yaw_rate, options.imu_y)
-        turned = self._scrubbing.turned(yaw_rate, travel.duration)
-        return travel._replace(distance=self._scrubbing.distance(rolled, push), scrubbed=turned)
+    def _scrubbed(
+        self, rolled: Rolled, travel: Travel, forwards: float | None
+    ) -> tuple[Travel, Rolled, float]:
+        """The travel of wheels that scrub, what they have rolled but for slip, and u [m/s].
+
+        It is the wheels' where there is no specific force `forwards` [m/s²].
+        """
+        options, mean, duration = self.options, self.estimate.mean, rolled.duration
+        angle = turn(float(mean[BIAS]), travel)
+        if forwards is None:
+            return travel._replace(scrubbed=abs(angle)), rolled, 0.0
+        turned = self._scrubbing.turned(rolled, angle / duration, options)
+        heading, pull = float(mean[HEADING]), models.share_along_wall(options)
+        uphill = pull * math.sin(heading)
+        slips, ways = mean[SLIPS].tolist(), mean[ASIDE].tolist()
+        slip = models.slip_along(slips, turned.slipped, turned.dragged, uphill)
+        aside = pull * models.slip_aside(ways, heading, angle, turned.angle) / duration
+        push = None
+        if self.knows_heading:
+            yaw_rate = angle / duration
+            forwards += yaw_rate * aside - float(mean[FORWARD_BIAS]) - GRAVITY * uphill
+            push = Push(forwards, yaw_rate, options.imu_y)
+        distance, slipped, dragged = self._scrubbing.go_on(rolled, push, turned, slip)
+        distance += models.slip_along(slips, slipped, dragged, uphill)
+        gone = distance, rolled.path, travel.yaw_rate, True, turned.angle, slipped, dragged
+        return Travel(duration, *gone), rolled._replace(distance=rolled.distance - slip), aside
 
     def _watch_gravity(self, weight: Weight) -> None:
         """Take the heading from gravity where nothing else tells it, or all tells another one."""
@@ -243,7 +265,8 @@ class Localizer:
         mean, offset, duration = self.estimate.mean, self.smoothing.offset, travel.duration
         x, y, heading = (mean[:3] + offset).tolist()
         gyro = turn(float(mean[BIAS]), travel) / duration
-        distance = travel.distance * (1 - float(mean[SCALE]))
+        uphill = models.share_along_wall(self.options) * math.sin(float(mean[HEADING]))
+        distance = models.forwards(mean, travel, uphill)
         speed, yaw_rate = self._output.go_on(distance, rolled.yaw_rate, gyro, duration)
         scale, bias = self.estimate.deviation(SCALE), self.estimate.deviation(BIAS)
         return Located(

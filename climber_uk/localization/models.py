@@ -1,11 +1,11 @@
 """How the state goes on, and what sensors show of it, with Jacobians (docs/localization.md).
 
-    x = (x, y, θ, b, σ, κ, β_x, β_y, λ, a)   pose; gyro's bias; encoders' scale error; creep;
-                                             accelerometer's biases, forwards and to the left;
-                                             scrub; pivot
+    x = (x, y, θ, b, σ, κ, β_x, β_y, λ, a, ζ, ξ)   pose; gyro's bias; encoders' scale error; creep;
+                                                   accelerometer's biases, forwards, to the left;
+                                                   scrub; pivot; slip by drag; slip by weight
 
-    s = S (1 - σ)   α = (ω_gyro - b) Δt   over a way of signed length S and length |S|
-    ψ = θ + α/2     u = p (a α sinψ - λ |α| cosψ)   to the left   p = sin(inclination)
+    α = (ω_gyro - b) Δt   ψ = θ + α/2   p = sin(inclination)   over a way S, of length |S|
+    s = S (1 - σ) - (ζ D + ξ p T sinψ)    u = p (a α sinψ - λ |α| cosψ)   to the left
     x⁺ = x + s cosψ - u sinψ   y⁺ = y + s sinψ + u cosψ - κ p |S|   θ⁺ = θ + α
 
 A wheel under load gives way in proportion to its force. Of the weight's part of that, along
@@ -15,6 +15,7 @@ the weight loads the lower ones, it turns about a point that is a sinθ behind i
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,9 +24,13 @@ from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import GRAVITY
 
-X, Y, HEADING, BIAS, SCALE, CREEP, FORWARD_BIAS, LEFT_BIAS, SCRUB, PIVOT = range(10)
-SIZE = 10
+X, Y, HEADING, BIAS, SCALE, CREEP, FORWARD_BIAS, LEFT_BIAS = range(8)
+SCRUB, PIVOT, DRAG_SLIP, WEIGHT_SLIP = range(8, 12)
+SIZE = 12
+ASIDE, SLIPS = [SCRUB, PIVOT], [DRAG_SLIP, WEIGHT_SLIP]
 FORCE_BIASES = [FORWARD_BIAS, LEFT_BIAS]
+# [s] twice for how long slip is by a chance off its share, times the square of how much of T
+SCATTERS = 0.006
 
 
 class Travel(NamedTuple):
@@ -37,6 +42,8 @@ class Travel(NamedTuple):
     yaw_rate: float  # [rad/s], of the gyro, else of the wheels
     is_gyro: bool  # whether it is the gyro's: biased
     scrubbed: float = 0.0  # |α| [rad], whichever way, of wheels that scrub
+    slipped: float = 0.0  # T [m], by which their sides slip against each other
+    dragged: float = 0.0  # D [m]: T, with the sign of the way
 
 
 class Late(NamedTuple):
@@ -47,16 +54,36 @@ class Late(NamedTuple):
 
 
 def advanced(state: Array, travel: Travel, pull: float) -> Array:
-    """State (10,) after a `travel`; `pull` is p, the share of gravity along the wall."""
-    x, y, heading, bias, scale, creep, _, _, scrub, pivot = state.tolist()
-    angle, way = turn(bias, travel), travel.distance * (1 - scale)
+    """State (12,) after a `travel`; `pull` is p, the share of gravity along the wall."""
+    x, y, heading, bias, scale, creep, _, _, scrub, pivot, *slips = state.tolist()
+    angle = turn(bias, travel)
     cosine, sine = math.cos(heading + angle / 2), math.sin(heading + angle / 2)
-    aside = pull * (pivot * sine * angle - scrub * cosine * travel.scrubbed)
+    way = travel.distance * (1 - scale) - slip_along(
+        slips, travel.slipped, travel.dragged, pull * sine
+    )
+    aside = pull * slip_aside((scrub, pivot), heading + angle / 2, angle, travel.scrubbed)
     after = state.copy()
     after[X] = x + way * cosine - aside * sine
     after[Y] = y + way * sine + aside * cosine - creep * pull * travel.path
     after[HEADING] = heading + angle
     return after
+
+
+def slip_aside(ways: Sequence[float], heading: float, angle: float, turned: float) -> float:
+    """u / p [m] by (λ, a), at a `heading` ψ, of a turn by an `angle` α, whichever way `turned`."""
+    scrub, pivot = ways
+    return pivot * math.sin(heading) * angle - scrub * math.cos(heading) * turned
+
+
+def slip_along(slips: Sequence[float], slipped: float, dragged: float, uphill: float) -> float:
+    """How much less than rolled it goes [m] by (ζ, ξ), where T is `slipped` and `uphill` p sinψ."""
+    return slips[0] * dragged + slips[1] * uphill * slipped
+
+
+def forwards(state: Array, travel: Travel, uphill: float) -> float:
+    """s [m], where `uphill` is p sinψ."""
+    slip = slip_along(state[SLIPS].tolist(), travel.slipped, travel.dragged, uphill)
+    return travel.distance * (1 - float(state[SCALE])) - slip
 
 
 def turn(bias: float, travel: Travel) -> float:
@@ -65,31 +92,42 @@ def turn(bias: float, travel: Travel) -> float:
 
 
 def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
-    """Derivative (10, 10) of `advanced` by the state."""
-    _, _, heading, bias, scale, *_, scrub, pivot = state.tolist()
-    angle, way = turn(bias, travel), travel.distance * (1 - scale)
+    """Derivative (12, 12) of `advanced` by the state."""
+    _, _, heading, bias, scale, _, _, _, scrub, pivot, *slips = state.tolist()
+    angle = turn(bias, travel)
     middle = heading + angle / 2
     cosine, sine = math.cos(middle), math.sin(middle)
+    way = travel.distance * (1 - scale) - slip_along(
+        slips, travel.slipped, travel.dragged, pull * sine
+    )
+    downhill = pull * travel.slipped  # ξ's, of a climber that looks up
+    by_heading = -slips[1] * downhill * cosine
     angle_by_bias = -travel.duration if travel.is_gyro else 0.0
     sag, swing = pull * travel.scrubbed, pull * angle
     jacobian = np.eye(SIZE)
     jacobian[X, SCRUB], jacobian[Y, SCRUB] = sag * cosine * sine, -sag * cosine * cosine
     jacobian[X, PIVOT], jacobian[Y, PIVOT] = -swing * sine * sine, swing * sine * cosine
     double, doubled = math.cos(2 * middle), math.sin(2 * middle)
-    jacobian[X, HEADING] = -way * sine + scrub * sag * double - pivot * swing * doubled
-    jacobian[Y, HEADING] = way * cosine + scrub * sag * doubled + pivot * swing * double
+    along, across = by_heading * cosine - way * sine, by_heading * sine + way * cosine
+    jacobian[X, HEADING] = along + scrub * sag * double - pivot * swing * doubled
+    jacobian[Y, HEADING] = across + scrub * sag * doubled + pivot * swing * double
     jacobian[: HEADING + 1, BIAS] = jacobian[: HEADING + 1, HEADING] * angle_by_bias / 2
     jacobian[X, BIAS] -= pull * pivot * sine * sine * angle_by_bias
     jacobian[Y, BIAS] += pull * pivot * sine * cosine * angle_by_bias
     jacobian[HEADING, BIAS] = angle_by_bias
     jacobian[X, SCALE], jacobian[Y, SCALE] = -travel.distance * cosine, -travel.distance * sine
     jacobian[Y, CREEP] = -pull * travel.path
+    jacobian[X, DRAG_SLIP] = -travel.dragged * cosine
+    jacobian[Y, DRAG_SLIP] = -travel.dragged * sine
+    jacobian[X, WEIGHT_SLIP] = -downhill * sine * cosine
+    jacobian[Y, WEIGHT_SLIP] = -downhill * sine * sine
     return jacobian
 
 
 def process_noise(travel: Travel, options: LocalizationOptions) -> Array:
-    """Variances (10,) that a `travel` adds."""
+    """Variances (12,) that a `travel` adds."""
     way = options.way_noise**2 * travel.path
+    way += SCATTERS * travel.slipped**2 / travel.duration
     if travel.is_gyro:
         angle = options.gyro_noise**2 * travel.duration
     else:
@@ -99,7 +137,8 @@ def process_noise(travel: Travel, options: LocalizationOptions) -> Array:
     bias = options.gyro_bias_walk**2 * travel.duration
     scale = 2 * options.scale_deviation**2 * travel.duration / options.scale_time
     force = options.acceleration_bias_walk**2 * travel.duration
-    return np.array([way, way, angle, bias, scale, 0.0, force, force, 0.0, 0.0])
+    slip = options.slip_walk**2 * travel.scrubbed
+    return np.array([way, way, angle, bias, scale, 0.0, force, force, 0.0, 0.0, slip, slip])
 
 
 def gravity(state: Array, late: Late, along_wall: float) -> Array:
@@ -111,7 +150,7 @@ def gravity(state: Array, late: Late, along_wall: float) -> Array:
 
 
 def gravity_jacobian(state: Array, late: Late, along_wall: float) -> Array:
-    """Derivative (2, 10) of `gravity` by the state."""
+    """Derivative (2, 12) of `gravity` by the state."""
     heading = earlier_heading(state, late)
     jacobian = np.zeros((2, SIZE))
     jacobian[:, HEADING] = along_wall * math.cos(heading), -along_wall * math.sin(heading)
@@ -131,7 +170,7 @@ def fixed(state: Array, lever: tuple[float, float]) -> Array:
 
 
 def fixed_jacobian(state: Array, lever: tuple[float, float]) -> Array:
-    """Derivative (3, 10) of `fixed` by the state."""
+    """Derivative (3, 12) of `fixed` by the state."""
     jacobian, away = np.eye(HEADING + 1, SIZE), fixed(state, lever) - state[: HEADING + 1]
     jacobian[X, HEADING], jacobian[Y, HEADING] = -away[Y], away[X]
     return jacobian

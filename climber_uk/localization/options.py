@@ -53,6 +53,13 @@ class LocalizationOptions:
         at_least=0,
         plausible=(0.0, 1.0),
     )
+    slip_deviation: float = parameter(
+        0.5,
+        "",
+        "of how far wheels that scrub slip along, by what their sides slip in turns (ζ, ξ)",
+        at_least=0,
+    )
+    slip_walk: float = parameter(0.05, "1/√rad", "how much that wanders in a turn", at_least=0)
     way_noise: float = parameter(
         0.001, "m/√m", "deviation of the position after a metre, else unexplained", at_least=0
     )
@@ -73,6 +80,12 @@ class LocalizationOptions:
     )
     initial_pivot: float = parameter(
         0.0, "m", "a at the start: how far below the centre it turns, as `localize` has told"
+    )
+    initial_drag_slip: float = parameter(
+        0.0, "", "ζ at the start: slip along by what drags it, as `localize` has told"
+    )
+    initial_weight_slip: float = parameter(
+        0.0, "", "ξ at the start: slip along by the weight, as `localize` has told"
     )
     initial_heading: float = parameter(0.0, "rad", "heading at the start")
     initial_position_deviation: float = parameter(

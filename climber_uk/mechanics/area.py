@@ -140,6 +140,8 @@ def read_area(file: str, clearance: float) -> Area:
     """
     try:
         blocks = [b for b in re.split(r"\n\s*\n", read_text(file).strip()) if b.strip()]
+        if not blocks:
+            raise ValueError("no corners in it: want x and y [m] of a corner a line")
         rings = []
         for number, block in enumerate(blocks, start=1):
             try:

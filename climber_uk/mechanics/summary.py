@@ -37,8 +37,8 @@ class Summary:
             said += f", wheels at most {self.fastest_wheel_speed:.3g} m/s"
         if math.isinf(self.smallest_radius):
             return f"{said}, straight"
-        x, y = self.tightest_place
-        return f"{said}, smallest radius {self.smallest_radius:.3g} m at ({x:.3g}, {y:.3g}) m"
+        x, y = (round(place, 3) + 0.0 for place in self.tightest_place)
+        return f"{said}, smallest radius {self.smallest_radius:.3g} m at ({x:g}, {y:g}) m"
 
 
 def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:

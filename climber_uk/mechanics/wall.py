@@ -12,11 +12,19 @@ origin, and across them by (x² + y²)/6R² too long, which is neglected. A new 
 `Wall`, and one entry in `WALLS`, or an entry point `climber_uk.walls` of another package.
 """
 
-import math
+from collections.abc import Callable
 from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY, Climber
-from climber_uk.mechanics.elementary import cos, select, sin, sqrt
+from climber_uk.mechanics.elementary import (
+    anywhere,
+    cos,
+    everywhere,
+    select,
+    sin,
+    sqrt,
+    with_sign_of,
+)
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
@@ -46,8 +54,8 @@ class Plane(Wall):
 
     def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
-        pull, tilt = sin(inclination * DEGREE), math.radians(self.tilt)
-        return pull * math.sin(tilt) + 0.0 * y, -pull * math.cos(tilt) + 0.0 * y
+        pull, tilt = sin(inclination * DEGREE), self.tilt * DEGREE
+        return pull * sin(tilt) + 0.0 * y, -pull * cos(tilt) + 0.0 * y
 
     def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
         """See `Wall`."""
@@ -112,7 +120,7 @@ class Cone(Wall):
     flat: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        if self.distance == 0:
+        if anywhere(self.distance == 0):
             raise ValueError("distance=0.0 must not be 0 [m]")
 
     def _to_apex(self, x: Any, y: Any) -> tuple[Any, Any, Any]:
@@ -124,7 +132,7 @@ class Cone(Wall):
     def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
         e_x, e_y, _ = self._to_apex(x, y)
-        downhill = -math.copysign(1.0, self.distance) * sin(inclination * DEGREE)
+        downhill = -with_sign_of(1.0, self.distance) * sin(inclination * DEGREE)
         return downhill * e_x, downhill * e_y
 
     def into(self, inclination: Any, x: Any, y: Any, x_speed: Any, y_speed: Any) -> Any:
@@ -132,7 +140,7 @@ class Cone(Wall):
         e_x, e_y, far = self._to_apex(x, y)
         around = x_speed * e_y - y_speed * e_x
         steepness = sin(inclination * DEGREE) / cos(inclination * DEGREE)
-        curvature = -math.copysign(1.0, self.distance) * steepness / far
+        curvature = -with_sign_of(1.0, self.distance) * steepness / far
         return GRAVITY * cos(inclination * DEGREE) + curvature * around * around
 
 
@@ -170,6 +178,15 @@ class Sphere(Wall):
 PLANE = Plane()  # that is not tilted
 
 
+def told(read: Callable[..., Any], name: str) -> Wall | None:
+    """Wall of a name in `WALLS`, its parameters as `read(kind, prefix)` has them.
+
+    None of a plane that is not tilted, which the climber's inclination tells.
+    """
+    wall: Wall = read(WALLS[name], f"{name}.")
+    return None if isinstance(wall, Plane) and everywhere(wall.tilt == 0) else wall
+
+
 def weight_beyond(
     wall: Wall, climber: Climber, motion: Motion, time: float = 0.0
 ) -> tuple[Any, Any]:
@@ -186,6 +203,26 @@ def weight_beyond(
     return x * cosine + y * sine, y * cosine - x * sine
 
 
+def weight(wall: Wall | None, climber: Climber, motion: Motion) -> tuple[Any, Any]:
+    """What the weight pulls forwards and to the left [N]; on None, an untilted plane."""
+    forward = -climber.weight_along_wall * motion.sine
+    left = -climber.weight_along_wall * motion.cosine
+    if wall is None:
+        return forward, left
+    forward_beyond, left_beyond = weight_beyond(wall, climber, motion)
+    return forward + forward_beyond, left + left_beyond
+
+
+def gravity(wall: Wall | None, climber: Climber, motion: Motion) -> tuple[Any, Any]:
+    """Gravity into the wall, with its centripetal part, and along it [m/s²]; see `weight`."""
+    if wall is None:
+        return climber.gravity_into_wall, climber.weight_along_wall / climber.mass
+    at = climber.inclination, motion.x, motion.y
+    s_x, s_y = wall.along(*at)
+    speeds = motion.speed * motion.cosine, motion.speed * motion.sine
+    return wall.into(*at, *speeds), GRAVITY * sqrt(s_x * s_x + s_y * s_y)
+
+
 def _turned(inclination: Any, ahead: Any, angle: Any) -> tuple[Any, Any]:
     """Gravity ahead and into the wall, by g, once the wall has turned upwards by `angle` [rad].
 
@@ -195,8 +232,8 @@ def _turned(inclination: Any, ahead: Any, angle: Any) -> tuple[Any, Any]:
     return ahead * cos(angle) - into * sin(angle), into * cos(angle) + ahead * sin(angle)
 
 
-def _check_radius(radius: float) -> None:
-    if radius == 0:
+def _check_radius(radius: Any) -> None:
+    if anywhere(radius == 0):
         raise ValueError("radius=0.0 must not be 0 [m]")
 
 

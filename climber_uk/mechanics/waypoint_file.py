@@ -13,6 +13,7 @@ from climber_uk.mechanics import Array
 COMMENT = re.compile(r"#.*|^\s*(//|%).*")
 UNIT = re.compile(r"[\[(](.*)[\])]")
 METRES = "m", "metre", "meter", "metres", "meters"
+FARTHEST = 1e6  # [m] of the origin; beyond it a path has no millimetres left
 NUMBERS = {  # columns that are, and their units
     **{"x": METRES, "y": METRES},
     "speed": ("m/s",),
@@ -96,6 +97,11 @@ def read_waypoint_text(text: str) -> tuple[Array, Marks]:
     for number, ((n, _), point) in enumerate(zip(rows_of, points, strict=True), start=1):
         if not all(map(math.isfinite, point)):
             raise ValueError(f"line {n}: point {number} is not finite")
+        if max(map(abs, point)) > FARTHEST:
+            x, y = point
+            raise ValueError(
+                f"line {n}: point {number} at ({x:g}, {y:g}) m is beyond {FARTHEST:g} m"
+            )
     speed = [_size(n, row, "speed", is_comma, math.inf) for n, row in rows_of]
     dwell = [_size(n, row, "dwell", is_comma, 0.0) for n, row in rows_of]
     tags = tuple(row.get("tag", "") for _, row in rows_of)

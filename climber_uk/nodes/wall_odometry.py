@@ -229,6 +229,8 @@ class WallOdometry(ClimberNode):
             "creep": with_deviation(models.CREEP),
             "scrub [m]": with_deviation(models.SCRUB),
             "pivot [m]": with_deviation(models.PIVOT),
+            "slip by drag": with_deviation(models.DRAG_SLIP),
+            "slip by weight": with_deviation(models.WEIGHT_SLIP),
             "gravity along the wall [m/s²]": self.options.gravity_along_wall,
             "output less estimate [m, m, rad]": [f"{o:.3g}" for o in localizer.smoothing.offset],
             "fixes taken": counts.taken,

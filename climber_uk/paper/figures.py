@@ -127,7 +127,7 @@ def draw_starts(runs: Mapping[str, Drift], directory: Path) -> Path:
     figure, axes = plt.subplots(figsize=(7, 4.6), layout="constrained")
     for method, run in runs.items():
         axes.semilogy(run.time, run.error, label=method)
-    axes.set_title("Start 0.1 m and 0.05 rad off the constraint", pad=44)
+    figure.suptitle("Start 0.1 m and 0.05 rad off the constraint")
     _label(axes, "t [s]", "position error [m]")
     return saved(figure, directory / "off_constraint.png", 80)
 

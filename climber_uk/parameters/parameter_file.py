@@ -203,9 +203,8 @@ def _value(text: str, style: str | None) -> bool | int | float | str:
 
 def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Keys and value of each entry of a file, in its order."""
-    tables, line, text = _Tables(), 1, ""
+    tables, line, text = _Tables(), 1, _text(path)
     try:
-        text = _text(path)
         for event in yaml.parse(text, PARSER):
             line = event.start_mark.line + 1  # type: ignore[union-attr]
             for value in tables.take(event):
@@ -232,11 +231,12 @@ def _text(path: Path) -> str:
     with path.open("rb") as stream:
         content = stream.read(LARGEST + 1)
     if len(content) > LARGEST:
-        raise ValueError(f"larger than {LARGEST >> 20} MiB")
+        raise ValueError(f"{path} is no parameter file: larger than {LARGEST >> 20} MiB")
     try:
         return content.decode("utf-8")
-    except UnicodeDecodeError:
-        raise ValueError("not a text in UTF-8") from None
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ValueError(f"{path} is no parameter file: line {line}: not a text in UTF-8") from None
 
 
 class _Tables:

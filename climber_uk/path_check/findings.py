@@ -43,10 +43,10 @@ def lines(numbers: dict[str, Any], is_whole: bool) -> list[str]:
         f"{numbers['fastest [m/s]']:.3g} m/s, {numbers['energy of the wheels [J]']:.4g} J{part}"
     ]
     for name, limit in sorted(numbers["limits"].items(), key=lambda of: of[1]["reserve"]):
-        x, y = limit["place [m]"]
+        x, y = (round(place, 3) + 0.0 for place in limit["place [m]"])  # no -0, no 4e-18
         verdict = "" if limit["reserve"] >= 1 else ": TOO MUCH"
         said.append(
-            f"{name}: {limit['reserve']:.3g} times what is asked for, at ({x:.3g}, {y:.3g}) m, "
+            f"{name}: {limit['reserve']:.3g} times what is asked for, at ({x:g}, {y:g}) m, "
             f"{limit['at [s]']:.4g} s{verdict}"
         )
     if "fastest rate" in numbers:

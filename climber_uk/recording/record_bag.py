@@ -35,7 +35,7 @@ from climber_uk.bags.log_clock import LogClock
 from climber_uk.bags.storage import STORAGES, is_known
 from climber_uk.recording.offered_qos import QUEUE_DEPTH, is_compatible, request_for, to_metadata
 from climber_uk.ros.transport import use_udp
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, in_words
 from climber_uk.system.signals import ignore_end, on_end
 
 FLUSH_PERIOD = 0.5  # [s] of messages that a killed recorder loses
@@ -335,7 +335,7 @@ def main() -> None:
     except KeyboardInterrupt:
         pass
     except OSError as error:
-        sys.exit(f"record_bag: {error}")
+        sys.exit(f"record_bag: {in_words(error)}")
     finally:
         ignore_end()
         rclpy.try_shutdown()

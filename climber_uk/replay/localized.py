@@ -11,12 +11,14 @@ from climber_uk.localization.localizer import Counts, Localizer
 from climber_uk.localization.models import (
     BIAS,
     CREEP,
+    DRAG_SLIP,
     FORWARD_BIAS,
     HEADING,
     LEFT_BIAS,
     PIVOT,
     SCALE,
     SCRUB,
+    WEIGHT_SLIP,
 )
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.smoother import smoothed
@@ -33,6 +35,8 @@ TOLD = {
     CREEP: "creep",
     SCRUB: "scrub [m]",
     PIVOT: "pivot [m]",
+    DRAG_SLIP: "slip by drag",
+    WEIGHT_SLIP: "slip by weight",
 }
 
 
@@ -40,8 +44,8 @@ TOLD = {
 class Estimates:
     """Estimates at n times."""
 
-    mean: Array  # (n, 10) as in `localization.models`
-    covariance: Array  # (n, 10, 10)
+    mean: Array  # (n, 12) as in `localization.models`
+    covariance: Array  # (n, 12, 10)
 
     @classmethod
     def of(cls, estimates: Sequence[Estimate]) -> "Estimates":
@@ -53,7 +57,7 @@ class Estimates:
 
     @property
     def deviation(self) -> Array:
-        """Standard deviations (n, 10)."""
+        """Standard deviations (n, 12)."""
         variances = np.diagonal(self.covariance, axis1=1, axis2=2)
         return np.sqrt(np.maximum(variances, 0.0))
 

@@ -55,6 +55,7 @@ class Film:
             self._curves(self.figure.add_subplot(grid[row, 1]), label, *drawn)
             for row, (label, drawn) in enumerate(curves.items())
         ]
+        self.cursors[-1].axes.set_xlabel("time [s]", fontsize=8)
 
     @staticmethod
     def _curves(axes: Any, label: str, time: Array, values: Array) -> Any:
@@ -63,7 +64,7 @@ class Film:
         for column, colour, width, name in wheels:
             axes.plot(*thinned(time, column), color=colour, linewidth=width, label=name)
         if values.shape[1] > 1:
-            axes.legend(loc="upper right", fontsize=7, ncols=2)
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=7, ncols=2)
         axes.set_ylabel(label, fontsize=8)
         axes.tick_params(labelsize=7)
         return axes.axvline(0.0, color="0.3")

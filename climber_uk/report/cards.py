@@ -98,28 +98,50 @@ def verdict(column: Column) -> str:
 
 
 def text(columns: Sequence[Column]) -> str:
-    """Cards, verdict and events of runs as lines for a terminal."""
-    return "\n\n".join("\n".join(_lines(column, len(columns) > 1)) for column in columns)
+    """Cards, events and verdict of runs as lines for a terminal; of several, cards in a table."""
+    if len(columns) == 1:
+        (column,) = columns
+        return "\n".join([*_lines(column), *_reported(column, FEW), verdict(column)])
+    lines = _table(columns)
+    for column in columns:
+        lines += [*_reported(column, FEW // len(columns)), f"{column.label}: {verdict(column)}"]
+    return "\n".join(lines)
 
 
-def _lines(column: Column, is_named: bool) -> Iterator[str]:
-    if is_named:
-        yield column.label
+def _table(columns: Sequence[Column]) -> list[str]:
+    """What matters of each run, without notes, a line each below a head."""
+    found = [{card.title: card for card in cards(column)} for column in columns]
+    titles = list(dict.fromkeys(title for of in found for title in of))
+    rows = [["", *(f"  {title}" for title in titles)]]
+    for column, of in zip(columns, found, strict=True):
+        cells = [
+            f"{MARKS[of[name].level]} {of[name].main}" if name in of else "" for name in titles
+        ]
+        rows.append([column.label, *cells])
+    widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
+    return [" ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def _lines(column: Column) -> Iterator[str]:
+    """Cards of a run, with their notes."""
     for title, main, note, level in cards(column):
         indented = textwrap.wrap(note, WIDTH - 44) or [""]
         yield f"{MARKS[level]} {title:<18}{main:<24}{indented[0]}".rstrip()
         yield from (" " * 44 + line for line in indented[1:])
+
+
+def _reported(column: Column, few: int) -> Iterator[str]:
+    """So many of the things that nodes reported, each once."""
     reported: dict[tuple[str, str], list[tuple[float, Event]]] = {}
     for time, event in column.case.run.events:
         if event.level > OK:
             what = event.text if event.kind == "log" else event.kind
             reported.setdefault((event.node, what), []).append((time, event))
-    for events in list(reported.values())[:FEW]:
+    for events in list(reported.values())[:few]:
         time, event = max(events, key=lambda timed: timed[1].level)  # the first of the worst
         more = f" (and {len(events) - 1} more)" if len(events) > 1 else ""
         where = f"{MARKS[event.level]} {time:8.3f} s  "
         said = f"{event.node}: {event.text}{more}"
         yield from textwrap.wrap(said, WIDTH, initial_indent=where, subsequent_indent=" " * 14)
-    if len(reported) > FEW:
-        yield f"  and {len(reported) - FEW} more: see the page"
-    yield verdict(column)
+    if len(reported) > few:
+        yield f"  and {len(reported) - few} more: see the page"

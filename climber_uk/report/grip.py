@@ -4,8 +4,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from climber_uk.bags.run import RecordedRun
+from climber_uk.control.build import known_wall
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.adhesion import Attachment, Grip
+from climber_uk.mechanics.quantities import Motion
+from climber_uk.mechanics.wall import weight
 from climber_uk.messages import topics
 from climber_uk.parameters.parameter_file import Values
 
@@ -28,7 +31,9 @@ def grip_asked(run: RecordedRun) -> Array:
     load = np.interp(time, run.seconds(run.margins), run.margins.values[:, 2])
     heading = np.interp(time, run.time, np.unwrap(run.pose[:, 2]))
     grip = Values(run.parameters).read(Grip)
-    across = -climber.weight_along_wall * np.cos(heading)
+    x, y = (np.interp(time, run.time, run.pose[:, axis]) for axis in (0, 1))
+    there = Motion.at(x, y, heading, 0.0, 0.0)
+    _, across = weight(known_wall(Values(run.parameters)), climber, there)
     sides = np.stack(Attachment(grip=grip).wheel_loads(climber, load, across), axis=-1)
     most = np.maximum(grip.wheel_friction_coefficient * sides, 1e-9)
     along = run.torques[torque] / climber.wheel_radius / most

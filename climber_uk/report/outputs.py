@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from climber_uk.bags.connection import one_line
+from climber_uk.system.command_line import in_words
 
 UNREADABLE = 2  # exit status: a bag or a parameter file that is not to be read, a wrong argument
 
@@ -28,7 +29,7 @@ def failing_in_a_line(tool: str) -> Iterator[list[str]]:
         yield remarks
     except (ValueError, OSError) as error:
         behind = f" ({'; '.join(dict.fromkeys(remarks))})" if remarks else ""
-        print(f"{tool}: {one_line(f'{error}{behind}')}", file=sys.stderr)
+        print(f"{tool}: {one_line(in_words(error) + behind)}", file=sys.stderr)
         sys.exit(UNREADABLE)
     for remark in dict.fromkeys(remarks):
         print(f"{tool}: {one_line(remark)}", file=sys.stderr)

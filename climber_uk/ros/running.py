@@ -34,6 +34,7 @@ from climber_uk.parameters.declaration import QOS, parameter, parameters
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
+from climber_uk.system.command_line import in_words
 from climber_uk.system.signals import ignore_end, on_end
 
 # else the first message type would have the generator of message types loaded, and its parser
@@ -317,4 +318,4 @@ def in_a_line(error: Exception) -> str:
     """Message of an error in one line, without rcl's file names."""
     if isinstance(error, UnknownROSArgsError):
         return f"not known after --ros-args: {str(error).strip('[]')}"
-    return re.sub(r", at /[^, ]*:\d+", "", " ".join(str(error).split()))
+    return re.sub(r", at /[^, ]*:\d+", "", " ".join(in_words(error).split()))

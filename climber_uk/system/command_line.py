@@ -4,12 +4,18 @@ import argparse
 import io
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 PACKAGE = "climber_uk"
+
+
+def in_words(error: Exception) -> str:
+    """Message of an error, without the number that the operating system has for it."""
+    return re.sub(r"^\[Errno -?\d+\] ", "", str(error))
 
 
 class Parser(argparse.ArgumentParser):

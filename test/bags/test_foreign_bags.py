@@ -249,7 +249,7 @@ def test_what_is_no_bag_is_called_by_its_name(tmp_path, name, data, said):
 
 def test_a_directory_says_what_it_has_instead(tmp_path):
     (tmp_path / "run.bag").write_bytes(b"#ROSBAG V2.0\n")
-    with pytest.raises(ValueError, match=r"an .mcap or .db3 file in it; run.bag is a ROS 1 bag"):
+    with pytest.raises(ValueError, match=r"no .mcap or .db3 file in it; run.bag is a ROS 1 bag"):
         contents(tmp_path)
 
 

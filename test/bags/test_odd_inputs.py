@@ -410,11 +410,11 @@ def test_a_replay_with_a_timeout_of_no_time_ends(tmp_path, run):
     run("replay_controller", tmp_path / "bag", "-p", "odometry_timeout:=1e-9")
 
 
-def test_what_is_no_text_is_no_parameter_file(tmp_path):
-    (tmp_path / "x.yaml").write_bytes(b"\xff\xfea\0")
-    with pytest.raises(
-        ValueError, match=r"/x.yaml is no parameter file: line 1: not a text in UTF"
-    ):
+@pytest.mark.parametrize(("content", "line"), [(b"\xff\xfea\0", 1), (b"a:\n  # Gr\xf6\xdfe\n", 2)])
+def test_what_is_no_text_is_no_parameter_file(tmp_path, content, line):
+    (tmp_path / "x.yaml").write_bytes(content)
+    why = f"/x.yaml is no parameter file: line {line}: not a text in UTF-8"
+    with pytest.raises(ValueError, match=why):
         read_sections(tmp_path / "x.yaml")
 
 

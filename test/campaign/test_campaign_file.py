@@ -35,7 +35,7 @@ WIDE = {"uniform": [0.1, 0.2]}
         ({PLANT + "friction": "lugre"}, "friction='lugre' must be 'coulomb'"),
         ({PLANT + "slip": True}, "slip=True must be False"),
         ({PLANT + "suction.pump_time": 1.0}, "suction.pump_time=1.0 must be 0.0"),
-        ({PLANT + "plane.tilt": WIDE}, "plane.tilt cannot be drawn"),
+        ({PLANT + "tank.radius": WIDE}, "tank.radius has no effect with wall='plane'"),
         ({PLANT + "odometry_delay": {"choice": [0.0, 0.005]}}, "odometry_delay cannot be drawn"),
         ({CONTROLLER + "transport_delay": WIDE}, "transport_delay cannot be drawn"),
         ({"trajectory_publisher.ellipse.semi_axis_x": WIDE}, "semi_axis_x cannot be drawn"),

@@ -24,6 +24,8 @@ from climber_uk.mechanics.quantities import Motion, State
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import Cone, Cylinder, Plane, Sphere, Tank
+from climber_uk.simulation.plant import Plant
 from climber_uk.simulation.sensors import Odometer, Sensors
 
 PAPER = Climber()
@@ -72,11 +74,11 @@ CASES = {
 }
 
 
-def alone(case, i, duration):
+def alone(case, i, duration, wall=None):
     """The same by the scalar `Controller` and the plant that integrates (30)."""
     trajectory, start, true, gains, known, steps, delay = case
     model = replace(BUILT if trajectory is EIGHT else PAPER, **known)
-    law = ControlLaw(as_floats(model, i), as_floats(gains, i))
+    law = ControlLaw(as_floats(model, i), as_floats(gains, i), wall=wall)
     timing = Timing(transport_delay=0.005 * delay)
     # of many, no side slip is learnt: their wheels hold
     observer, pacing = Observer(side_slip_bandwidth=0.0), Pacing(catch_up=0.0)
@@ -85,7 +87,8 @@ def alone(case, i, duration):
     state = State.moving(Motion(*(float(number) for number in indexed(start, i))))
     # nor is there a guard, and its budget of force, over many
     controller = Controller(settings, Safety(max_jump=1e9), guard=UNGUARDED)
-    return simulate(trajectory, state, duration, controller, as_floats(true, i), link)
+    course = trajectory, state, duration, controller, as_floats(true, i), link
+    return simulate(*course, plant_of=lambda *of: Plant(*of, wall=wall or Plane()))
 
 
 def as_floats(of, i):
@@ -116,6 +119,47 @@ def test_each_of_many_is_what_it_is_alone(name):
         np.testing.assert_allclose(got.peak_torque, known["max_wheel_torque"], rtol=1e-12)
     else:
         np.testing.assert_array_equal(got.saturated, 0)
+
+
+ROUND = {
+    "tank": Tank(around(-5.0)),
+    "pipe": Cylinder(3.0),
+    "sphere": Sphere(around(4.0)),
+    "roof": Cone(around(6.0)),
+    "tilted": Plane(around(30.0)),
+}
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_so_is_each_on_a_wall_that_is_round_or_tilted_and_may_be_of_its_own(name):
+    wall, leaning = ROUND[name], replace(BUILT, inclination=70.0, mass=around(5.0))
+    believed = replace(leaning, mass=5.0)
+    law = ControlLaw(believed, SLOW, wall=wall)
+    got = Loops(ON_EIGHT, leaning, law, wall=wall).run(BatchRun(EIGHT, 0.5), block=3)
+    for i in range(N):
+        case, its = (
+            (EIGHT, ON_EIGHT, leaning, SLOW, {"inclination": 70.0}, 2, 0),
+            as_floats(wall, i),
+        )
+        run = alone(case, i, 0.5, its)
+        plant = Plant(as_floats(leaning, i), 0.0025, wall=its)
+        # the weight changes within a period, but on a plane
+        error = 1e-9 if name == "tilted" else 1e-7
+        assert got.rms[i] == pytest.approx(run.rms(), abs=error)
+        assert got.worst[i] == pytest.approx(run.distance.max(), abs=error)
+        states = map(State, run.pose, run.velocity)
+        tips = [plant.margins(state, np.zeros(2))[1] for state in states]
+        assert got.tip_margin[i] == pytest.approx(min(tips), abs=1e-6)
+
+
+def test_what_a_wall_turns_upside_down_falls_there():
+    """Hardly held by its suction, from a pipe's side on to where its weight pulls it off."""
+    weak = replace(BUILT, suction_pressure=np.array([200.0, 8000.0, 8000.0, 200.0]))
+    pipe = Cylinder(3.0)
+    start = indexed(ON_EIGHT, np.arange(N))._replace(y=np.array([4.6, 4.6, 0.0, 0.0]))
+    loops = Loops(start, replace(weak, inclination=0.0), ControlLaw(BUILT, SLOW), wall=pipe)
+    fell = loops.run(BatchRun(EIGHT, 0.1)).fell
+    np.testing.assert_array_equal(fell, [0.0, np.inf, np.inf, np.inf])
 
 
 def noisy(seeds):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_batch import BUILT, CASES, EIGHT, ELLIPSE, ON_EIGHT, PAPER, SLOW, around
+from test_batch import BUILT, CASES, EIGHT, ELLIPSE, ON_EIGHT, PAPER, ROUND, SLOW, around
 
 from climber_uk.closed_loop.batch import Change, Loops
 from climber_uk.closed_loop.period import BatchRun
@@ -47,6 +47,13 @@ def test_so_are_loops_with_noise_that_lose_suction_and_are_told(time):
         gauge=0.05,
     )
     check(loops, BatchRun(EIGHT, 1.0, delay=1))
+
+
+@pytest.mark.parametrize("name", ["sphere", "roof"])
+def test_so_are_loops_on_walls(name):
+    wall, leaning = ROUND[name], replace(BUILT, inclination=70.0)
+    loops = Loops(ON_EIGHT, leaning, ControlLaw(leaning, SLOW, wall=wall), wall=wall)
+    check(loops, BatchRun(EIGHT, 0.8))
 
 
 def test_a_period_that_no_stamp_can_tell_is_refused():

@@ -287,6 +287,21 @@ def test_a_force_that_is_missing_at_one_wheel_alone_is_found_at_once(
         assert found[1].startswith(f"the {('right', 'left')[side]} one")
 
 
+@pytest.mark.parametrize("speed", [0.2, -0.2])
+@pytest.mark.parametrize("turn", [1, -1])
+@pytest.mark.parametrize(("wanted", "is_stuck"), [(1.0, False), (0.6, True)])
+def test_a_rim_may_stand_in_a_turn_that_is_wanted(speed, turn, wanted, is_stuck):
+    """Wheels that scrub have to turn faster than the reference does, whose both rims go."""
+    rate = turn * abs(speed) / CLIMBER.half_track
+    guard, found = Guard(GuardOptions(), Suction()), None
+    motion = Motion(0.0, 0.0, 0.0, 1.0, 0.0, speed, rate)
+    observed = Observed(motion, motion, PERIOD, [], Wrench(0.0, 0.0), REACTION, 0.0, wanted * rate)
+    expected = Expected(Rates(0.2, 0.6 * abs(rate)), Rates(9.0, 9.0), False, speed)
+    for _ in range(30):
+        found = found or guard.watch(CLIMBER, observed, expected)
+    assert (found and found[0]) == (Mode.DEAD_WHEEL if is_stuck else None)
+
+
 def test_what_a_wheel_did_before_a_rest_is_forgotten():
     guard = Guard(GuardOptions(**UNCHECKED), Suction())
     assert found_of_wheels(STRONG, DEAD, periods=7, guard=guard) is None

@@ -21,6 +21,7 @@ from climber_uk.mechanics.quantities import Motion, ReferencePoint, State, Torqu
 from climber_uk.mechanics.shapes import Circle, Line
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.wall import Plane
 from climber_uk.simulation.sensors import Sensors
 
 CLIMBER = Climber(
@@ -162,19 +163,43 @@ def test_on_a_course_the_closed_form_is_what_the_rows_give(constraints, motion, 
     np.testing.assert_allclose(one.demanded, other.demanded, rtol=1e-9, atol=1e-9)
 
 
-@given(st.floats(-0.29, 0.2), st.tuples(numbers, numbers, numbers))
-def test_a_heading_that_has_to_be_ahead_solves_its_equation(lead, coefficients):
-    heading = np.polynomial.Polynomial([0.0, *coefficients]) * 0.1
+def turning(*coefficients):
+    """A reference by its time, whose heading is this polynomial of it [rad]."""
+    heading = np.polynomial.Polynomial([0.0, *coefficients])
 
     def at(later):
         derivatives = (heading.deriv(n)(later) if n else heading(later) for n in range(3))
         angle, rate, acceleration = (float(each) for each in derivatives)
-        return ReferencePoint(0.0, 0.0, angle, 0.0, 0.0, rate, 0.0, 0.0, acceleration, 0.0, 0.0)
+        return ReferencePoint(later, 0.0, angle, 0.0, 0.0, rate, 0.0, 0.0, acceleration, 0.0, 0.0)
 
-    angle, rate, acceleration = _ahead(at(0.0), at, lead)
+    return at
+
+
+def is_ahead(at, lead, slope=0.0):
+    """How far θ, with its derivatives, is from T θ̇ [rad], [rad/s], [rad/s²]."""
+    angle, rate, acceleration = _ahead(at(0.0), at, lambda of: [lead + slope * of.x], 0)
     wanted = at(0.0)
-    assert angle - lead * (rate + wanted.yaw_rate) == pytest.approx(0.0, abs=1e-9)
-    assert rate - lead * (acceleration + wanted.yaw_acceleration) == pytest.approx(0.0, abs=1e-9)
+    rate, acceleration = rate + wanted.yaw_rate, acceleration + wanted.yaw_acceleration
+    return angle - lead * rate, rate - wanted.yaw_rate - slope * rate - lead * acceleration
+
+
+@given(st.floats(-0.29, 0.2), st.tuples(numbers, numbers, numbers))
+def test_a_heading_that_has_to_be_ahead_solves_its_equation(lead, coefficients):
+    off = is_ahead(turning(*0.1 * np.array(coefficients)), lead)
+    assert off == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+@given(st.floats(-0.7, 0.7), numbers, numbers)
+def test_a_heading_ahead_goes_on_turning_beyond_what_is_seen(lead, rate, acceleration):
+    assert is_ahead(turning(rate), lead) == pytest.approx((0.0, 0.0), abs=1e-9)
+    off, _ = is_ahead(turning(rate, acceleration), lead)
+    assert abs(off) <= 0.42 * abs(acceleration) + 1e-9
+
+
+@given(st.sampled_from([-1, 1]), st.floats(0.02, 0.2), st.floats(-0.3, 0.3), numbers)
+def test_a_heading_is_as_far_ahead_as_scrubbing_will_be(sign, lead, slope, rate):
+    off = is_ahead(turning(rate), sign * lead, slope)
+    assert off == pytest.approx((0.0, 0.0), abs=1.1 * slope**2 * abs(rate) + 1e-9)
 
 
 @given(st.floats(-0.5, 0.5))
@@ -206,6 +231,34 @@ def test_noise_of_poses_is_no_side_slip_and_no_missing_twist(noise, most):
     run = simulate(LINE, start, 8.0, controlling, CLIMBER, link)
     assert modes == {Mode.FOLLOWING}
     assert run.rms() < most
+
+
+@given(*(st.floats(-1, 1) for _ in range(4)), st.floats(-3, 3), st.floats(-180, 180))
+def test_on_a_tilted_wall_it_slips_as_upright_on_one_that_is_not(
+    v, v_1, omega, aside, heading, tilt
+):
+    """Learnt and followed, both seen from where downhill is."""
+
+    def seen(tilted):
+        turned = np.radians(tilt) if tilted else 0.0
+        wall = Plane(tilt) if tilted else None
+        before = Motion.at(0.0, 0.0, heading + turned, v, omega)
+        middle = heading + turned + omega * PERIOD / 2
+        x, y = PERIOD * np.array(
+            [
+                v * np.cos(middle) - aside * np.sin(middle),
+                v * np.sin(middle) + aside * np.cos(middle),
+            ]
+        )
+        end = Motion.at(float(x), float(y), heading + turned + omega * PERIOD, v + v_1, omega)
+        slip = SideSlip(scrub=0.1).learnt(CLIMBER, before, end, PERIOD, 6.0, wall)
+        speeds = v * np.cos(heading + turned), v * np.sin(heading + turned)
+        point = ReferencePoint(0.0, 0.0, heading + turned, *speeds, omega, *np.zeros(5).tolist())
+        course = slip.course(CLIMBER, point, lambda _: point, wall)
+        parts = *slip[:-1], *slip.covariance, *(course or ())
+        return *parts, slip.speed(CLIMBER, end, wall)
+
+    assert seen(tilted=True) == pytest.approx(seen(tilted=False), abs=1e-9)
 
 
 def test_resisted_turns_end_and_do_not_begin_below_the_resistance():

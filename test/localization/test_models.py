@@ -23,6 +23,8 @@ STATES = st.tuples(
     st.floats(-0.5, 0.5),
     st.floats(-0.3, 0.3),
     st.floats(-0.3, 0.3),
+    st.floats(-1, 1),
+    st.floats(-1, 1),
 ).map(np.array)
 TRAVELS = st.builds(
     Travel,
@@ -32,6 +34,8 @@ TRAVELS = st.builds(
     yaw_rate=st.floats(-3, 3),
     is_gyro=st.booleans(),
     scrubbed=st.floats(0, 0.3),
+    slipped=st.floats(-0.1, 0.1),
+    dragged=st.floats(-0.1, 0.1),
 )
 STEP = 1e-6
 
@@ -71,22 +75,32 @@ def test_the_jacobian_of_a_fix_is_its_derivative(state, lever):
 
 
 def test_a_climber_that_rolls_up_a_vertical_wall_sags_by_its_creep():
-    state = np.array([1.0, 2.0, math.pi / 2, 0.0, 0.1, 0.03, 0, 0, 0, 0])
+    state = np.array([1.0, 2.0, math.pi / 2, 0.0, 0.1, 0.03, *[0] * 6])
     after = models.advanced(state, Travel(0.1, 0.2, 0.2, 0.0, True), pull=1.0)
     np.testing.assert_allclose(after[:3], [1.0, 2.0 + 0.2 * 0.9 - 0.2 * 0.03, math.pi / 2])
 
 
 def test_a_climber_that_turns_on_the_spot_sags_too_and_a_gyros_bias_is_no_turn():
-    state = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.03, 0, 0, 0, 0])
+    state = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.03, *[0] * 6])
     travel = Travel(0.1, 0.0, 0.2, 0.5, True)
     np.testing.assert_allclose(models.advanced(state, travel, 1.0)[:3], [0, -0.006, 0], atol=1e-15)
     by_wheels = models.advanced(state, travel._replace(is_gyro=False), 1.0)
     assert by_wheels[HEADING] == pytest.approx(0.05)
 
 
+def test_wheels_that_slip_along_in_a_turn_go_less_far_uphill_and_further_downhill():
+    slips, travel = [0.5, 0.4], Travel(0.1, 0.05, 0.05, 0.0, True, slipped=0.01, dragged=0.01)
+    for heading, way in ((math.pi / 2, 0.05 - 0.005 - 0.004), (-math.pi / 2, -0.05 + 0.001)):
+        state = np.array([0.0, 0.0, heading, *[0] * 7, *slips])
+        assert models.advanced(state, travel, 1.0)[1] == pytest.approx(way)
+        assert models.advanced(state, travel, 0.0)[1] == pytest.approx(math.copysign(0.045, way))
+    back = travel._replace(distance=-0.05, dragged=-0.01)
+    assert models.advanced(state, back, 0.0)[1] == pytest.approx(0.045)
+
+
 def test_gravity_is_forwards_where_the_climber_looks_up_and_to_the_left_where_it_looks_along_x():
     for heading, force in ((math.pi / 2, (9.81, 0)), (0.0, (0, 9.81)), (math.pi, (0, -9.81))):
-        state = np.array([0, 0, heading, *[0] * 7])
+        state = np.array([0, 0, heading, *[0] * 9])
         np.testing.assert_allclose(models.gravity(state, Late(0, 0), 9.81), force, atol=1e-12)
 
 
@@ -94,7 +108,7 @@ def test_gravity_is_forwards_where_the_climber_looks_up_and_to_the_left_where_it
 def test_on_floor_and_ceiling_gravity_and_creep_weigh_nothing(inclination):
     options = LocalizationOptions(inclination=inclination)
     assert models.share_along_wall(options) == pytest.approx(0, abs=1e-15)
-    state, late = np.array([0, 0, 1.0, *[0] * 7]), Late(0, 0)
+    state, late = np.array([0, 0, 1.0, *[0] * 9]), Late(0, 0)
     jacobian = models.gravity_jacobian(state, late, options.gravity_along_wall)
     np.testing.assert_allclose(jacobian[:, : models.FORWARD_BIAS], 0, atol=1e-14)
 

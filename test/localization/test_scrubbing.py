@@ -8,15 +8,17 @@ import pytest
 from climber_uk.localization.encoders import Rolled
 from climber_uk.localization.gate import Fix
 from climber_uk.localization.localizer import Localizer
-from climber_uk.localization.models import PIVOT, SCRUB
+from climber_uk.localization.models import DRAG_SLIP, PIVOT, SCRUB, WEIGHT_SLIP
 from climber_uk.localization.options import LocalizationOptions
-from climber_uk.localization.scrubbing import LONGEST, SOON, Push, Scrubbing
+from climber_uk.localization.scrubbing import LONGEST, SOON, Push, Scrubbing, Turned
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import GRAVITY
 
 PERIOD, SPEED, YAW_RATE = 0.005, 0.2, 0.4
 LAMBDA, LEVER = 0.08, 0.03  # λ, a [m]
+WIDER, BY_DRAG, BY_WEIGHT = 0.06, 0.6, 0.4  # [m] by which wheels show a wider track; ζ, ξ
 NOISE = 0.02  # [m] of a fix
+STRAIGHT = Turned(0.0, 0.0, 0.0)
 
 
 def aside(heading, yaw_rate):
@@ -27,10 +29,16 @@ def aside(heading, yaw_rate):
 class Circles:
     """A climber on circles up to 20 s, then on straight ways and turns, and its localizer."""
 
-    def __init__(self, **options):
+    def __init__(self, slips=(0.0, 0.0), **options):
+        self.slips, wider = slips, WIDER if any(slips) else 0.0
         known = {"initial_heading": 0.3, "initial_position_deviation": 0.001, "imu_y": 0.1}
         self.options = LocalizationOptions(
-            way_noise=0.002, scale_deviation=0.002, creep_deviation=0.0, **known, **options
+            effective_half_track=0.3 + wider,
+            way_noise=0.002,
+            scale_deviation=0.002,
+            creep_deviation=0.0,
+            **known,
+            **options,
         )
         self.localizer, self.random = Localizer(self.options), np.random.default_rng(0)
         self.pose, self.angles, self.now = np.array([0.0, 0.0, 0.3]), np.zeros(2), 0.0
@@ -66,8 +74,10 @@ class Circles:
         self.pose = self.pose + np.array(
             [along * cosine - across * sine, along * sine + across * cosine, rate * PERIOD]
         )
-        track = self.options.half_track * rate
-        rims = np.array([speed + spin + track, speed + spin - track])
+        drag, uphill = self.slips
+        slip = WIDER * abs(rate) * (drag + uphill * math.sin(heading))
+        track = self.options.effective_half_track * rate
+        rims = speed + spin + slip + np.array([track, -track])
         self.angles = self.angles + rims * PERIOD / self.options.wheel_radius
         stamp = SECOND + round(self.now * SECOND)
         self.localizer.on_imu(stamp, rate, forwards, left)
@@ -87,6 +97,19 @@ def test_how_wheels_give_way_is_learnt_from_fixes_and_carries_through_a_time_wit
     assert estimate.mean[PIVOT] == pytest.approx(LEVER, abs=0.01)
     circles.go_on(6, YAW_RATE, fixes=False).go_on(6, -YAW_RATE, fixes=False)
     assert circles.off < 0.03  # having sagged by 0.2 m
+
+
+def test_how_far_they_slip_along_in_turns_is_learnt_and_is_no_way_of_the_climber():
+    circles = Circles((BY_DRAG, BY_WEIGHT), scrub_deviation=0.1, slip_walk=0.02).go_on(1, 0.0)
+    for _ in range(3):
+        circles.go_on(6, YAW_RATE).go_on(6, -YAW_RATE)
+    estimate = circles.localizer.estimate
+    assert estimate.mean[DRAG_SLIP] == pytest.approx(BY_DRAG, abs=0.1)
+    assert estimate.mean[WEIGHT_SLIP] == pytest.approx(BY_WEIGHT, abs=0.1)
+    circles.too_fast = 0.0
+    circles.go_on(6, YAW_RATE, fixes=False).go_on(6, -YAW_RATE, fixes=False)
+    assert circles.off < 0.03  # wheels have turned 0.17 m too far
+    assert circles.too_fast < 0.008  # of 24 mm/s
 
 
 def test_what_an_earlier_run_has_told_of_it_needs_no_fixes():
@@ -110,9 +133,10 @@ def test_wheels_that_break_away_for_a_moment_are_not_believed_to_move_the_climbe
 @pytest.mark.parametrize("wrong", [-0.5, -0.1, 0.05, 0.3])  # [m/s²]
 def test_an_accelerometer_that_is_off_for_good_moves_the_speed_by_a_bound_only(wrong):
     scrubbing, rolled = Scrubbing(), Rolled(PERIOD, SPEED * PERIOD, SPEED * PERIOD, 0.0, False)
-    scrubbing.distance(rolled, None)
+    scrubbing.go_on(rolled, None, STRAIGHT, 0.0)
     push = Push(wrong, 0.0, 0.0)
-    off = [scrubbing.distance(rolled, push) / PERIOD - SPEED for _ in range(4000)]
+    gone = [scrubbing.go_on(rolled, push, STRAIGHT, 0.0).distance for _ in range(4000)]
+    off = np.array(gone) / PERIOD - SPEED
     assert np.abs(off).max() < abs(wrong) * (LONGEST + 2 * SOON)
     assert np.abs(off[-1]) < abs(wrong) * (0.2 * LONGEST + 2 * SOON)
 
@@ -120,10 +144,11 @@ def test_an_accelerometer_that_is_off_for_good_moves_the_speed_by_a_bound_only(w
 def test_at_rest_and_without_an_imu_the_way_is_the_wheels():
     scrubbing = Scrubbing()
     spins = Rolled(PERIOD, PERIOD, PERIOD, 0.0, False)
-    scrubbing.distance(spins, Push(0.0, 0.0, 0.0))
+    scrubbing.go_on(spins, Push(0.0, 0.0, 0.0), STRAIGHT, 0.0)
     assert scrubbing.breaks_away
     rests = Rolled(PERIOD, 0.0, 0.0, 0.0, True)
-    assert scrubbing.distance(rests, Push(GRAVITY, 0.0, 0.0)) == 0
+    assert scrubbing.go_on(rests, Push(GRAVITY, 0.0, 0.0), STRAIGHT, 0.0).distance == 0
     assert not scrubbing.breaks_away
     rolls = Rolled(PERIOD, SPEED * PERIOD, SPEED * PERIOD, 0.0, False)
-    assert scrubbing.distance(rolls, None) == rolls.distance
+    gone = scrubbing.go_on(rolls, None, Turned(0.0, 1e-3, 1e-3), 4e-4)
+    assert gone == pytest.approx((rolls.distance - 4e-4, 1e-3, 1e-3))

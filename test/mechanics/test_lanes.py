@@ -125,6 +125,7 @@ def test_every_lane_is_driven_whole_from_end_to_end():
 @pytest.mark.parametrize(
     ("text", "how", "why"),
     [
+        ("\n\n", {}, "no corners in it"),
         ("0 0\n1 0", {}, r"area='.*': ring 1: 2 corner\(s\), want >= 3"),
         ("0 0\n1 0\n1 1\n\n0 0\n1 x\n0 1", {}, "ring 2: line 2: 'x' must be a number"),
         ("0 0\n0.3 0\n0.3 0.3\n0 0.3", {}, "m between the clearances"),

@@ -51,6 +51,7 @@ BAD = {
     "nan": ("1 2\n\n3 nan\n", "line 3: point 2 is not finite"),
     "infinite": ("1 2\n-inf 3\n", "line 2: point 2 is not finite"),
     "too large": ("1 2\n1e999 3\n", "line 2: point 2 is not finite"),
+    "far away": ("1 2\n3 1e300\n", "line 2: point 2 at (3, 1e+300) m is beyond 1e+06 m"),
     "a word": ("1 2\nthree 4\n", "line 2: 'three' must be a number"),
     "a gap": ("x,y\n1,2\n3,\n", "line 3: '' must be a number"),
     "a digit's underscore": ("1 2\n1_0 4\n", "line 2: '1_0' must be a number"),

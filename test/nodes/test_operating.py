@@ -1,5 +1,6 @@
 """An operator pauses a climber on its path, goes on, slower, and back: the three nodes."""
 
+import json
 import subprocess
 
 import numpy as np
@@ -11,7 +12,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 from test_faults import LIMIT, LOCK_STEP, PLANNER, PLANT
 from test_waiting import Waiting
-from world import executable
+from world import CONFIG, executable
 
 from climber_uk.messages import reading
 
@@ -75,6 +76,21 @@ class Operated(Waiting):
     def largest_jump(self):
         efforts = np.array([m.effort for m in self.torques])
         return np.abs(np.diff(efforts, axis=0)).max()
+
+
+def press(world, panel):
+    """What foxglove_bridge does when a button of the layout is pressed; the service's response."""
+    layout = json.loads((CONFIG / "foxglove_layout.json").read_text())
+    button = layout["configById"][panel]
+    if panel.startswith("Publish"):
+        return world.speak(Float64, button["topicName"]).publish(
+            Float64(**json.loads(button["value"]))
+        )
+    kind = Trigger if button["requestPayload"] == "{}" else SetBool
+    asked = kind.Request(**json.loads(button["requestPayload"]))
+    response = world.call(kind, button["serviceName"], asked)
+    assert response.success, response.message
+    return response
 
 
 def stamp_of(message):
@@ -160,6 +176,24 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.odometry[-1].pose.pose.position.x == pytest.approx(2.0, abs=0.01)
     assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
     assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01
+
+
+def test_the_buttons_of_the_viewers_layout_do_what_is_written_on_them(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    climb = Operated(world, {PLANNER: line, PLANT: ["initial_heading:=0.0"]})
+    climb.drives(0.28, 0.31)
+    press(world, "CallService!pause")
+    climb.is_told_to_be("paused")
+    climb.drives(-1e-3, 1e-3)
+    press(world, "Publish!speed")
+    press(world, "CallService!go_on")
+    climb.drives(0.14, 0.16)
+    press(world, "CallService!disable")
+    climb.is_in("disabled")
+    press(world, "CallService!enable")
+    climb.is_in("following")
+    assert press(world, "CallService!start").message == "comes to rest, then starts"
+    climb.is_told_to_be("approaching")
 
 
 def test_tags_of_a_path_are_told_as_the_climber_reaches_them(world):

@@ -1,13 +1,18 @@
-"""What README offers to be done with a bag, done as it is written there, by somebody new."""
+"""What README and the docs say can be done, done as it is written there, by somebody new."""
 
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
+import time
+from itertools import groupby
 from pathlib import Path
 
 import pytest
+from test_documented_commands import GIVEN, NODES, OURS
+from world import new_domain
 
 pytestmark = [pytest.mark.nodes, pytest.mark.soak]
 
@@ -19,9 +24,76 @@ OF_A_BAG = re.findall(r"^\| `(\w+ (?:BAG|A B)[^`]*)` \|", README, re.MULTILINE)
 DEMOS = re.findall(r"^\| `(C\w+=[\w/.]+)` \|", README, re.MULTILINE)
 
 
+ONE_BY_ONE = re.search(r"^## Run the nodes.*?^```\n(.*?)^```", README, re.MULTILINE | re.DOTALL)[1]
+TOOLS = set(OURS) - NODES - {"campaign", "climber", "record_bag"}
+OPEN = re.compile(r"[A-Z]+|…|.*:=value|my_.*")  # for the reader to fill in
+
+
+def is_whole(words):
+    """Whether a command of a page is one of ours that can be given just so, and soon ends."""
+    is_ours = words[0] in TOOLS or (words[:2] == ["make", "demo"] and words[2:])
+    is_in_the_table = words[2:] in [[variable] for variable in DEMOS]
+    return is_ours and not is_in_the_table and not any(OPEN.fullmatch(word) for word in words)
+
+
+ON_A_PAGE = {
+    page.name: [words for _, words in rows if is_whole(words)]
+    for page, rows in groupby(GIVEN, key=lambda row: row[0])
+}
+ON_A_PAGE = {page: rows for page, rows in ON_A_PAGE.items() if rows and page != "README.md"}
+
+
 def given(words, **options):
     environment = {**os.environ, "PATH": PATH}
     return subprocess.run(words, env=environment, capture_output=True, text=True, **options)
+
+
+@pytest.fixture
+def clone(tmp_path):
+    """A directory that has what the repository has, and keeps what is written into it."""
+    for entry in ROOT.iterdir():
+        if not entry.name.startswith((".", "demo")) or entry.name == ".venv":
+            (tmp_path / entry.name).symlink_to(entry)
+    return tmp_path
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("page", ON_A_PAGE)
+def test_the_commands_of_a_page_can_be_given_one_after_the_other(page, clone):
+    for words in ON_A_PAGE[page]:
+        done = given(words, cwd=clone)
+        assert done.returncode == 0, (words, done.stdout, done.stderr)
+        assert "Traceback" not in done.stderr
+
+
+@pytest.mark.timeout(1200)
+def test_the_nodes_are_run_one_by_one(clone):
+    environment = {**os.environ, "PATH": PATH, "ROS_DOMAIN_ID": str(new_domain())}
+    logs = [clone / f"{number}.log" for number in range(4)]
+    lines = ONE_BY_ONE.splitlines()
+    assert [line.split()[0] for line in lines][-1] == "record_bag"
+    started = [
+        subprocess.Popen(
+            shlex.split(line),
+            env=environment,
+            cwd=clone,
+            stdout=log.open("w"),
+            stderr=subprocess.STDOUT,
+        )
+        for line, log in zip(lines, logs, strict=True)
+    ]
+    try:
+        while "done: at the end" not in logs[0].read_text():
+            assert [process.poll() for process in started] == [None] * 4
+            time.sleep(1.0)
+    finally:
+        for process in reversed(started):
+            process.send_signal(signal.SIGINT)
+            process.wait(60)
+    assert [process.returncode for process in started] == [0] * 4
+    done = given(["analyze_bag", "my_bag"], cwd=clone)
+    assert done.returncode == 0, done.stderr
+    assert "It followed its path" in done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -57,3 +129,4 @@ def test_a_demonstration_of_the_table_drives_its_path(variable, tmp_path):
 def test_the_tables_are_read():
     assert len(OF_A_BAG) >= 7
     assert len(DEMOS) >= 7
+    assert sum(map(len, ON_A_PAGE.values())) >= 20

@@ -221,7 +221,7 @@ def test_a_topic_that_is_missing_is_named_in_one_line(bag, tmp_path, replay, top
         (["-p", "mass=5.0"], "'mass=5.0' must be name:=value"),
         (["-p", "mass:=-5.0"], r"mass=-5.0 must be > 0 \[kg\]"),
         (["-p", "observer.bandwidth:=[1]"], r"observer.bandwidth=\[1\] must be a finite number"),
-        (["--params", "no.yaml"], "No such file .*no.yaml"),
+        (["--params", "no.yaml"], "replay_controller: No such file .*no.yaml"),
         (["--namespace", "second"], "has no message on /second/wheel_torques"),
     ],
 )

@@ -170,13 +170,14 @@ def test_margins_are_the_lowest_and_the_share_below_one(tmp_path):
     same(got, lowest_slip_margin=0.5, slip_share=25.0, lowest_tip_margin=6, lowest_wheel_load=80)
 
 
-def test_the_grip_that_is_asked_of_each_wheel_is_that_by_hand(tmp_path):
+@pytest.mark.parametrize(("tilt", "pulls_left"), [(0.0, np.cos), (90.0, np.sin)])
+def test_the_grip_that_is_asked_of_each_wheel_is_that_by_hand(tmp_path, tilt, pulls_left):
     """The norm of the share is 1 over the slip margin, without which nothing is drawn."""
     made = Made(torques=lambda time, _: np.tile([0.4, -0.2], (len(time), 1)))
     made.add_odometry()
     made.add_torques()
     made.add_forces(np.tile([7.0, 20.0, 1.0], (400, 1)))
-    made.add_parameters(**vars(Climber()))
+    made.add_parameters(**vars(Climber()), **{"plane.tilt": tilt})
     (run,), _ = read_runs(made.write(tmp_path / "bare"), Topics())
     assert not len(grip_asked(run))
     made.add_vectors("plant_simulator/margins", np.tile([1.0, 7.0, 79.5], (400, 1)).tolist())
@@ -184,7 +185,7 @@ def test_the_grip_that_is_asked_of_each_wheel_is_that_by_hand(tmp_path):
     asked, held = grip_asked(run), Attachment()
     assert asked.shape == (400, 2, 2)
     for (right, left), heading in zip(asked[::50], made.pose[::50, 2], strict=True):
-        across, forces = -49.05 * np.cos(heading), (0.4 / 0.027, -0.2 / 0.027)
+        across, forces = -49.05 * pulls_left(heading), (0.4 / 0.027, -0.2 / 0.027)
         margin = held.slip_margin(Climber(), 0.0, forces, 20.0, across)
         assert 1 / max(np.hypot(*right), np.hypot(*left)) == pytest.approx(margin, rel=1e-3)
     assert "grip" in draw([("", run)])

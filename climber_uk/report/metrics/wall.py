@@ -1,14 +1,20 @@
 """Margins of slipping and tipping, slip, and the friction of the wall.
 
 m Δv = ∫ (τR + τL)/r dt - m g_t ∫ sinθ dt - f ∫ σ dt        (11), integrated
+
+with the weight as it pulls there, on a wall that the controller was told.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from climber_uk.control.build import known_wall
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.quantities import Motion
+from climber_uk.mechanics.wall import weight
 from climber_uk.messages import topics
+from climber_uk.parameters.parameter_file import Values
 from climber_uk.report.metrics.metric import NAN, Case, Metric, largest, lowest, share
 
 WINDOW = 0.5  # [s] over which momentum is balanced
@@ -24,7 +30,9 @@ def friction(case: Case) -> float:
         return NAN
     time, speed = run.seconds(run.commands), run.rates[run.is_answered, 0]
     drive, _ = climber.force_and_moment(run.torques)
-    push = drive - climber.weight_along_wall * np.sin(run.pose[run.is_answered, 2])
+    x, y, heading = run.pose[run.is_answered].T
+    there = Motion.at(x, y, heading, 0.0, 0.0)
+    push = drive + weight(known_wall(Values(run.parameters)), climber, there)[0]
     pushed = np.concatenate([[0.0], np.cumsum(push[:-1] * np.diff(time))])
     directions = np.sign(speed) * (np.abs(speed) > MOVING)
     summed = np.concatenate([[0], np.cumsum(directions)])
