@@ -16,7 +16,7 @@ SBOM := .venv-sbom
 BIN := $(VENV)/bin
 # What has been installed: for nodes, recorder and analysis; for tests, campaigns and benches too
 SET_UP := $(VENV)/set-up
-TOOLS := $(VENV)/tools
+TOOLS := $(VENV)/tools-set-up
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
 .PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean test-kilted sbom
