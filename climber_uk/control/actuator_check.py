@@ -91,7 +91,7 @@ class RimStop:
         """Add speeds [m/s] of this rim, of the other, and what is asked of this one at least."""
         if abs(rim) >= STANDS or (abs(other) <= GOES and not self._at_once):
             self._stands, self._at_once = 0, False
-        else:
+        elif abs(other) > GOES:  # where both stand, a seal may have stuck again
             if self._stands == 0:
                 self._at_once = max(map(abs, self._seen)) > WENT
             self._stands += 1

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from climber_uk.control.actuator_check import RimStop
 from climber_uk.control.estimator import Observed
 from climber_uk.control.guard import Expected, Guard, GuardOptions, Rates
 from climber_uk.control.safety import Mode
@@ -300,6 +301,19 @@ def test_a_rim_may_stand_in_a_turn_that_is_wanted(speed, turn, wanted, is_stuck)
     for _ in range(30):
         found = found or guard.watch(CLIMBER, observed, expected)
     assert (found and found[0]) == (Mode.DEAD_WHEEL if is_stuck else None)
+
+
+@pytest.mark.parametrize(
+    ("others", "is_stuck"),
+    [((0.06, 0.05, 0.05), True), ((0.017, 0.0, 0.0, 0.0), False), ((0.05, 0.0, 0.05, 0.05), True)],
+)
+def test_wheels_that_stop_one_message_after_the_other_are_none_that_is_stuck(others, is_stuck):
+    """A seal that has let go sticks again; of a coarse encoder, one wheel shows it first."""
+    rim = RimStop()
+    rim.add(0.06, 0.06, 0.0)
+    for other in others:
+        rim.add(0.0, other, 0.0)
+    assert rim.is_stuck == is_stuck
 
 
 def test_what_a_wheel_did_before_a_rest_is_forgotten():
