@@ -84,14 +84,16 @@ class RimStop:
 
     def __init__(self) -> None:
         self._seen = 0.0, 0.0  # [m/s] in the last two messages
-        self._stands, self._at_once = 0, False  # messages in a row; whether it went before them
+        self._stands, self._at_once = 0, False  # messages; whether it went before them
+        self._other_stands = 0  # messages in a row
         self.is_stuck = False
 
     def add(self, rim: float, other: float, asked: float) -> None:
         """Add speeds [m/s] of this rim, of the other, and what is asked of this one at least."""
-        if abs(rim) >= STANDS or (abs(other) <= GOES and not self._at_once):
+        self._other_stands = self._other_stands + 1 if abs(other) <= GOES else 0
+        if abs(rim) >= STANDS or self._other_stands >= (STANDS_AT_ONCE if self._at_once else 1):
             self._stands, self._at_once = 0, False
-        elif abs(other) > GOES:  # where both stand, a seal may have stuck again
+        elif not self._other_stands:  # else a seal may have stuck again
             if self._stands == 0:
                 self._at_once = max(map(abs, self._seen)) > WENT
             self._stands += 1

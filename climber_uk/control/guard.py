@@ -140,7 +140,7 @@ class Guard:
         torques = observed.torques
         self._followed += observed.time
         slower = expected.wanted.speed - climber.half_track * expected.wanted.yaw_rate
-        # of the climber's own turning, a rim may stand: wheels that scrub head where it does not go
+        # wheels that give way turn it otherwise than its reference does: a rim may stand by that
         turning = math.copysign(climber.half_track, expected.speed) * observed.turning
         own = expected.wanted.speed + turning, expected.wanted.speed - turning
         right, left = (min(slower, rim) for rim in own)
@@ -215,7 +215,8 @@ class Guard:
         largest = max(abs(torques.right), abs(torques.left))
         load = largest / climber.max_wheel_torque
         if wanted.speed > MOVES:
-            stands = motion.speed * math.copysign(1.0, expected.speed) < STANDS * wanted.speed
+            is_against = motion.speed * expected.speed < 0
+            stands = is_against or abs(motion.speed) < STANDS * wanted.speed
         else:  # it turns in place, or rests
             turns = climber.half_track * wanted.yaw_rate > MOVES
             stands = turns and abs(motion.yaw_rate) < STANDS * wanted.yaw_rate

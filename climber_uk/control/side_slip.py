@@ -38,38 +38,38 @@ At = Callable[[float], ReferencePoint]
 
 
 class Covariance(NamedTuple):
-    """How little is known of ρ, λ [m] and p [m]: the upper triangle, row by row."""
+    """How little is known of creep ρ, scrub λ [m] and pivot p [m]: the upper triangle, by rows."""
 
-    rho: float = SIZES[0] ** 2
-    rho_lambda: float = 0.0
-    rho_p: float = 0.0
-    lambdas: float = SIZES[1] ** 2
-    lambda_p: float = 0.0
-    p: float = SIZES[2] ** 2
+    creep: float = SIZES[0] ** 2
+    creep_scrub: float = 0.0
+    creep_pivot: float = 0.0
+    scrub: float = SIZES[1] ** 2
+    scrub_pivot: float = 0.0
+    pivot: float = SIZES[2] ** 2
 
-    def times(self, rho: float, scrub: float, pivot: float) -> tuple[float, float, float]:
+    def times(self, creep: float, scrub: float, pivot: float) -> tuple[float, float, float]:
         """Its product with a vector."""
         a, b, c, d, e, f = self
         return (
-            a * rho + b * scrub + c * pivot,
-            b * rho + d * scrub + e * pivot,
-            c * rho + e * scrub + f * pivot,
+            a * creep + b * scrub + c * pivot,
+            b * creep + d * scrub + e * pivot,
+            c * creep + e * scrub + f * pivot,
         )
 
     def after(
-        self, times: tuple[float, float, float], known: float, forgotten: float
+        self, vector: tuple[float, float, float], known: float, forgotten: float
     ) -> "Covariance":
-        """Less `known` times the square of a vector; a share of what was known is forgotten."""
+        """Less a vector's square, times `known`; a share of all that is known is `forgotten`."""
         a, b, c, d, e, f = self
-        rho, scrub, pivot = times
+        creep, scrub, pivot = vector
         kept, unknown = 1 - forgotten, NOTHING_KNOWN
         return Covariance(
-            kept * a - known * rho * rho + forgotten * unknown.rho,
-            kept * b - known * rho * scrub,
-            kept * c - known * rho * pivot,
-            kept * d - known * scrub * scrub + forgotten * unknown.lambdas,
+            kept * a - known * creep * creep + forgotten * unknown.creep,
+            kept * b - known * creep * scrub,
+            kept * c - known * creep * pivot,
+            kept * d - known * scrub * scrub + forgotten * unknown.scrub,
             kept * e - known * scrub * pivot,
-            kept * f - known * pivot * pivot + forgotten * unknown.p,
+            kept * f - known * pivot * pivot + forgotten * unknown.pivot,
         )
 
 

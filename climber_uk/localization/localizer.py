@@ -170,8 +170,10 @@ class Localizer:
             push = Push(forwards, yaw_rate, options.imu_y)
         distance, slipped, dragged = self._scrubbing.go_on(rolled, push, turned, slip)
         distance += models.slip_along(slips, slipped, dragged, uphill)
-        gone = distance, rolled.path, travel.yaw_rate, True, turned.angle, slipped, dragged
-        return Travel(duration, *gone), rolled._replace(distance=rolled.distance - slip), aside
+        travel = travel._replace(
+            distance=distance, scrubbed=turned.angle, slipped=slipped, dragged=dragged
+        )
+        return travel, rolled._replace(distance=rolled.distance - slip), aside
 
     def _watch_gravity(self, weight: Weight) -> None:
         """Take the heading from gravity where nothing else tells it, or all tells another one."""

@@ -86,6 +86,14 @@ def test_a_stall_counts_from_the_beginning_once_the_climber_has_moved():
     assert climb.periods_until(Mode.STALLED, speed=0.0, torques=(2.41, -2.41)) == 6
 
 
+@pytest.mark.parametrize(("reference", "speed"), [(0.0, -0.1), (-0.2, -0.1), (0.2, 0.1)])
+def test_a_climber_that_brakes_on_its_way_is_not_stalled(reference, speed):
+    climb = Watched()
+    for _ in range(50):
+        torques = (2.41, -2.41)
+        assert climb.finds(speed=speed, torques=torques, reference=reference) is None
+
+
 @pytest.mark.parametrize(
     ("strong", "weak", "periods"), [(1, 1, 14), (2, 1, 10), (1, 3, 48), (1, 4, None)]
 )
@@ -95,7 +103,8 @@ def test_a_climber_that_trembles_is_stalled(strong, weak, periods):
     for number in range(1, 101):
         drives = number % (strong + weak) < strong
         torque = 2.41 if drives else 0.0
-        if climb.finds(speed=0.0 if drives else -0.1, torques=(torque, -torque)):
+        speed = 0.0 if drives else -0.1
+        if climb.finds(speed=speed, torques=(torque, -torque), reference=0.2):
             break
     assert (number if number < 100 else None) == periods
 
@@ -305,7 +314,12 @@ def test_a_rim_may_stand_in_a_turn_that_is_wanted(speed, turn, wanted, is_stuck)
 
 @pytest.mark.parametrize(
     ("others", "is_stuck"),
-    [((0.06, 0.05, 0.05), True), ((0.017, 0.0, 0.0, 0.0), False), ((0.05, 0.0, 0.05, 0.05), True)],
+    [
+        ((0.06, 0.05, 0.05), True),
+        ((0.05, 0.0, 0.05, 0.05), True),
+        ((0.017, 0.0, 0.0, 0.0), False),
+        ((0.05, 0.05, 0.0, 0.0, 0.0, 0.02), False),  # it rests, and one wheel goes on first
+    ],
 )
 def test_wheels_that_stop_one_message_after_the_other_are_none_that_is_stuck(others, is_stuck):
     """A seal that has let go sticks again; of a coarse encoder, one wheel shows it first."""
