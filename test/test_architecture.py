@@ -46,6 +46,11 @@ def traced():
 
 
 @pytest.mark.nodes
+def test_the_tree_has_all_rooms():
+    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert set(re.findall(r"climber_uk/(\w+)/ ", section("Where things are"))) == rooms
+
+
 def test_one_odometry_goes_the_way_that_is_drawn():
     calls = [(file, name) for _, file, name in traced()]
     files = {file for file, _ in calls}
