@@ -129,7 +129,7 @@ def trial(path: str, seed: int) -> tuple[Array, Array, dict[str, str]]:
     motion: RecordedMotion = replace(ear.motion(true.suction_pressure), wheel_angles=angles)
     found = identify(motion, believed)
     moment, track = shown(run, angles, true, found)
-    why = {name: reason.words for name, reason in found.reasons.items()}
+    why = {name: reason.words.split(":")[0] for name, reason in found.reasons.items()}
     told = [(found[name], found.half_width(name), name not in why) for name in OFF]
     told.append((*found.resisted, found.tells_resisted))
     told.append((found["half_track"], found.half_width("half_track"), found.tells_effective_track))

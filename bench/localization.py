@@ -290,11 +290,13 @@ def main() -> None:
     parser.add_argument(
         "--drawn", action="store_true", help="start, biases and creep of each row as is believed"
     )
+    parser.add_argument("--duration", type=float, default=math.inf, help="[s] of a run, at most")
     options = parser.parse_args()
     print(f"{'':<42}{HEAD}")
     for name, case in ROWS.items():
         if options.only in name:
-            case = replace(case, is_drawn=case.is_drawn or options.drawn)
+            duration = min(case.duration, options.duration)
+            case = replace(case, is_drawn=case.is_drawn or options.drawn, duration=duration)
             loops = [Loop(case, seed).run() for seed in range(options.seeds)]
             print(f"{name:<42}{figures(loops)}", flush=True)
 
