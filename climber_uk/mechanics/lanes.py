@@ -4,6 +4,7 @@ They lie side by side, evenly, and one along each edge covers what their ends le
 each it goes on to the nearest end of all that are left, straight or around corners.
 """
 
+import itertools
 import math
 from functools import cached_property
 from typing import Any
@@ -19,6 +20,9 @@ from climber_uk.parameters.declaration import parameter, parameters
 SHORTEST = 1e-3  # [m] of a lane
 CUT = 0.25  # of the tolerance: most that a turn around an obstacle, of 1/8, is rounded
 MOST_LANES = 500
+NEAREST_TURNS = 0.25  # of the lanes' spacing: nearer to each other, two turns are eased
+BENDS = 0.2  # [rad] from which on a corner is a turn
+EASE = 3.0  # times as long as two turns are apart is what is left out of a lane to ease them: 18°
 
 
 @parameters
@@ -74,6 +78,7 @@ class Lanes(ThroughPoints):
         try:
             lanes = lanes_of(area, self.width - self.overlap, self.edges)
             places, begins = joined(area, lanes, start)
+            places = eased(area, places, NEAREST_TURNS * (self.width - self.overlap))
             return turned(places, self.direction), begins
         except ValueError as error:
             raise ValueError(f"{self.source}: {error}") from None
@@ -82,7 +87,8 @@ class Lanes(ThroughPoints):
 def lanes_of(area: Area, spacing: float, edges: bool) -> Array:
     """Lanes (n, 2, 2) [m], both ends of each, along x, no more than `spacing` [m] apart.
 
-    With those along `edges`, none lies beside an edge.
+    One lies along each level edge, so that none lies just beside one that leads around a hole;
+    with `edges`, along each edge.
     """
     y = np.concatenate(area.rings)[:, 1]
     least = area.clearance + SLACK
@@ -92,18 +98,30 @@ def lanes_of(area: Area, spacing: float, edges: bool) -> Array:
             f"{high - low:.4g} m between the clearances, want 0 to {MOST_LANES} lanes of "
             f"{spacing:.4g} m"
         )
-    number = math.ceil((high - low) / spacing - 1e-9)
-    heights = low + (high - low) * np.arange(edges, number + 1 - edges) / max(number, 1)
-    lanes = [
+    along = area.along_edges()
+    is_level = np.ptp(along[:, :, 1], axis=1) < SHORTEST
+    shortest = spacing if edges else SHORTEST  # what is shorter lies between two along edges
+    across = [
         [[left, y], [right, y]]
-        for y in heights.tolist()
+        for y in _heights(np.array([low, high, *along[is_level, 0, 1]]), spacing)
         for left, right in area.spans(y).tolist()
-        if right - left >= SHORTEST
+        if right - left >= shortest
     ]
-    along = area.along_edges() if edges else np.empty((0, 2, 2))
-    found = np.concatenate([along, np.array(lanes).reshape(-1, 2, 2)])
+    lanes = np.array(across).reshape(-1, 2, 2)
+    found = np.concatenate([along[~is_level], lanes]) if edges else lanes
     if not len(found):
         raise ValueError(f"nowhere is room for a clearance of {area.clearance:.4g} m")
+    return found
+
+
+def _heights(fixed: Array, spacing: float) -> list[float]:
+    """Heights [m] at all that are `fixed`, and evenly between them."""
+    fixed = np.unique(fixed)
+    fixed = fixed[np.diff(fixed, prepend=-np.inf) > SHORTEST]
+    found = [float(fixed[0])]
+    for low, high in itertools.pairwise(fixed.tolist()):
+        number = max(1, math.ceil((high - low) / spacing - 1e-9))
+        found += [low + (high - low) * part / number for part in range(1, number + 1)]
     return found
 
 
@@ -135,6 +153,52 @@ def joined(area: Area, lanes: Array, start: Array) -> tuple[Array, list[int]]:
             raise ValueError(f"no way leads on to ({x:.4g}, {y:.4g}) m: drive the area in parts")
         way += _between(before, at, goal)
         at = goal
+
+
+def eased(area: Area, places: Array, nearest: float) -> Array:
+    """A way through `places` (n, 2) [m], with no two turns nearer to each other than `nearest` [m].
+
+    Of two that are, one is begun sooner, by an oblique end of its lane, or ended later, where that
+    is clear and makes no others. Places that are one stay one.
+    """
+    is_new = np.append(True, np.hypot(*np.diff(places, axis=0).T) > SHORTEST)
+    way = places[is_new]
+    for at in range(1, len(way) - 2):
+        around = slice(max(at - 3, 0), at + 5)
+        a, b, c, d = way[at - 1 : at + 3]
+        near = _near_turns(way[around], nearest)
+        if math.dist(b, c) >= nearest or not near:
+            continue
+        length = EASE * math.dist(b, c)
+        for sooner, later in (
+            (_towards(b, a, length), c),
+            (b, _towards(c, d, length)),
+            (c, c),
+            (b, b),
+        ):
+            tried = way.copy()
+            tried[at : at + 2] = sooner, later
+            legs = zip(tried[at - 1 : at + 2], tried[at : at + 3], strict=True)
+            clear = all(area.is_clear(start, end[None])[0] for start, end in legs)
+            if clear and _near_turns(tried[around], nearest) < near:
+                way = tried
+                break
+    return way[np.cumsum(is_new) - 1]
+
+
+def _towards(start: Array, goal: Array, length: float) -> Array:
+    """The place so far [m] from `start`, at most halfway to `goal`."""
+    return start + min(length / max(math.dist(start, goal), SHORTEST), 0.5) * (goal - start)
+
+
+def _near_turns(way: Array, nearest: float) -> int:
+    """How many turns are nearer to the one before."""
+    legs = np.diff(way, axis=0)
+    legs = legs[np.hypot(*legs.T) > SHORTEST]
+    angle = np.arctan2(*legs.T[::-1])
+    turn = np.abs((np.diff(angle) + np.pi) % (2 * np.pi) - np.pi)
+    along = np.cumsum(np.hypot(*legs.T))[:-1]
+    return int(np.sum(np.diff(along[turn > BENDS]) < nearest))
 
 
 def _apart(area: Area, places: Array) -> Array:
