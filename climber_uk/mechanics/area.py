@@ -6,6 +6,7 @@ places only, as what is nearer to an edge is convex: so all is found without off
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -166,7 +167,7 @@ def _around(bend: float, side: int) -> float:
 def read_area(file: str, clearance: float) -> Area:
     """Area of a text file: corners x, y [m] a line, an empty line before each further ring.
 
-    Raises `ValueError` naming the file.
+    Raises `ValueError` naming the file, also where a ring crosses itself or another one.
     """
     try:
         blocks = [b for b in re.split(r"\n\s*\n", read_text(file).strip()) if b.strip()]
@@ -182,9 +183,30 @@ def read_area(file: str, clearance: float) -> Area:
             if len(ring) < 3:
                 raise ValueError(f"ring {number}: {len(ring)} corner(s), want >= 3")
             rings.append(ring)
+        _refuse_crossings(rings)
     except ValueError as error:
         raise ValueError(f"area={file!r}: {error}") from None
     return Area(tuple(rings), clearance)
+
+
+def _refuse_crossings(rings: Sequence[Array]) -> None:
+    begin, end = Area(tuple(rings), 0.0).edges
+    number = np.repeat(np.arange(1, len(rings) + 1), [len(ring) for ring in rings])
+    way = end - begin
+    for edge in range(len(begin) - 1):
+        later = slice(edge + 1, None)
+        crosses = _cross(way[edge], way[later])
+        gap = begin[later] - begin[edge]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t, u = _cross(gap, way[later]) / crosses, _cross(gap, way[edge]) / crosses
+        inner = 1e-9, 1 - 1e-9  # edges may touch
+        meet = (t > inner[0]) & (t < inner[1]) & (u > inner[0]) & (u < inner[1])
+        if meet.any():
+            other = int(np.argmax(meet))
+            x, y = begin[edge] + t[other] * way[edge]
+            one, two = number[edge], number[edge + 1 + other]
+            what = "itself" if one == two else f"ring {two}"
+            raise ValueError(f"ring {one} crosses {what} at ({x:.4g}, {y:.4g}) m")
 
 
 def turned(points: Array, angle: float) -> Array:

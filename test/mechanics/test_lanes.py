@@ -189,6 +189,8 @@ def test_every_lane_is_driven_whole_from_end_to_end():
         ("\n\n", {}, "no corners in it"),
         ("0 0\n1 0", {}, r"area='.*': ring 1: 2 corner\(s\), want >= 3"),
         ("0 0\n1 0\n1 1\n\n0 0\n1 x\n0 1", {}, "ring 2: line 2: 'x' must be a number"),
+        ("0 0\n2 2\n2 0\n0 2", {}, r"ring 1 crosses itself at \(1, 1\) m"),
+        ("0 0\n3 0\n3 3\n0 3\n\n2 1\n4 1\n4 2\n2 2", {}, r"ring 1 crosses ring 2 at \(3, 1\) m"),
         ("0 0\n0.3 0\n0.3 0.3\n0 0.3", {}, "m between the clearances"),
         ("0 0\n3000 0\n3000 2000\n0 2000", {}, "want 0 to 500 lanes of 0.2 m"),
         ("0 0\n1 0\n1 1\n0 1", {"overlap": 0.2}, "overlap=0.2 must be < width=0.2"),
