@@ -20,6 +20,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 SHORTEST = 1e-3  # [m] of a lane
 CUT = 0.25  # of the tolerance: most that a turn around an obstacle, of 1/8, is rounded
 MOST_LANES = 500
+LEVEL = np.zeros(2)
 NEAREST_TURNS = 0.25  # of the lanes' spacing: nearer to each other, two turns are eased
 BENDS = 0.2  # [rad] from which on a corner is a turn
 EASE = 3.0  # times as long as two turns are apart is what is left out of a lane to ease them: 18°
@@ -43,6 +44,14 @@ class Lanes(ThroughPoints):
     )
     direction: float = parameter(0.0, "rad", "of the lanes, anticlockwise from x")
     edges: bool = parameter(True, "", "a lane along each edge, too, for what lanes' ends leave")
+    descent: float = parameter(
+        1.0,
+        "",
+        "times as far as it is counts what the way between two lanes goes down, against y: more "
+        "for climbers whose turns scrub, which sag where they turn from down to level",
+        at_least=1,
+        at_most=100,
+    )
     dwell: float = parameter(0.0, "s", "rest where each lane but the first begins", at_least=0)
     start_x: float = parameter(0.0, "m", "begin at the end of a lane that is nearest to this x")
     start_y: float = parameter(0.0, "m", "begin at the end of a lane that is nearest to this y")
@@ -77,7 +86,8 @@ class Lanes(ThroughPoints):
         start = turned(np.array([self.start_x, self.start_y]), -self.direction)
         try:
             lanes = lanes_of(area, self.width - self.overlap, self.edges)
-            places, begins = joined(area, lanes, start)
+            up = (self.descent - 1) * turned(np.array([0.0, 1.0]), -self.direction)
+            places, begins = joined(area, lanes, start, up)
             places = eased(area, places, NEAREST_TURNS * (self.width - self.overlap))
             return turned(places, self.direction), begins
         except ValueError as error:
@@ -125,16 +135,17 @@ def _heights(fixed: Array, spacing: float) -> list[float]:
     return found
 
 
-def joined(area: Area, lanes: Array, start: Array) -> tuple[Array, list[int]]:
+def joined(area: Area, lanes: Array, start: Array, up: Array = LEVEL) -> tuple[Array, list[int]]:
     """Places (n, 2) [m] of a way along all lanes, which begins at the end nearest to `start`.
 
-    And the numbers of the places at which lanes begin, from 0.
+    And the numbers of the places at which lanes begin, from 0. What it goes down between them,
+    against a vector `up` (2,), counts by that much more.
     """
     from scipy.sparse.csgraph import dijkstra  # slow to import: where it is needed only
 
     ends = lanes.reshape(-1, 2)
     places = np.concatenate([ends, area.corners])
-    apart = _apart(area, places)
+    apart = _apart(area, places, up)
     left = np.ones(len(ends), bool)
     at = int(np.hypot(*(ends - start).T).argmin())
     way: list[int] = []
@@ -201,12 +212,13 @@ def _near_turns(way: Array, nearest: float) -> int:
     return int(np.sum(np.diff(along[turn > BENDS]) < nearest))
 
 
-def _apart(area: Area, places: Array) -> Array:
+def _apart(area: Area, places: Array, up: Array) -> Array:
     """Distances (n, n) [m] of places between which the way is straight; 0: not straight."""
     apart = np.zeros((len(places), len(places)))
     for i, place in enumerate(places):
         sees = area.is_clear(place, places)
-        apart[i, sees] = np.hypot(*(places[sees] - place).T)
+        way = places[sees] - place
+        apart[i, sees] = np.hypot(*way.T) + np.maximum(-way @ up, 0.0)
     return apart
 
 

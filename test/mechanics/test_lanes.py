@@ -174,6 +174,21 @@ def test_it_begins_at_the_corner_that_is_nearest(tmp_path):
         assert np.hypot(*(lanes.given()[0] - [x, y])) <= 0.3
 
 
+def test_where_the_way_down_counts_more_it_goes_up_from_lane_to_lane(tmp_path):
+    """No turn from down to level is left, in which a climber whose turns scrub would sag."""
+    descended = []
+    for direction in (0.0, np.pi):
+        lanes = made(tmp_path, FACADE.read_text(), direction=direction, descent=4.0)
+        legs = np.diff(lanes.given(), axis=0)
+        legs = legs[np.hypot(*legs.T) > 1e-3]
+        slope = legs[:, 1] / np.hypot(*legs.T)
+        turns = np.abs(np.sum(legs[1:] * legs[:-1], axis=1)) < 0.1 * np.prod(
+            np.hypot(*np.stack([legs[1:], legs[:-1]]).T), axis=1
+        )
+        descended.append(np.sum((slope[:-1] < -0.9) & (np.abs(slope[1:]) < 0.1) & turns))
+    assert descended == [0, 0]
+
+
 def test_every_lane_is_driven_whole_from_end_to_end():
     area = Area((np.array([[0, 0], [3, 0], [3, 2], [0, 2.0]]),), 0.2)
     lanes = lanes_of(area, 0.2, edges=True)
