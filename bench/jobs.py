@@ -106,15 +106,14 @@ def torques(climber: Any, jump: float | None) -> Iterator[Found]:
 CLEARANCE = 0.2  # [m] that it is to keep
 BY_LANES = {
     "lanes.clearance": CLEARANCE + 0.006,
-    "lanes.tolerance": 0.008,
     "lanes.max_acceleration": 0.1,
     "lanes.descent": 4.0,
     "lanes.reversal_angle": 0.6,
 }
 IN_LANES = {
     "observer.side_slip_bandwidth": 0.0,
-    "guidance.fade_speed": 0.02,
-    "guidance.turn_radius": 0.04,
+    "guidance.fade_speed": 0.01,
+    "guidance.turn_radius": 0.02,
 }
 
 
@@ -133,7 +132,9 @@ def lanes(_: argparse.Namespace) -> Iterator[Found]:
     short = CLEARANCE - distance(places[::4], area).min()
     yield Found("nearer to an edge than the clearance", 1e3 * short, 2, "mm")
     yield Found("covered", 100 * covered(area, places[::4], shape.width), 99, "%", True)
-    yield from torques(climber, None)
+    other = sum(mode is not Mode.FOLLOWING for mode in climber.modes)
+    yield Found("periods of another mode", other, 0, "")
+    yield from torques(climber, 0.4)
 
 
 def paths(options: argparse.Namespace) -> Iterator[Found]:

@@ -114,7 +114,9 @@ class MujocoDriver(ClimberNode):
         values, names = getattr(message, self.obeyed), self.names
         fields = reading.JointFields(*divmod(stamp, SECOND), values, message.name)
         wheels = names.left_wheel_joint, names.right_wheel_joint
-        return reading.wheel_torques(fields, *wheels, self.obeyed)
+        return reading.wheel_torques(
+            fields, *wheels, "velocities" if self.obeyed == "velocity" else "efforts"
+        )
 
     def follow_clock(self) -> None:
         """Let the time pass that has passed on the wall clock."""

@@ -7,7 +7,7 @@ Stamps are integers in nanoseconds. Messages have wheels by name; arrays have (r
 import math
 from collections.abc import Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -126,7 +126,10 @@ def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motio
 
 
 def wheel_torques(
-    fields: JointFields, left_joint: str, right_joint: str, what: str = "efforts"
+    fields: JointFields,
+    left_joint: str,
+    right_joint: str,
+    what: Literal["efforts", "velocities"] = "efforts",
 ) -> Torques:
     """Torques [N m] of the sides, or their rates [rad/s]: `what` the fields' values are.
 

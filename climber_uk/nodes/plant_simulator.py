@@ -161,8 +161,9 @@ class PlantSimulator(ClimberNode):
             if self.exclusive:
                 self.check_alone(TORQUES)
             wheels = names.left_wheel_joint, names.right_wheel_joint
-            what = "velocities" if self.take_speeds else "efforts"
-            told = reading.wheel_torques(fields, *wheels, what)
+            told = reading.wheel_torques(
+                fields, *wheels, "velocities" if self.take_speeds else "efforts"
+            )
             self.report(TORQUES, "")
         except ValueError as error:
             self.report(TORQUES, f"refused, {self.instead} instead", str(error))
