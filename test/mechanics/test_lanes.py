@@ -100,8 +100,9 @@ def some_area(random):
     """Corners of a rectangle, a polygon, an L, or a rectangle with a square or a polygon in it."""
     kind, (w, h) = random.integers(5), random.uniform(1, 4, 2)
     if kind == 1:
-        angles = np.sort(random.uniform(0, 2 * np.pi, random.integers(4, 9)))
-        return [np.c_[np.cos(angles), np.sin(angles)] * random.uniform(1, 2, (len(angles), 1))]
+        number = random.integers(4, 9)
+        angles = 2 * np.pi / number * (np.arange(number) + random.uniform(0, 0.8, number))
+        return [np.c_[np.cos(angles), np.sin(angles)] * random.uniform(1, 2, (number, 1))]
     if kind == 2:
         u, v = random.uniform(0.4, 0.8, 2) * (w, h)
         return [[(0, 0), (w, 0), (w, v), (u, v), (u, h), (0, h)]]
@@ -129,10 +130,12 @@ def test_of_any_area_the_lanes_cover_it_keep_clear_and_have_no_zigzag(seed, tmp_
     width, overlap = random.choice([0.15, 0.2, 0.3]), random.choice([0.0, 0.05])
     direction = random.choice([0.0, np.pi / 2, random.uniform(-3, 3)])
     lanes = made(tmp_path, text, width=width, overlap=overlap, direction=direction)
-    path, area = Polyline.through(lanes.given(), lanes), read_area(lanes.area, lanes.clearance)
+    # what is kept clear of, so that corners that are rounded do as well: a raster's row beyond
+    # may be 1 % of a small area
+    path, area = Polyline.through(lanes.given(), lanes), read_area(lanes.area, 0.2 + TOLERANCE / 4)
     places = path.derivatives(np.linspace(0, path.length, 10_001))[0]
     assert distance(places[::3], area).min() >= lanes.clearance - 1e-4
-    assert covered(area, places, lanes.width) >= 0.99
+    assert covered(area, places, width) >= 0.99
     assert nearest_turns(lanes.given()) >= (width - overlap) / 4
 
 
