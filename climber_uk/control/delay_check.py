@@ -18,7 +18,7 @@ LATE = 0.06, 0.08, 0.1, 0.14, 0.2  # [s] that it does not
 MEMORY = 0.15  # [s] in which a difference is forgotten
 EXCITED = 0.03  # of the largest force: standard deviation of what no delay leaves unexplained
 UNEXPLAINED = 4.0  # times as much is unexplained with any delay that is borne as with a longer one
-IN_A_ROW = 2  # odometry messages
+IN_A_ROW = 3  # odometry messages
 
 
 class Axis:
