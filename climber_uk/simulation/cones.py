@@ -17,9 +17,10 @@ from climber_uk.mechanics import Array
 MAX_SWEEPS = 5000  # a few suffice, unless contacts only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
 FEW = 4  # contacts, for which sweeps alone are faster
-NEAR = 1e-3, 1e-6, 1e-9, 1e-12  # [m/s] of sliding, below which friction is taken for viscous
+EPSILONS = 1e-3, 1e-6, 1e-9, 1e-12  # [m/s] of sliding, below which friction is taken for viscous
 STICKING = 100.0  # times the smallest of these
 MAX_STEPS = 40  # of Newton's method, with each of these
+FEW_STEPS = 10  # with the smallest at once, which take 3 as a rule
 SMALLEST = 1e-90  # [N s] of an impulse, below which it counts as 0: its cube still is a number
 
 
@@ -31,14 +32,15 @@ class Cone(NamedTuple):
 
 
 def solve_friction_impulses(
-    velocity: Array, lightness: Array, cones: list[Cone]
+    velocity: Array, lightness: Array, cones: list[Cone], start: Array
 ) -> tuple[Array, list[bool]]:
     """ν⁺ (n,) from ν = `velocity` (n,) and `lightness`, the diagonal (n,) of M⁻¹.
 
-    And for each cone whether its contact sticks.
+    And for each cone whether its contact sticks. `start` (n,) is a guess of ν⁺, as that of
+    the step before; it decides how soon ν⁺ is found, not what it is.
     """
     if len(cones) > FEW and lightness.all():
-        found = _by_newton(velocity, 1 / lightness, cones)
+        found = _by_newton(velocity, 1 / lightness, cones, start)
         if found is not None:
             return found
     velocity = velocity.copy()
@@ -66,40 +68,61 @@ def solve_friction_impulses(
 
 
 def _by_newton(
-    velocity: Array, masses: Array, cones: list[Cone]
+    velocity: Array, masses: Array, cones: list[Cone], start: Array
 ) -> tuple[Array, list[bool]] | None:
-    """The same, with √(s² + ε²) in the place of |s| and ε shrinking by `NEAR`; None: not found.
+    """The same, with √(s² + ε²) in the place of |s|; None: not found.
 
-    Newton's method on ν, and on the directions w = s/√(s² + ε²) as unknowns of their own (Chan,
-    Golub & Mulet 1999): so it takes few steps where contacts stick, too.
+    With the smallest ε at once from `start`, where contacts mostly stick or slide as they did; else
+    with one after the other of `EPSILONS`. The directions w = s/√(s² + ε²) are unknowns of their
+    own beside ν (Chan, Golub & Mulet 1999): so it takes few steps where contacts stick, too.
     """
     limits = np.array([cone.limit for cone in cones])
     rows = np.zeros((len(cones), max(len(cone.rows) for cone in cones), len(velocity)))
     for number, cone in enumerate(cones):
         rows[number, : len(cone.rows)] = cone.rows
+    problem = velocity, np.diag(masses), limits, rows
+    sliding = rows @ start
+    directions = sliding / np.sqrt((sliding**2).sum(axis=1) + EPSILONS[1] ** 2)[:, None]
+    found = _newton(*problem, EPSILONS[-1], start, directions, FEW_STEPS)
+    if found is None:
+        found = velocity, np.zeros(rows.shape[:2])
+        for epsilon in EPSILONS:
+            found = _newton(*problem, epsilon, *found, MAX_STEPS)
+            if found is None:
+                return None
+    sliding = rows @ found[0]
+    return found[0], (np.sqrt((sliding**2).sum(axis=1)) < STICKING * EPSILONS[-1]).tolist()
+
+
+def _newton(
+    velocity: Array,
+    masses: Array,
+    limits: Array,
+    rows: Array,
+    epsilon: float,
+    found: Array,
+    directions: Array,
+    max_steps: int,
+) -> tuple[Array, Array] | None:
+    """ν⁺ (n,) and directions (contacts, k) for one ε, beginning with `found` and `directions`."""
     flat = rows.reshape(-1, len(velocity))
-    found, directions = velocity, np.zeros(rows.shape[:2])
-    for near in NEAR:
-        for _ in range(MAX_STEPS):
-            s = rows @ found
-            size = np.sqrt((s * s).sum(axis=1) + near * near)
-            pull = limits / size  # impulse per sliding
-            weighed = (pull[:, None, None] * rows).reshape(flat.shape)
-            turned = (s[:, None, :] @ rows)[:, 0]
-            held = ((pull / size)[:, None, None] * directions[:, None, :] @ rows)[:, 0]
-            curvature = flat.T @ weighed - (turned.T @ held + held.T @ turned) / 2
-            curvature += np.diag(masses)
-            step = np.linalg.solve(curvature, masses * (velocity - found) - weighed.T @ s.ravel())
-            slid = rows @ step
-            along = (s * slid).sum(axis=1) / size
-            change = (s + slid - directions * along[:, None]) / size[:, None] - directions
-            found, directions = found + step, directions + change
-            directions /= np.maximum(1.0, np.sqrt((directions**2).sum(axis=1)))[:, None]
-            if np.abs(step).max() <= UNCHANGED + near / 1e6:
-                break
-        else:
-            return None
-    return found, (np.sqrt(((rows @ found) ** 2).sum(axis=1)) < STICKING * NEAR[-1]).tolist()
+    for _ in range(max_steps):
+        s = rows @ found
+        size = np.sqrt((s * s).sum(axis=1) + epsilon * epsilon)
+        pull = limits / size  # impulse per sliding
+        weighed = (pull[:, None, None] * rows).reshape(flat.shape)
+        turned = (s[:, None, :] @ rows)[:, 0]
+        held = ((pull / size)[:, None, None] * directions[:, None, :] @ rows)[:, 0]
+        curvature = masses + flat.T @ weighed - (turned.T @ held + held.T @ turned) / 2
+        step = np.linalg.solve(curvature, masses @ (velocity - found) - weighed.T @ s.ravel())
+        slid = rows @ step
+        along = (s * slid).sum(axis=1) / size
+        change = (s + slid - directions * along[:, None]) / size[:, None] - directions
+        found, directions = found + step, directions + change
+        directions /= np.maximum(1.0, np.sqrt((directions**2).sum(axis=1)))[:, None]
+        if np.abs(step).max() <= UNCHANGED + epsilon / 1e6:
+            return found, directions
+    return None
 
 
 def impulse_against(sliding: Array, W: Array, limit: float) -> Array:

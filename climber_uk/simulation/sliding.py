@@ -9,7 +9,7 @@ order in the step, against four while nothing changes; so steps are short, and t
 """
 
 import math
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -92,18 +92,20 @@ class ContactStepper:
         cosine, sine = math.cos(middle), math.sin(middle)
         v, rolls = v_x * cosine + v_y * sine, forward_speed(y)
         u = v_y * cosine - v_x * sine if self.slip else 0.0
-        sliding = np.array([v, u, self.body.contact.grip.seal_radius * omega])
+        before = np.array([v, u, omega])
+        sliding = before * [1.0, 1.0, self._radius]
 
         f_x, f_y = self.body.outside(x, height, inputs)
         pull = np.array([f_x * cosine + f_y * sine, f_y * cosine - f_x * sine, inputs.push_moment])
         against, drag = self._smooth_friction(sliding, np.array(deflection), h)
         masses = np.array([self.mass, self.mass, self.yaw_inertia])
-        free = masses * [v, u, omega] + h * (pull - against)
+        free = masses * before + h * (pull - against)
         if self.slip:
             yaw_force = inputs.moment / d
             forces = np.array([inputs.force + yaw_force, inputs.force - yaw_force]) / 2
             rims = slip + np.array([rolls + d * omega, rolls - d * omega])
             free = np.concatenate([free, self.rim * rims + h * forces])
+            before = np.concatenate([before, rims])
             masses = np.concatenate([masses + h * drag, [self.rim, self.rim]])
             lightness = 1 / masses
         else:
@@ -112,7 +114,7 @@ class ContactStepper:
             free[1] = lightness[1] = 0.0
         cones = self._wheel_cones(h * load, h * pull, lightness) if self.slip else []
         cones += self._other_cones(load, float(np.linalg.norm(sliding)), h)
-        velocities, sticks = solve_friction_impulses(free * lightness, lightness, cones)
+        velocities, sticks = solve_friction_impulses(free * lightness, lightness, cones, before)
         v, u, omega = self._velocities(velocities[:3], sticks)
 
         deflection_1 = self._deflected(
@@ -182,12 +184,7 @@ class ContactStepper:
         for side, rim, side_load in ((d, 3, sides[0]), (-d, 4, sides[1])):
             for x in ahead:
                 foot_load = max(0.0, side_load / len(ahead) + pitch * x)
-                rows = np.zeros((2, 5))
-                rows[0, [0, 2, rim]] = 1.0, side, -1.0
-                rows[1, [1, 2]] = across, across * x
-                if x != 0:
-                    _, axes = np.linalg.eigh(rows * lightness @ rows.T)
-                    rows = axes.T @ rows
+                rows = _foot_rows(side, rim, x, across, *lightness.tolist())
                 cones.append(Cone(rows, along * foot_load))
         return cones
 
@@ -236,3 +233,15 @@ class ContactStepper:
         heading, end = float(y[2]), y.copy()
         end[3:6] = v * math.cos(heading), v * math.sin(heading), omega
         return end, np.zeros(2)
+
+
+@lru_cache(maxsize=64)
+def _foot_rows(side: float, rim: int, x: float, across: float, *lightness: float) -> Array:
+    """H (2, 5) of a wheel `x` [m] ahead of the axle, such that H M⁻¹ Hᵀ is diagonal."""
+    rows = np.zeros((2, 5))
+    rows[0, [0, 2, rim]] = 1.0, side, -1.0
+    rows[1, [1, 2]] = across, across * x
+    if x != 0:
+        _, axes = np.linalg.eigh(rows * lightness @ rows.T)
+        rows = axes.T @ rows
+    return rows

@@ -15,10 +15,10 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("fastest", [0.2, 6.0])
 def test_what_is_compiled_is_what_it_was_compiled_from(fastest):
-    random, number = np.random.default_rng(3), 600  # more than a block
+    random, number = np.random.default_rng(3), 540  # more than a block
     masses = random.uniform(4, 6, number)
     body, motion = UnicycleModel.of(replace(PAPER, mass=masses)), many_starts(number, fastest)
-    for _ in range(60):
+    for _ in range(30):
         wrench = Wrench(*PAPER.wrench(*wheels(random, motion)))
         expected = unicycle.advanced_often(body, motion, wrench, 0.0025, 2)
         motion = compiled.advanced(body, motion, wrench, 0.0025, 2)

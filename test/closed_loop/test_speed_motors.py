@@ -92,7 +92,11 @@ def test_climber_yaml_differs_in_its_motors_only():
         assert other.keys() <= this.keys()
 
 
-@pytest.mark.parametrize("path", [SMALL, FORTH_AND_BACK], ids=["eight", "forth and back"])
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(SMALL, marks=pytest.mark.soak), FORTH_AND_BACK],
+    ids=["eight", "forth and back"],
+)
 def test_a_servo_in_steps_of_a_millimetre_a_second_follows(path):
     run, told = drive(SERVO, path)
     assert run.rms() < 1e-3
@@ -101,7 +105,11 @@ def test_a_servo_in_steps_of_a_millimetre_a_second_follows(path):
     assert at_rest < 1e-6
 
 
-@pytest.mark.parametrize("path", [SMALL, FORTH_AND_BACK], ids=["eight", "forth and back"])
+@pytest.mark.parametrize(
+    "path",
+    [SMALL, pytest.param(FORTH_AND_BACK, marks=pytest.mark.soak)],
+    ids=["eight", "forth and back"],
+)
 def test_a_dead_band_costs_millimetres_and_makes_no_servo_hunt(path):
     run, told = drive(DEAD_BAND, path)
     assert run.rms() < 3e-3
@@ -115,9 +123,9 @@ def test_a_dead_band_costs_millimetres_and_makes_no_servo_hunt(path):
     [
         pytest.param(replace(SERVO, servo_time_constant=0.0), INNER, marks=pytest.mark.soak),
         pytest.param(replace(SERVO, servo_time_constant=0.01), INNER, marks=pytest.mark.soak),
-        (replace(SERVO, servo_time_constant=0.04), INNER),
+        pytest.param(replace(SERVO, servo_time_constant=0.04), INNER, marks=pytest.mark.soak),
         pytest.param(SERVO, replace(INNER, delay=0.02), marks=pytest.mark.soak),
-        (SERVO, replace(INNER, period=0.02)),
+        pytest.param(SERVO, replace(INNER, period=0.02), marks=pytest.mark.soak),
         (DEAD_BAND, replace(INNER, delay=0.005, sensors=ENCODERS)),
     ],
     ids=["at once", "10 ms", "40 ms", "20 ms of delay", "50 Hz", "encoders"],
@@ -127,7 +135,11 @@ def test_a_servo_that_is_other_than_told_is_learnt(servo, link):
     assert run.rms() < 3e-3
 
 
-@pytest.mark.parametrize("change", [{"mass": 7.0}, {"seal_friction_coefficient": 0.1}], ids=str)
+@pytest.mark.parametrize(
+    "change",
+    [{"mass": 7.0}, pytest.param({"seal_friction_coefficient": 0.1}, marks=pytest.mark.soak)],
+    ids=str,
+)
 def test_what_it_carries_and_rubs_against_is_the_servos_business(change):
     run, _ = drive(SERVO, truth=lambda climber: replace(climber, **change))
     assert run.rms() < 1e-3

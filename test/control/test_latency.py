@@ -39,7 +39,11 @@ def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, *
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("guidance", [BUILT.guidance, Guidance()], ids=["climber.yaml", "defaults"])
+@pytest.mark.parametrize(
+    "guidance",
+    [BUILT.guidance, pytest.param(Guidance(), marks=pytest.mark.soak)],
+    ids=["climber.yaml", "defaults"],
+)
 @pytest.mark.parametrize(
     "link",
     [
@@ -77,7 +81,7 @@ def test_a_model_that_is_wrong_as_well_ends_in_no_limit_cycle(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.03, 0.04])
+@pytest.mark.parametrize("delay", [pytest.param(0.03, marks=pytest.mark.soak), 0.04])
 def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
     run, estimator = drive(Link(delay=delay), duration=15.0)
     assert run.rms() < 5e-3

@@ -92,14 +92,16 @@ def is_never_stopped(climb, most):
 
 
 @pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("friction", [0.4, 0.7, 1.3, 1.5])
+@pytest.mark.parametrize(
+    "friction", [0.4, *(pytest.param(it, marks=pytest.mark.soak) for it in (0.7, 1.3)), 1.5]
+)
 def test_friction_that_is_another_stops_no_slow_loop_that_turns_back(
     path, friction, tmp_path_factory
 ):
     is_never_stopped(climbed(path, Odd(friction), tmp_path_factory, is_slow=True), 0.15)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
     path=some.sampled_from(sorted(PATHS)),
     friction=some.floats(0.4, 1.6),
@@ -113,7 +115,13 @@ def test_nothing_unknown_stops_a_climber_that_turns_back(
 
 
 @pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("odd", [Odd(mass=0.8, rolling=8.0), Odd(mass=1.2, push=(10.0, -10.0))])
+@pytest.mark.parametrize(
+    "odd",
+    [
+        pytest.param(Odd(mass=0.8, rolling=8.0), marks=pytest.mark.soak),
+        Odd(mass=1.2, push=(10.0, -10.0)),
+    ],
+)
 def test_nor_one_without_a_seal(path, odd, tmp_path_factory):
     is_never_stopped(climbed(path, odd, tmp_path_factory, **MAGNETIC), 0.1)
 

@@ -94,11 +94,10 @@ def drive(trajectory, duration, constraints=GAINS, observer=None, **slip):
 @pytest.mark.parametrize(
     ("creep", "resistance"),
     [
-        (-0.03, 0.0),
         (0.03, 30.0),
         *(
             pytest.param(*it, marks=pytest.mark.soak)
-            for it in [(0.0, 0.0), (0.03, 0.0), (-0.03, 30.0), (0.0, 30.0)]
+            for it in [(0.0, 0.0), (0.03, 0.0), (-0.03, 0.0), (-0.03, 30.0), (0.0, 30.0)]
         ),
     ],
 )

@@ -13,7 +13,7 @@ OPTIONS, STEP = LocalizationOptions(), 0.005
 METRES = st.floats(-3, 3)
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(x=METRES, y=METRES, heading=METRES)
 def test_the_output_follows_a_correction_no_faster_than_it_may_and_arrives(x, y, heading):
     smoothing, jump = Smoothing(OPTIONS), np.array([x, y, heading])

@@ -71,9 +71,9 @@ def runs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper_bags(runs):
-    """A lap and a bit, and its first 3 s again."""
+    """5 s of a lap, and its first 2 s again."""
     bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
-    for bag, duration in zip(bags, ["10", "3"], strict=True):
+    for bag, duration in zip(bags, ["5", "2"], strict=True):
         demo(runs, bag.parent, "paper.yaml", "--duration", duration)
         hold_up_the_recorder(runs)
         finished(runs)
@@ -125,7 +125,7 @@ def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay)
 def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(paper_bags):
     bags = paper_bags
     run = read_run(bags[0])
-    assert run.time[-1] >= 10.0
+    assert run.time[-1] >= 5.0
     assert len(run.time) == round(run.time[-1] * 200) + 1  # not one is missing
     assert np.sqrt(np.mean(run.distance**2)) <= 0.05e-3
     assert run.distance.max() <= 0.15e-3
@@ -141,7 +141,7 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
     }.items():
         first, second = (by_stamp(bag, topic, content) for bag in bags)
         common = sorted(first.keys() & second.keys())
-        assert len(common) >= 600
+        assert len(common) >= 400
         assert all(first[stamp] == second[stamp] for stamp in common)
 
 
@@ -177,7 +177,7 @@ def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_it
 
 
 def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):
-    for bag, answers in ((paper_bags[0], 1990), (climber_bag, 2790)):
+    for bag, answers in ((paper_bags[0], 990), (climber_bag, 2790)):
         numbers = replay(bag, "--fail-above", "1e-9")
         odometry, torques = (set(by_stamp(bag, of, str)) for of in ("/odom", "/wheel_torques"))
         # the recorder may end between the last odometries and their answers

@@ -90,7 +90,7 @@ ASKED = st.lists(
 )
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(ASKED, st.floats(0.0, 10.0))
 def test_its_points_go_on_from_each_other_and_speed_up_no_harder_than_planned(asked, begin):
     """What is near is not taken back; the acceleration is at most half again that of the law."""

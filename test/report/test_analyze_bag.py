@@ -177,7 +177,7 @@ def test_bags_are_compared_side_by_side_with_ratios(bags, run, tmp_path):
     assert "second / first" in page
 
 
-@pytest.mark.parametrize("name", ["=1+1", "@x"])
+@pytest.mark.parametrize("name", ["=1+1", pytest.param("@x", marks=pytest.mark.soak)])
 def test_no_name_becomes_a_formula_in_a_spreadsheet_and_numbers_stay_numbers(run, tmp_path, name):
     made = a_run(200, torques=lambda time, _: np.full((len(time), 2), -2.0))
     made.add_joints(rates=[1.0, 1.0], torques=[-3.0, -3.0])
@@ -260,7 +260,7 @@ def test_help_says_what_the_exit_status_means(run, command):
     assert "exit status" in " ".join(out)
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("unbuffered", ["", pytest.param("1", marks=pytest.mark.soak)])
 def test_a_reader_that_leaves_takes_neither_files_nor_status_away(bags, tmp_path, unbuffered):
     command = f"{sys.executable} -m climber_uk.report.analyze_bag {bags}/first -o {tmp_path}"
     ran = subprocess.run(

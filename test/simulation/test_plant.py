@@ -60,7 +60,7 @@ def test_random_torques_move_it_as_the_reduced_equations_say(seed, climber):
     random = np.random.default_rng(seed)
     plant = Plant(climber, 0.001)
     state = oracle = State.rolling(np.array([0.0, 6.0, 0.3]), 6.0, -0.6)
-    for _ in range(200):
+    for _ in range(80):
         torques = random_drive(random, state)
         state = plant.advance(state, torques, steps=100)
         oracle = reduced(climber, oracle, torques, 0.1)
@@ -110,10 +110,10 @@ def test_wheels_that_may_slip_and_do_not_turn_the_same_rotors():
         np.testing.assert_allclose(states[0].velocity, states[1].velocity, atol=1e-5)
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.7, np.pi / 2, -np.pi / 2, 3.0])
+@pytest.mark.parametrize("heading", [0.0, -np.pi / 2, 3.0])
 def test_friction_holds_the_climber_still_on_the_vertical_wall(heading):
     start = State(np.array([0.0, 6.0, heading]), np.zeros(3))
-    end = Plant(PAPER, 0.0025).advance(start, np.zeros(2), steps=24_000)  # 60 s
+    end = Plant(PAPER, 0.0025).advance(start, np.zeros(2), steps=8_000)  # 20 s
     assert np.abs(end.pose - start.pose).max() < 1e-9
     assert not end.velocity.any()
 
@@ -259,7 +259,7 @@ def test_it_stays_where_it_is_with_whatever_sticks(friction, options):
     )
     start = State(np.array([0.0, 6.0, 0.7]), np.zeros(3))
     plant = Plant(PAPER, 0.005, contact, slip=options.get("slip", False))
-    end = plant.advance(start, np.zeros(2), steps=12_000)  # 60 s
+    end = plant.advance(start, np.zeros(2), steps=2_000)  # 10 s
     assert np.abs(end.pose - start.pose).max() < 1e-9
     assert not end.velocity.any()
 
@@ -297,6 +297,7 @@ BALANCES = {
     "tilted": Plant(PAPER, FINE, wall=Plane(tilt=30.0)),
     "gripping": Plant(PAPER, FINE, Contact(grip=Grip(100.0)), slip=True),
 }
+OFTEN = "stribeck", "lugre", "pipe", "gripping"  # the others for soak
 
 
 def friction_power(plant, state):
@@ -321,7 +322,10 @@ def energy(plant, state):
 
 
 @pytest.mark.parametrize("seconds", [20, pytest.param(60, marks=pytest.mark.soak)])
-@pytest.mark.parametrize("name", BALANCES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in OFTEN else pytest.mark.soak) for name in BALANCES],
+)
 def test_over_some_random_driving_not_a_millionth_of_the_energy_is_lost(name, seconds):
     plant, random = BALANCES[name], np.random.default_rng(5)
     climber, state = plant.climber, State(np.array([0.0, 6.0, 0.3]), np.zeros(3))
@@ -351,14 +355,14 @@ def test_with_friction_enough_slip_mode_is_the_plant_that_does_not_slip():
     start = trajectory.at(0.0)
     rolling = slipping = State(start.pose, start.velocity)
     firm, loose = Plant(PAPER, step), Plant(PAPER, step, Contact(grip=Grip(5.0)), slip=True)
-    for number in range(4000):
+    for number in range(1000):
         now = trajectory.at((number + 0.5) * step)
         drive = 5 * now.forward_acceleration + PAPER.seal_friction + 49.05 * np.sin(now.heading)
         torques = PAPER.wheel_torques(drive, 0.33 * now.acceleration[2])
         rolling = firm.advance(rolling, torques, 1)
         slipping = loose.advance(slipping, torques, 1)
     assert np.abs(rolling.pose - slipping.pose).max() < 1e-6
-    assert np.hypot(*(rolling.pose - trajectory.at(20.0).pose)[:2]) < 0.1  # it was the ellipse
+    assert np.hypot(*(rolling.pose - trajectory.at(5.0).pose)[:2]) < 0.1  # it was the ellipse
 
 
 @settings(max_examples=40, deadline=None)
