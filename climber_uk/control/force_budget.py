@@ -25,7 +25,8 @@ TRIED = 2  # pushes, from which on a climber off its path is stalled
 SPENT = 0.8  # of it, from which it is used up
 FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing drives
 HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
-LATE = 0.035  # [s] into a pause, from which on a motion that begins comes too late
+MOVES_NOTHING = 0.85  # of it, up to which a push surely has ended
+LATE = 0.035  # [s] after a push has ended, from which on a motion that begins comes too late
 MEMORY = 0.1  # [s] in which friction is learnt
 CREEPS = 1e-3  # [m/s] of a motion that pose and twist tell alike, from which on it is one
 KNOWN = 0.2  # [s] of sliding, after which it is known
@@ -54,6 +55,7 @@ class ForceBudget:
         self._astray = 0.0  # [rad] that its heading may be off
         self.pushes = 0  # without an answer
         self.paused: float | None = None  # [s] for which nothing drives
+        self._still = 0.0  # [s] for which it rests after a push, as far as its torques tell
         self._wanted, self._allowed = 0.0, math.inf  # [m/s]
         self._lives = False  # odometry, that has changed at all since the first push
         self._most_pushes = PUSHES
@@ -96,16 +98,17 @@ class ForceBudget:
 
     def _slide(self, climber: Climber, observed: Observed) -> Trouble | None:
         before, after, time = observed.before, observed.after, observed.time
-        late = self.paused
+        push = _push(climber, observed.torques, _weight(climber, observed))
+        holds = self._holds(climber)
+        is_late = self._rests and self.pushes > 0 and _ends(climber, push, holds)
         if self._rests:
             self._rests, self.paused, self._slid, self.pushes = False, None, 0.0, self.pushes // 2
         self._slid += time
-        resists = _push(climber, observed.torques, _weight(climber, observed))
-        resists -= climber.driven_mass * (after.speed - before.speed) / time
+        resists = push - climber.driven_mass * (after.speed - before.speed) / time
         new = max(1 - math.exp(-time / MEMORY), time / self._slid)
         self._friction += new * (math.copysign(1.0, after.speed) * resists - self._friction)
-        if late is not None and late > LATE + observed.reaction:
-            return Mode.LATE, f"it moves {late:.2f} s after a push has ended"
+        if is_late and self._still > LATE + observed.reaction:
+            return Mode.LATE, f"it moves {self._still:.2f} s after a push has ended"
         return None
 
     def _rest(self, climber: Climber, observed: Observed) -> Trouble | None:
@@ -113,17 +116,21 @@ class ForceBudget:
         if not self._rests:
             self._friction *= self._slid > KNOWN
             self._rests, self.speed, self.turn, self._astray = True, before.speed, 0.0, 0.0
-            self._lives = False
+            self._lives, self._still = False, 0.0
             stops = self._wanted > STOPPED and self._slid > KNOWN
             self._most_pushes = STOPPED_PUSHES if stops else PUSHES
-        elif self.pushes and after[:3] != before[:3]:
+        elif self.pushes and after[:3] != before[:3] and not self._lives:
             self._lives = True
-        if self._is_told:
-            self.speed, self.turn = before.speed, climber.half_track * after.yaw_rate
-            return None
+            if self._still > LATE + observed.reaction:
+                self.paused = 0.0  # is it what that push did? See what it becomes
         push = _push(climber, observed.torques, _weight(climber, observed))
         holds = self._holds(climber)
         self.speed = _rolled(self.speed, push, holds, time / climber.driven_mass)
+        ends = self.speed == 0 and _ends(climber, push, holds)
+        self._still = self._still + time if ends else 0.0
+        if self._is_told:
+            self.speed, self.turn = before.speed, climber.half_track * after.yaw_rate
+            return None
         _, moment = climber.wrench(*observed.torques)
         holds = BREAKS_LOOSE * self._scrubs
         self.turn = _rolled(self.turn, moment, holds, time * _rims(climber))
@@ -191,6 +198,11 @@ class ForceBudget:
         holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
         lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
         return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))
+
+
+def _ends(climber: Climber, push: float, holds: float) -> bool:
+    """Whether a push surely moves nothing, of which friction `holds` so much [N]."""
+    return abs(push) <= MOVES_NOTHING * min(climber.seal_friction, holds)
 
 
 def _rolled(speed: float, push: float, friction: float, by_time: float) -> float:

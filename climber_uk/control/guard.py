@@ -9,6 +9,7 @@ from collections import deque
 from typing import NamedTuple
 
 from climber_uk.control.actuator_check import ActuatorCheck
+from climber_uk.control.delay_check import LATE, DelayCheck
 from climber_uk.control.estimator import Observed
 from climber_uk.control.force_budget import ForceBudget
 from climber_uk.control.model import DisturbanceEstimate
@@ -32,6 +33,7 @@ LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may 
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
 PROOF_IF_TOO_FAST = 0.4  # of that of a dead wheel is enough where it is too fast as well
 RIM_REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests, by its twist and its pose
+FOR_GOOD = frozenset({Mode.DEAD_WHEEL, Mode.SIGN_WRONG, Mode.LATE})  # somebody has to look
 STALL_REST = 10  # times the rest after which a stalled climber tries again
 
 
@@ -119,6 +121,7 @@ class Guard:
         self._followed = math.inf  # [s] since the last fault
         self.faults: deque[int] = deque()  # [ns] stamps
         self._actuators, self.budget = ActuatorCheck(), ForceBudget()
+        self._delays = DelayCheck()
         self.restart()
 
     def forgive(self) -> None:
@@ -133,6 +136,7 @@ class Guard:
         self._swings = Swings(), Swings()
         self._since_rest = math.inf  # [s]
         self._actuators.restart()
+        self._delays.restart()
         self.budget.restart()
 
     def watch(self, climber: Climber, observed: Observed, expected: Expected) -> Trouble | None:
@@ -145,16 +149,25 @@ class Guard:
         own = expected.wanted.speed + turning, expected.wanted.speed - turning
         right, left = (min(slower, rim) for rim in own)
         self._actuators.add(climber, observed, self.options.response_time, (right, left))
+        late = self._watch_delay(climber, observed)
         given = self._watch_budget(climber, observed, expected)
         too_fast = self._watch_rates(climber, observed, expected)
         return (
-            self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
+            late
+            or self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
             or too_fast
             or self._watch_limit(climber, observed, expected, torques)
             or self._watch_swings(climber, observed, torques)
             or self._watch_disturbance(climber, observed.disturbance)
             or given
         )
+
+    def _watch_delay(self, climber: Climber, observed: Observed) -> Trouble | None:
+        if self.options.response_time == 0:
+            return None
+        if not self._delays.add(climber, observed):
+            return None
+        return Mode.LATE, f"by {LATE[0]} s or more, or torques act so late"
 
     def _watch_budget(
         self, climber: Climber, observed: Observed, expected: Expected
@@ -214,13 +227,12 @@ class Guard:
         motion, wanted = observed.after, expected.wanted
         largest = max(abs(torques.right), abs(torques.left))
         load = largest / climber.max_wheel_torque
-        strong = STRONG
-        if wanted.speed > MOVES:
+        strong, rim = STRONG, climber.half_track * wanted.yaw_rate
+        if wanted.speed > max(MOVES, rim):
             is_against = motion.speed * expected.speed < 0
             stands = is_against or abs(motion.speed) < STANDS * wanted.speed
-        else:  # it turns in place, or rests
-            turns = climber.half_track * wanted.yaw_rate > MOVES
-            stands = turns and abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
+        else:  # it turns, in place or in a corner, or rests
+            stands = rim > MOVES and abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
             strong = AT_LIMIT  # what scrubs may resist a turn by more than the seal does a way
         effort = 0.0
         if stands and load >= strong:
@@ -288,7 +300,8 @@ class Guard:
         """Whether it ends only by ~/enable, once the climber has been looked after."""
         many = len(self.faults) >= self.options.attempts
         is_stuck = self._is(Mode.STALLED) and self.budget.unanswered is not None
-        return many or is_stuck or self._is(Mode.DEAD_WHEEL) or self._is(Mode.SIGN_WRONG)
+        needs_somebody = self.fault is not None and self.fault[0] in FOR_GOOD
+        return many or is_stuck or needs_somebody
 
     @property
     def trouble(self) -> Trouble | None:

@@ -19,8 +19,8 @@ from climber_uk.localization.options import LocalizationOptions
 
 SOON = 0.05  # [s] T
 SLIPS = 0.02  # [m/s] G
-BREAKS_AWAY = 0.08  # [m/s] of γ, from which on gravity is not told from what wheels accelerate,
-MEMORY = 0.2  # and for as long [s] after that: the force goes through a low-pass
+BREAKS_AWAY = 0.04  # [m/s] of γ, from which on gravity is not told from what wheels accelerate,
+MEMORY = 0.4  # and for as long [s] after that: the force goes through a low-pass, and slip ebbs
 LONGEST = 1.0  # [s] for which wheels may slip
 TURNING = 0.05  # [s] of the low-pass of a turn: of noise, its size would be a turn, too
 DRAGGED = 0.1  # [m/s] about which it changes its sign what drags

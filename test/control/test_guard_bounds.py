@@ -67,6 +67,10 @@ def test_the_other_way_than_the_reference_goes_less_is_too_fast(reference, is_ag
         ({"speed": 0.021, "torques": (4.0, 4.0)}, None),  # it moves, at a tenth
         ({"speed": 0.0, "wanted": (0.0, 0.5), "torques": (4.0, -4.0)}, 4),
         ({"speed": 0.0, "wanted": (0.0, 0.5), "turn": 0.06, "torques": (4.0, -4.0)}, None),
+        # in a corner, whose inner wheel is to go backwards, it turns
+        ({"speed": 0.0, "wanted": (0.1, 0.5), "turn": 0.4, "torques": (4.0, -4.0)}, None),
+        ({"speed": 0.0, "wanted": (0.1, 0.5), "turn": 0.04, "torques": (4.0, -4.0)}, 4),
+        ({"speed": 0.0, "wanted": (0.2, 0.5), "turn": 0.4, "torques": (4.0, 4.0)}, 4),
         ({"speed": 0.0, "wanted": (0.0, 0.0), "torques": (4.0, 4.0)}, None),  # it is to rest
         ({"waits": True, "torques": (3.95, 3.95)}, 6),
         ({"waits": True, "torques": (3.9, 3.9)}, None),
