@@ -19,7 +19,6 @@ import numpy as np
 from climber_uk.closed_loop.simulate import simulate
 from climber_uk.control.build import build_controller
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.quantities import State
@@ -47,7 +46,7 @@ class Problem(NamedTuple):
 
     trajectory: Trajectory
     climber: Climber
-    attachment: Attachment
+    contact: Contact
     limits: Limits
 
 
@@ -149,7 +148,7 @@ def constant_speed(problem: Problem, ours: Trajectory) -> float:
         X = speed**2 / square
         U = -(p_1 * p_2).sum(axis=1) / square * X
         at = ours.at_progress((s, np.sqrt(X), U, 0 * s))
-        left = reserves(at, problem.climber, problem.attachment)
+        left = reserves(at, problem.climber, problem.contact)
         of = problem.limits
         bend = np.abs(speed * at.yaw_rate).max()
         holds = (left.slip >= of.margin).all() and (left.torque >= 1).all()
@@ -164,7 +163,7 @@ def in_the_plant(problem: Problem, ours: Trajectory) -> str:
     file = CONFIG / "climber.yaml"
     given = {**read_file(file, "/uk_torque_controller"), "learn_delay": False}
     controller = build_controller(Values(given), None)
-    contact = Contact(grip=problem.attachment.grip)
+    contact = Contact(grip=problem.contact.grip)
 
     def plant_of(climber: Climber, step: float) -> Plant:
         return Plant(climber, step, contact, slip=True)

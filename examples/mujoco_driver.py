@@ -71,7 +71,7 @@ class MujocoDriver(ClimberNode):
         self.climber = MujocoClimber(parts, self.options.initial_state, self.options.control_period)
         self.film = Film(self.climber, film) if film else None
         self.is_simulated, self.has_fallen = self.options.simulated_time, False
-        self.obeyed = "velocity" if parts.motors.take_speeds else "effort"
+        self.takes_speeds = parts.motors.take_speeds
         self.command = np.zeros(2)  # right, left
         self.commanded_at = 0  # [ns] of its odometry
         # a stamp of 0 would mean that there is no time yet
@@ -111,10 +111,11 @@ class MujocoDriver(ClimberNode):
 
     def fit(self, message: JointState, stamp: int) -> Torques:
         """Command of a message, torques or rates; `ValueError` if it is none."""
-        values, names = getattr(message, self.obeyed), self.names
+        values, names = message.velocity if self.takes_speeds else message.effort, self.names
         fields = reading.JointFields(*divmod(stamp, SECOND), values, message.name)
         wheels = names.left_wheel_joint, names.right_wheel_joint
-        return reading.wheel_torques(fields, *wheels, self.obeyed)
+        what: reading.Told = "velocities" if self.takes_speeds else "efforts"
+        return reading.wheel_torques(fields, *wheels, what)
 
     def follow_clock(self) -> None:
         """Let the time pass that has passed on the wall clock."""

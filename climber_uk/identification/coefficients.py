@@ -5,7 +5,7 @@ a = (1/(m' r), μ/m', c/m', m/m' - 1)   b = (d/(J' r), C/J', D/J')   and by whee
 m' = m + 2 I/r² and J' = J + 2 I d²/r² with the inertia I of rotors, which have no weight.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -26,15 +26,17 @@ from climber_uk.identification.identified import (
     Identified,
     Widths,
 )
+from climber_uk.identification.integral_equations import Equations
 from climber_uk.identification.lateness import Columns
 from climber_uk.identification.window_fit import WindowFit
 from climber_uk.mechanics import Array
 from climber_uk.mechanics.climber import Climber
 
 FIRST = {DRIVE: 0, YAW: 4, WAY: 7, HEADING: 8}  # of the coefficients of each kind of equation
-VISCOUS, LATE = 2, 3  # columns of (11) and (15)
+COULOMB, VISCOUS, LATE = 1, 2, 3  # columns of (11) and (15)
 WEIGHTLESS = 4  # of (11)
 QUANTILE = 0.975  # of intervals of 95 %
+DOUBT = 0.5  # share by which an inertia that is taken as assumed may be off
 SURE = 2.0  # half widths of its interval from zero, above which a friction is significant
 
 
@@ -86,6 +88,23 @@ def parameters(
     return values, Widths(*(np.where(known, width, np.inf) for width in widths)), sought
 
 
+def resisted(equations: Sequence[Equations], climber: Climber, noise: Array) -> tuple[float, float]:
+    """Moment [N m] that resists turning, and its half width, with the inertia of `climber`.
+
+    Where that moment is most of what motors give, it hides the inertia, which then hardly matters:
+    its half width contains what `DOUBT` of it would make. Its yaw rates are those of `equations`.
+    """
+    found = []
+    for inertia in (climber.driven_inertia, (1 + DOUBT) * climber.driven_inertia):
+        turned = climber.half_track / (inertia * climber.wheel_radius)
+        left = [one._replace(target=one.target - turned * one.design[:, 0]) for one in equations]
+        fit = WindowFit.of(left, (COULOMB,), noise)
+        found.append(inertia * float(fit.coefficients[0]))
+    spread = float(stdtrit(len(fit.ends) - 1, QUANTILE)) * fit.deviation(0)
+    half_width = inertia * (spread + float(fit.bias(np.eye(1))[0])) + abs(found[1] - found[0])
+    return found[0], half_width
+
+
 def with_scrub(found: Identified, columns: Columns, climber: Climber, slips: bool) -> Identified:
     """The same, corrected where wheels scrub, or may: their angles show too wide a track.
 
@@ -95,7 +114,8 @@ def with_scrub(found: Identified, columns: Columns, climber: Climber, slips: boo
     `climber` is taken for all that is made of torques.
     """
     number = NAMES.index("turning_friction")
-    scrubs = found.values[number] > SURE * found.half_widths[number]
+    moment, half_width = found.resisted
+    scrubs = found.values[number] > SURE * found.half_widths[number] or moment > SURE * half_width
     is_told = YAW in found.fits and found.uncertainty[number] <= KNOWN
     if HEADING not in found.fits or (is_told and not scrubs):
         return found

@@ -16,6 +16,7 @@ from climber_uk.identification.coefficients import (
     VISCOUS,
     WEIGHTLESS,
     parameters,
+    resisted,
     with_scrub,
 )
 from climber_uk.identification.fit_test import lacks
@@ -83,6 +84,10 @@ def identify(
     values = parameters(fits, columns, climber)
     found = Identified(*values, fits, task.extent, kept.windows, site, left_out, late)
     slips = any(lack.kind == WAY and not lack.fits for lack in lacks(found, motion, climber))
+    if YAW in fits:
+        pushing = climber if slips else replace(climber, wheel_radius=found["wheel_radius"])
+        of_kept = replace(task, windows=kept.windows).equations[YAW]
+        found = replace(found, resisted=resisted(of_kept, pushing, task.noise(YAW)))
     found = with_scrub(found, columns, climber, slips)
     found = replace(found, lacks=tuple(lacks(found, motion, climber)))
     return replace(found, reasons=reasons(found, motion, climber, cut))

@@ -95,6 +95,8 @@ def _plans(
     climber: Climber, limits: ExcitationLimits, origin: tuple[float, float], site: Site
 ) -> Iterator[ExcitationPlan]:
     for name, shape in _shapes(limits.size):
+        if site.scrubs and _sharpest(shape) < climber.half_track:
+            continue
         for ramp_time in RAMPS:
             trajectory = Trajectory(shape, _law(shape, ramp_time, limits), origin=origin)
             if trajectory.duration > limits.duration:
@@ -114,6 +116,13 @@ def _shapes(size: float) -> Iterator[tuple[str, Shape]]:
         yield "ellipse", Ellipse(half, share * half)
         yield "lemniscate", Lemniscate(half, share * half)
         yield "lemniscate", Lemniscate(share * half, half)
+
+
+def _sharpest(shape: Shape) -> float:
+    """Least radius of its bends [m]: below the half track, the wheels inside would roll back."""
+    _, slope, curving, *_ = shape.derivatives(np.linspace(0, shape.length, 1000))
+    bend = np.abs(slope[..., 0] * curving[..., 1] - slope[..., 1] * curving[..., 0])
+    return float((np.linalg.norm(slope, axis=-1) ** 3 / np.maximum(bend, 1e-9)).min())
 
 
 def _law(shape: Shape, ramp_time: float, limits: ExcitationLimits) -> RestToRest:

@@ -30,8 +30,8 @@ def lacks(found: Identified, motion: RecordedMotion, climber: Climber) -> Iterat
     """Test each kind of equations; masses that were not found are those of `climber`."""
     extent = found.extent
     scales = {
-        DRIVE: (_positive(found["mass"], climber.mass), extent.force),
-        YAW: (_positive(found["yaw_inertia"], climber.yaw_inertia), extent.moment),
+        DRIVE: (_found(found, "mass", climber.mass), extent.force),
+        YAW: (_found(found, "yaw_inertia", climber.yaw_inertia), extent.moment),
         WAY: (1.0, extent.speed),
         HEADING: (1.0, extent.yaw_rate),
     }
@@ -43,8 +43,8 @@ def lacks(found: Identified, motion: RecordedMotion, climber: Climber) -> Iterat
         yield Lack(kind, fit.misfit.ratio, size, share, goes_with)
 
 
-def _positive(value: float, otherwise: float) -> float:
-    return value if np.isfinite(value) and value > 0 else otherwise
+def _found(found: Identified, name: str, otherwise: float) -> float:
+    return found[name] if found[name] > found.half_width(name) else otherwise
 
 
 def _explained(found: Identified, kind: str, motion: RecordedMotion) -> str:

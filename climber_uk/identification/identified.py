@@ -29,6 +29,7 @@ ROTORS = "rotor_inertia"
 OF_TURNING = ("yaw_inertia", "turning_friction", "turning_resistance")
 DRIVE, YAW, WAY, HEADING = "drive", "yaw", "way", "heading"  # kinds of equations
 IN_TIME = (0.0, 0.0)
+UNRESISTED = (0.0, float("inf"))
 KNOWN = 0.1  # uncertainty, relative to the value or the drive, above which a value is of no use
 NOTHING = 1e-100
 WORTH_A_WORD = 0.01  # share of all drive: a model error below it is not reported
@@ -42,7 +43,7 @@ WORDS = {
 }
 HINTS = {
     WEIGHT[0]: "is the wall tilted, or the centre of mass beside the centre?",
-    WEIGHT[1]: "is the wall round?",
+    WEIGHT[1]: "is the wall round, or do wheels scrub?",
     "the yaw rate": "do wheels or a seal scrub?",
     "the speed": "is friction neither Coulomb's nor viscous?",
     "the side it turns to": "are the wheels, or their motors, unlike?",
@@ -119,6 +120,7 @@ class Identified:
     left_out: int = 0  # windows that fit much worse than the others
     late: tuple[float, float] = IN_TIME  # [s] delay and lag of the torques beyond what is assumed
     has_effective_track: bool = False  # of wheels that scrub, or may
+    resisted: tuple[float, float] = UNRESISTED  # [N m] turning, and half width: see `resisted`
     slips: bool = False  # whether its wheels slip along their way: their angles show no radius
     lacks: Sequence[Lack] = ()  # the test of fit, by kind of equation
     reasons: Mapping[str, Reason] = field(default_factory=dict)  # by name, of undetermined ones
@@ -154,6 +156,13 @@ class Identified:
     def is_clear(self, name: str) -> bool:
         """Whether zero is not in the interval of a parameter that was sought."""
         return abs(self[name]) > self.half_width(name) > 0
+
+    @property
+    def tells_resisted(self) -> bool:
+        """Whether what resists turning is told only as one moment, at the bag's yaw rates."""
+        moment, half_width = self.resisted
+        is_sum = {"turning_friction", "turning_resistance"} <= self.reasons.keys()
+        return is_sum and half_width <= KNOWN * moment
 
     @property
     def tells_effective_track(self) -> bool:

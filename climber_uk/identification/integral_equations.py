@@ -43,10 +43,11 @@ class Equations(NamedTuple):
 
 @dataclass(frozen=True)
 class Site:
-    """What a climber was driven on, and whether a seal rubs on it."""
+    """What a climber was driven on, and what rubs on it."""
 
     wall: Wall = field(default_factory=Plane)
     has_seal: bool = True
+    scrubs: bool = False  # whether wheels or tracks do as it turns
 
 
 @parameters

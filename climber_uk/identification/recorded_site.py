@@ -13,6 +13,7 @@ from climber_uk.identification.integral_equations import Site
 from climber_uk.mechanics.adhesion import ADHESION
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.wall import WALLS
+from climber_uk.messages.names import Names
 from climber_uk.parameters.parameter_file import Values
 
 # Settings that identification neglects: the values that matter, and what follows.
@@ -33,7 +34,7 @@ OF_SUCTION = ("seal_friction_coefficient", "wheel_load_share", "suction_pressure
 
 
 def site_of(controller: Parameters, plant: Parameters) -> Site:
-    """Wall of the plant, or else of the controller, and whether there is a seal.
+    """Wall of the plant, or else of the controller, whether there is a seal, and what scrubs.
 
     Raises `ValueError` for unknown names.
     """
@@ -44,7 +45,9 @@ def site_of(controller: Parameters, plant: Parameters) -> Site:
     adhesion = controller.get("adhesion", plant.get("adhesion", "suction"))
     if adhesion not in ADHESION:
         raise ValueError(f"adhesion={adhesion!r} must be one of {', '.join(ADHESION)}")
-    return Site(Values(values).read(WALLS[wall], f"{wall}."), ADHESION[adhesion].has_seal)
+    names = Values(controller).read(Names).wheels
+    scrubs = len(names.left) > 1 or plant.get("locomotion", "wheeled") != "wheeled"
+    return Site(Values(values).read(WALLS[wall], f"{wall}."), ADHESION[adhesion].has_seal, scrubs)
 
 
 def differences(file: Parameters, recorded: Parameters, site: Site) -> Iterator[str]:

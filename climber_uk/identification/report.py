@@ -11,6 +11,7 @@ from climber_uk.report.tables import markdown
 
 COLUMNS = ("parameter", "estimate", "± 95 %", "unit", "nodes now", "")
 EFFECTIVE = "effective_half_track"  # that the wheels show while they scrub
+MOMENT = "turning_moment"  # friction and viscous resistance together, at the bag's yaw rates
 COULOMB = "seal_friction_coefficient"
 WITHOUT_SEAL = {COULOMB: ("rolling_friction", "N")}  # what that coefficient is then
 ADVICE = {
@@ -54,8 +55,14 @@ def rows(found: Identified, assumed: Climber) -> Iterator[dict[str, Any]]:
         }
         yield row
         if name == "half_track" and found.tells_effective_track:
-            told = {"estimate": float(value), "half_width": float(half_width), "known": True}
-            yield {**row, **told, "parameter": EFFECTIVE, "cause": None, "reason": None}
+            yield {**row, **_told(value, half_width), "parameter": EFFECTIVE}
+        if name == "turning_resistance" and found.tells_resisted:
+            yield {**row, **_told(*found.resisted), "parameter": MOMENT, "unit": "N m"}
+
+
+def _told(value: float, half_width: float) -> dict[str, Any]:
+    numbers = {"estimate": float(value), "half_width": float(half_width)}
+    return {**numbers, "known": True, "cause": None, "reason": None}
 
 
 def table(found: Identified, assumed: Climber) -> str:
@@ -90,8 +97,10 @@ def remarks(found: Identified) -> Iterator[str]:
         yield f"viscous friction cannot be told apart from {other}: drive at different speeds"
     elif found.is_clear("viscous_friction") and found.site.has_seal:
         yield "the controller knows no viscous friction: it gets that of this speed as the seal's"
-    if found.is_clear("turning_friction") or found.is_clear("turning_resistance"):
-        moment = f"{found.turning_moment:.3g} N m at {extent.yaw_rate:.3g} rad/s"
+    is_clear = found.is_clear("turning_friction") or found.is_clear("turning_resistance")
+    if found.tells_resisted or is_clear:
+        whole = found.resisted[0] if found.tells_resisted else found.turning_moment
+        moment = f"{whole:.3g} N m at {extent.yaw_rate:.3g} rad/s"
         yield f"turning is resisted, by {moment}: it is left to the controller's observer"
     if found.has_effective_track:
         yield "inertia and what resists turning are those of the nodes' half track"

@@ -129,7 +129,8 @@ def _absent(found: Identified, cut: Cut) -> Iterator[tuple[str, Reason]]:
         words = "joint_states has no wheel angles"
         yield from ((name, Reason("absent", words)) for name in OF_WHEELS)
     elif found.has_effective_track and found.uncertainty[-1] <= KNOWN:
-        scrub = "wheels scrub" if found.is_clear("turning_friction") else "wheels may scrub"
+        is_clear = found.is_clear("turning_friction") or found.resisted[0] > found.resisted[1]
+        scrub = "wheels scrub" if is_clear else "wheels may scrub"
         words = f"{scrub}: their angles show an effective one of {found['half_track']:.4g} m"
         yield "half_track", Reason("absent", words)
         if found.slips:

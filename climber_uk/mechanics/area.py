@@ -4,7 +4,9 @@ It keeps a clearance from all edges. A straight line comes nearer to an edge tha
 places only, as what is nearer to an edge is convex: so all is found without offsetting polygons.
 """
 
+import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,6 +19,7 @@ from climber_uk.mechanics.waypoint_file import read_text, read_waypoint_text
 SLACK = 1e-6  # [m] by which a distance is kept as well
 ROUND = np.arange(8) * np.pi / 4  # directions from a corner in which a way around it may lead
 FURTHER = 1.0 / np.cos(np.pi / 8) + 1e-6  # so that the straight lines between those keep clear
+SHARPEST = 2 * np.pi / 3 + 1e-6  # [rad] of a corner around which a way may lead with a single turn
 
 
 @dataclass(frozen=True)
@@ -36,15 +39,32 @@ class Area:
         """The area, turned anticlockwise about the origin."""
         return Area(tuple(turned(ring, angle) for ring in self.rings), self.clearance)
 
-    def along_edges(self) -> Array:
-        """Ways (n, 2, 2) [m], both ends of each, along all edges, at the clearance from them."""
+    @cached_property
+    def bends(self) -> Array:
+        """By how much (n, 2) [rad] its ring bends to the left where each edge begins, and ends."""
         found = []
-        for begin, end in zip(*self.edges, strict=True):
+        for ring in self.rings:
+            along = np.roll(ring, -1, axis=0) - ring
+            angle = np.arctan2(*along.T[::-1])
+            bend = (angle - np.roll(angle, 1) + np.pi) % (2 * np.pi) - np.pi
+            found.append(np.c_[bend, np.roll(bend, -1)])
+        return np.concatenate(found)
+
+    def along_edges(self) -> Array:
+        """Ways (n, 2, 2) [m], both ends of each, along all edges, at the clearance from them.
+
+        Around a corner each leads on to where it meets the next, unless that is far off.
+        """
+        found = []
+        clear = self.clearance + SLACK
+        for begin, end, bends in zip(*self.edges, self.bends.tolist(), strict=True):
             angle = float(np.arctan2(*(end - begin)[::-1]))
             level = self.turned(-angle)
             (left, y), (right, _) = turned(np.array([begin, end]), -angle)
-            for height in (y - self.clearance - SLACK, y + self.clearance + SLACK):
-                spans = level.spans(float(height)).clip(left, right)
+            for side in (-1, 1):
+                before, beyond = (clear * _around(bend, side) for bend in bends)
+                height = y + side * clear
+                spans = level.spans(float(height)).clip(left - before, right + beyond)
                 for a, b in spans[spans[:, 1] - spans[:, 0] > SLACK].tolist():
                     found.append(turned(np.array([[a, height], [b, height]]), angle))
         return np.array(found).reshape(-1, 2, 2)
@@ -128,15 +148,26 @@ class Area:
     @cached_property
     def corners(self) -> Array:
         """Places (n, 2) [m] around all corners, between which a way around them may lead."""
+        (begin, end), bend = self.edges, self.bends[:, 0]
+        angle = np.arctan2(*(end - begin).T[::-1]) - bend / 2  # halfway between both edges
+        out = -np.sign(bend) * (self.clearance + 2 * SLACK) / np.cos(bend / 2)
+        single = begin + out[:, None] * np.c_[-np.sin(angle), np.cos(angle)]
+        is_single = (np.abs(bend) <= SHARPEST) & np.asarray(self.holds(single))
         around = self.clearance * FURTHER * np.c_[np.cos(ROUND), np.sin(ROUND)]
-        places = (np.concatenate(self.rings)[:, None] + around).reshape(-1, 2)
-        return places[self.holds(places)]
+        places = (begin[~is_single, None] + around).reshape(-1, 2)
+        return np.concatenate([single[is_single], places[self.holds(places)]])
+
+
+def _around(bend: float, side: int) -> float:
+    """How far, in clearances, a way at the `side` of an edge leads around a corner."""
+    is_outside = bend * side < 0 and abs(bend) <= SHARPEST
+    return math.tan(abs(bend) / 2) if is_outside else 0.0
 
 
 def read_area(file: str, clearance: float) -> Area:
     """Area of a text file: corners x, y [m] a line, an empty line before each further ring.
 
-    Raises `ValueError` naming the file.
+    Raises `ValueError` naming the file, also where a ring crosses itself or another one.
     """
     try:
         blocks = [b for b in re.split(r"\n\s*\n", read_text(file).strip()) if b.strip()]
@@ -152,9 +183,30 @@ def read_area(file: str, clearance: float) -> Area:
             if len(ring) < 3:
                 raise ValueError(f"ring {number}: {len(ring)} corner(s), want >= 3")
             rings.append(ring)
+        _refuse_crossings(rings)
     except ValueError as error:
         raise ValueError(f"area={file!r}: {error}") from None
     return Area(tuple(rings), clearance)
+
+
+def _refuse_crossings(rings: Sequence[Array]) -> None:
+    begin, end = Area(tuple(rings), 0.0).edges
+    number = np.repeat(np.arange(1, len(rings) + 1), [len(ring) for ring in rings])
+    way = end - begin
+    for edge in range(len(begin) - 1):
+        later = slice(edge + 1, None)
+        crosses = _cross(way[edge], way[later])
+        gap = begin[later] - begin[edge]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t, u = _cross(gap, way[later]) / crosses, _cross(gap, way[edge]) / crosses
+        inner = 1e-9, 1 - 1e-9  # edges may touch
+        meet = (t > inner[0]) & (t < inner[1]) & (u > inner[0]) & (u < inner[1])
+        if meet.any():
+            other = int(np.argmax(meet))
+            x, y = begin[edge] + t[other] * way[edge]
+            one, two = number[edge], number[edge + 1 + other]
+            what = "itself" if one == two else f"ring {two}"
+            raise ValueError(f"ring {one} crosses {what} at ({x:.4g}, {y:.4g}) m")
 
 
 def turned(points: Array, angle: float) -> Array:

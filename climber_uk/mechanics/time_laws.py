@@ -76,7 +76,9 @@ class RestToRest(TimeLaw):
     """
 
     rate: float = _rate()
-    ramp_time: float = parameter(3.0, "s", "rest to full rate; shorter takes more torque", above=0)
+    ramp_time: float = parameter(
+        3.0, "s", "rest to full rate; shorter takes more torque", at_least=1e-3
+    )
     laps: int = parameter(1, "", "rounds of a closed shape without a stop", at_least=1)
     runs: int = parameter(1, "", "runs from rest to rest; 0: without end", at_least=0)
     pause: float = parameter(1.0, "s", "rest between two runs", at_least=0)
@@ -84,7 +86,7 @@ class RestToRest(TimeLaw):
     def duration(self, shape: Shape) -> float:
         """See `TimeLaw`."""
         run_time = float(self._legs(shape)[2][-1])
-        return self.runs * (run_time + self.pause) - self.pause if self.runs else math.inf
+        return self.runs * run_time + (self.runs - 1) * self.pause if self.runs else math.inf
 
     def horizon(self, shape: Shape) -> float:
         """See `TimeLaw`."""

@@ -3,6 +3,7 @@
 ṗ = p' ṡ,   p̈ = p'' ṡ² + p' s̈,   p⃛ = p''' ṡ³ + 3 p'' ṡ s̈ + p' s⃛, and the heading along p'.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,13 +14,19 @@ from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.mechanics.time_laws import TimeLaw
+from climber_uk.mechanics.waypoint_file import FARTHEST
+
+LONGEST = 1e9  # [s], about 30 years; stamps in nanoseconds end after 290
+SMALLEST = 1e-4  # [m] of a path
+LOOKS = 9  # places that are looked at
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """A shape travelled by a time law; in reverse gear the climber's tail goes first.
 
-    Raises `ValueError` if the law would leave a path that ends, or not stop where it turns back.
+    Raises `ValueError` if the law would leave a path that ends, or not stop where it turns back,
+    and where lengths or times are beyond those that have millimetres, or nanoseconds, left.
     """
 
     shape: Shape
@@ -28,8 +35,12 @@ class Trajectory:
     origin: tuple[float, float] = (0.0, 0.0)  # [m] of the shape, in the wall's frame
 
     def __post_init__(self) -> None:
+        try:
+            with np.errstate(all="ignore"):
+                self._refuse_absurd()
+        except ArithmeticError as error:
+            raise ValueError(f"numbers of the path are too large or too small: {error}") from None
         if self.law.stops:
-            _ = self.duration  # raises if the law is none for this path
             return
         if not self.shape.closed:
             raise ValueError(f"time_law {self.law} runs off an open shape: use 'rest_to_rest'")
@@ -39,6 +50,27 @@ class Trajectory:
                 f"time_law {self.law} does not stop where the path turns back or rests, "
                 f"at ({x:.4g}, {y:.4g}) m: use 'rest_to_rest'"
             )
+
+    def _refuse_absurd(self) -> None:
+        """Also where the law is none for this path."""
+        course = self.course
+        places = course.derivatives(np.linspace(0.0, course.length, LOOKS))[0]
+        extent = float(np.ptp(places, axis=0).max())
+        x, y = (places + self.origin).T
+        beyond = ~((np.abs(x) <= FARTHEST) & (np.abs(y) <= FARTHEST))
+        if not np.isfinite(places).all():
+            raise ArithmeticError("where it leads cannot be told")
+        if beyond.any():
+            i = int(np.argmax(beyond))
+            raise ValueError(
+                f"the path leads to ({x[i]:.4g}, {y[i]:.4g}) m, beyond {FARTHEST:g} m of the origin"
+            )
+        if extent < SMALLEST:
+            raise ValueError(f"the path is {extent:.4g} m wide and high, want >= {SMALLEST:g} m")
+        duration, once = self.duration, self.law.horizon(course)
+        if not once <= LONGEST or not (duration <= LONGEST or duration == math.inf):
+            longest = once if not once <= LONGEST else duration
+            raise ValueError(f"the path takes {longest:.4g} s, more than {LONGEST:g} s")
 
     @cached_property
     def course(self) -> Shape:

@@ -23,7 +23,7 @@ class Rounding:
     """How corners of a path through points are rounded, and how slow they are."""
 
     tolerance: float = parameter(
-        0.02, "m", "most distance of the path from the straight lines between points", above=0
+        0.02, "m", "most distance of the path from the straight lines between points", at_least=1e-5
     )
     max_yaw_rate: float = parameter(1.0, "rad/s", "most yaw rate; bends are slow for it", above=0)
     max_acceleration: float = parameter(0.5, "m/s²", "most acceleration, also in bends", above=0)

@@ -7,7 +7,7 @@ Stamps are integers in nanoseconds. Messages have wheels by name; arrays have (r
 import math
 from collections.abc import Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -125,13 +125,20 @@ def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motio
     return Motion(x, y, heading, math.cos(heading), math.sin(heading), v_x, yaw_rate)
 
 
+Told = Literal["efforts", "velocities"]
+
+
 def wheel_torques(
-    fields: JointFields, left_joint: str, right_joint: str, what: str = "efforts"
+    fields: JointFields,
+    left_joint: str,
+    right_joint: str,
+    what: Told = "efforts",
 ) -> Torques:
     """Torques [N m] of the sides, or their rates [rad/s]: `what` the fields' values are.
 
     The torque of a side is the sum of its wheels', its rate their mean.
     """
+    is_mean = {"efforts": False, "velocities": True}[what]
     names, values = list(fields.names), list(fields.values)
     joints = wheel_joints(left_joint, right_joint)
     if names != joints.all and sorted(names) != sorted(joints.all):
@@ -142,9 +149,9 @@ def wheel_torques(
         raise ValueError(f"{what} {values} must be finite")
     told = dict(zip(names, values, strict=True))
     left, right = (sum(told[name] for name in side) for side in joints)
-    if what == "efforts":
-        return Torques(right, left)
-    return Torques(right / len(joints.right), left / len(joints.left))
+    if is_mean:
+        return Torques(right / len(joints.right), left / len(joints.left))
+    return Torques(right, left)
 
 
 def pressure(message: "FluidPressure") -> float:

@@ -161,7 +161,7 @@ class PlantSimulator(ClimberNode):
             if self.exclusive:
                 self.check_alone(TORQUES)
             wheels = names.left_wheel_joint, names.right_wheel_joint
-            what = "velocities" if self.take_speeds else "efforts"
+            what: reading.Told = "velocities" if self.take_speeds else "efforts"
             told = reading.wheel_torques(fields, *wheels, what)
             self.report(TORQUES, "")
         except ValueError as error:

@@ -15,14 +15,15 @@ from typing import Any
 
 from climber_uk.closed_loop.node_parameters import read_parameters
 from climber_uk.control.build import ControllerChoice
-from climber_uk.mechanics.adhesion import ADHESION, Attachment, Grip
+from climber_uk.mechanics.adhesion import ADHESION, Grip
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import LOCOMOTION, Contact
 from climber_uk.mechanics.fastest_law import DEGREE
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
 from climber_uk.mechanics.wall import WALLS, Wall
-from climber_uk.messages.topics import CONTROLLER, PLANNER
+from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.path_check.demands import demands
@@ -32,6 +33,7 @@ from climber_uk.path_check.path_limits import Limits
 from climber_uk.path_check.posterior import chances, read_posterior
 from climber_uk.path_check.time_optimal import PERIOD, time_optimal
 from climber_uk.report.outputs import failing_in_a_line, printable
+from climber_uk.simulation.simulated_robot import Physics
 from climber_uk.system.command_line import Parser, between
 
 NAMES = {
@@ -51,20 +53,24 @@ MOST_CLIMBERS = 1_000_000
 
 def read(
     file: Path, changes: dict[str, Any], remarks: list[str]
-) -> tuple[Trajectory, Climber, Attachment, Wall]:
+) -> tuple[Trajectory, Climber, Contact, Wall]:
     """Path, climber, what holds it and its wall, by a file and changes of the path's parameters.
 
-    Raises `ValueError`, also for a name that no part of the path has. `remarks` gets a line on each
-    value that can hardly be meant.
+    What resists a turn is that of plant_simulator's `locomotion`. Raises `ValueError`, also for a
+    name that no part of the path has. `remarks` gets a line on each value that can hardly be meant.
     """
     trajectory = build_trajectory(Values(_planner(file, changes, remarks)).read)
     values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
     choice = values.read(ControllerChoice)
     name, wall = choice.adhesion, choice.wall
-    attachment = Attachment(
-        adhesion=values.read(ADHESION[name], f"{name}."), grip=values.read(Grip)
+    plant = Values(read_parameters(file, f"/{PLANT}"))
+    runs_on = plant.read(Physics).locomotion
+    contact = Contact(
+        adhesion=values.read(ADHESION[name], f"{name}."),
+        grip=values.read(Grip),
+        locomotion=plant.read(LOCOMOTION[runs_on], f"{runs_on}."),
     )
-    return trajectory, values.read(Climber), attachment, values.read(WALLS[wall], f"{wall}.")
+    return trajectory, values.read(Climber), contact, values.read(WALLS[wall], f"{wall}.")
 
 
 def _planner(file: Path, changes: dict[str, Any], remarks: list[str]) -> dict[str, Any]:
@@ -88,7 +94,7 @@ def _fastest_law(
     options: argparse.Namespace,
     trajectory: Trajectory,
     climber: Climber,
-    attachment: Attachment,
+    contact: Contact,
     wall: Wall,
 ) -> tuple[Trajectory | None, dict[str, Any]]:
     """The path by the fastest law, and what that takes; or None, and the reason."""
@@ -99,10 +105,10 @@ def _fastest_law(
     }
     limits, period = Limits(options.margin, **given), options.smoothing / (DEGREE + 1)
     try:
-        law = time_optimal(trajectory, climber, attachment, limits, period, wall).trajectory
+        law = time_optimal(trajectory, climber, contact, limits, period, wall).trajectory
     except ValueError as error:
         return None, {"reason": str(error)}
-    found = demands(law, climber, attachment, options.margin, wall)
+    found = demands(law, climber, contact, options.margin, wall)
     least = min(found.least(), key=lambda of: of.reserve)
     return law, {
         "duration [s]": law.duration,
@@ -164,9 +170,9 @@ def main() -> None:
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
     with failing_in_a_line("check_path") as remarks:
-        trajectory, climber, attachment, wall = read(options.params, dict(options.param), remarks)
+        trajectory, climber, contact, wall = read(options.params, dict(options.param), remarks)
         posterior = read_posterior(options.posterior) if options.posterior else None
-        asked, law = (climber, attachment), None
+        asked, law = (climber, contact), None
         found = demands(trajectory, *asked, options.margin, wall)
         numbers = told(found, trajectory, climber.half_track)
         if options.fastest and trajectory.law.rate > 0:

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.demand import demanded
+from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.demand import STANDS, demanded
+from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Wrench
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
@@ -21,6 +22,8 @@ from climber_uk.mechanics.wall import PLANE, Wall
 
 PERIOD = 0.02  # [s] between two times that are looked at
 MOST_TIMES = 50_000
+HALVINGS = 20  # of what changes abruptly between two of them, by [m/s] and [rad]
+ABRUPT_SPEED, ABRUPT_TURN = 0.02, 0.1
 
 
 @dataclass(frozen=True)
@@ -54,11 +57,14 @@ class Demands:
 
 
 class Resistance(NamedTuple):
-    """What resists the motion beside the seal; numbers, or arrays (k, 1) of many climbers."""
+    """What resists the motion beside the seal; numbers, or arrays (k, 1) of many climbers.
+
+    Without `turning`, what scrubs resists a turn, as the contact's locomotion has it.
+    """
 
     rolling: Any = 0.0  # Coulomb's [N]
     viscous: Any = 0.0  # [N s/m]
-    turning: Any = 0.0  # Coulomb's [N m]
+    turning: Any = None  # Coulomb's [N m]
     turning_viscous: Any = 0.0  # [N m s]
 
 
@@ -79,58 +85,99 @@ class Reserves(NamedTuple):
 
 
 def times(trajectory: Trajectory) -> tuple[Array, bool]:
-    """Times (n,) [s] to look at, and whether they are all of it, or a round or two."""
+    """Times (n,) [s] to look at, and whether they are all of it, or a round or two.
+
+    They are as near to each other as its speed and its heading change fast. Raises `ValueError`
+    where that is not near enough: it turns, or starts, at once.
+    """
     duration = trajectory.duration
     horizon = trajectory.law.horizon(trajectory.course)
     last = min(duration, horizon) if np.isfinite(horizon) else duration
     time = np.linspace(0.0, last, min(int(last / PERIOD) + 2, MOST_TIMES))
-    return time, bool(last >= duration)
+    at = trajectory.at(time)
+    for _ in range(HALVINGS):
+        abrupt = np.flatnonzero(_is_abrupt(time, at))
+        if not len(abrupt):
+            return time, bool(last >= duration)
+        if len(time) + len(abrupt) > 2 * MOST_TIMES:
+            break
+        time = np.insert(time, abrupt + 1, (time[abrupt] + time[abrupt + 1]) / 2)
+        at = trajectory.at(time)
+    x, y, _ = at.pose[abrupt[0]]
+    raise ValueError(
+        f"the path turns on the spot, or changes its speed at once, at ({x:.4g}, {y:.4g}) m, "
+        f"{time[abrupt[0]]:.4g} s"
+    )
+
+
+def _is_abrupt(time: Array, at: Reference) -> Any:
+    """Whether (n - 1,) speed or heading changes by more than the rates at both ends explain."""
+    step, speed, heading = np.diff(time), np.diff(at.speed), np.diff(at.heading)
+    faster, turned = (
+        step * (rate[1:] + rate[:-1]) / 2 for rate in (at.forward_acceleration, at.yaw_rate)
+    )
+    explained = (np.abs(speed - faster) < ABRUPT_SPEED) & (
+        np.abs(wrapped(heading - turned)) < ABRUPT_TURN
+    )
+    return ~explained
 
 
 def reserves(
     reference: Reference,
     climber: Climber,
-    attachment: Attachment,
+    contact: Contact,
     resistance: Resistance = NOTHING_ELSE,
     wall: Wall = PLANE,
 ) -> Reserves:
     """Reserves at n places of a reference, of one climber, or of many: fields (k, 1)."""
     speed, yaw_rate, radius = reference.speed, reference.yaw_rate, climber.wheel_radius
-    friction = attachment.seal_friction(climber) + resistance.rolling
-    turning = resistance.turning * np.sign(yaw_rate) + resistance.turning_viscous * yaw_rate
+    friction = contact.seal_friction(climber) + resistance.rolling
+    place = *np.moveaxis(reference.pose, -1, 0)[:2], *np.moveaxis(reference.velocity, -1, 0)[:2]
+    scrubs: Any = resistance.turning
+    if scrubs is None:
+        load = contact.wheel_load(climber, wall.into(climber.inclination, *place))
+        scrubs = contact.locomotion.turning_resistance(load)
+    turns = np.where(climber.half_track * np.abs(yaw_rate) > STANDS, np.sign(yaw_rate), 0.0)
+    turning = scrubs * turns + resistance.turning_viscous * yaw_rate
     resists = Wrench(-resistance.viscous * speed, -turning)
     demand = demanded(climber, friction, reference, resists, wall)
     (right, left), lateral, across, into_wall = demand[:4]
-    slip = attachment.slip_margin(
-        climber, into_wall, (right / radius, left / radius), lateral, across
-    )
-    tip = attachment.tip_margin(climber, into_wall, demand.along_wall)
+    slip = contact.slip_margin(climber, into_wall, (right / radius, left / radius), lateral, across)
+    tip = contact.tip_margin(climber, into_wall, demand.along_wall)
     rates = (
         (speed + climber.half_track * yaw_rate) / radius,
         (speed - climber.half_track * yaw_rate) / radius,
     )
     motors = _motors(climber, (right, left), rates)
-    loads = attachment.wheel_loads(climber, attachment.wheel_load(climber, into_wall), across)
+    loads = contact.wheel_loads(climber, contact.wheel_load(climber, into_wall), across)
     tips = tip + 0 * np.asarray(slip)
-    normal = attachment.normal_force(climber, into_wall)
+    normal = contact.normal_force(climber, into_wall)
     return Reserves(slip, tips, motors, (right, left), rates, lateral, loads, normal)
 
 
 def demands(
     trajectory: Trajectory,
     climber: Climber,
-    attachment: Attachment,
+    contact: Contact,
     margin: float,
     wall: Wall = PLANE,
 ) -> Demands:
-    """Demands of a trajectory; slipping is to be a `margin` away."""
-    time, is_whole = times(trajectory)
-    reference = trajectory.at(time)
-    left = reserves(reference, climber, attachment, wall=wall)
+    """Demands of a trajectory; slipping is to be a `margin` away.
+
+    Raises `ValueError` where what is asked for is beyond what can be computed with.
+    """
+    with np.errstate(all="ignore"):
+        time, is_whole = times(trajectory)
+        reference = trajectory.at(time)
+        left = reserves(reference, climber, contact, wall=wall)
     power = sum(
         np.maximum(torque * rate, 0.0)
         for torque, rate in zip(left.torques, left.rates, strict=True)
     )
+    if not (can := np.isfinite([*reference.pose.T, *left.torques]).all(axis=0)).all():
+        raise ValueError(
+            f"what the path asks for at {time[np.argmin(can)]:.4g} s is too much to compute with"
+        )
     step = np.hypot(*np.diff(reference.pose[:, :2], axis=0).T)
     return Demands(
         time=time,

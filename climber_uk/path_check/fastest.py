@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.fastest_law import Tabulated, write_table
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import PLANE, Wall
@@ -24,7 +24,7 @@ WIDEST, HALVINGS = 16.0, 12  # times slower and faster than planned; to 0.1 %
 def fastest(
     trajectory: Trajectory,
     climber: Climber,
-    attachment: Attachment,
+    contact: Contact,
     margin: float,
     wall: Wall = PLANE,
 ) -> Trajectory | None:
@@ -39,7 +39,7 @@ def fastest(
         return replace(trajectory, law=faster)
 
     def holds(log: float) -> bool:
-        found = demands(at(log), climber, attachment, margin, wall)
+        found = demands(at(log), climber, contact, margin, wall)
         return all(limit.reserve >= 1 for limit in found.least())
 
     low, high = -math.log(WIDEST), math.log(WIDEST)

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import Wall
@@ -63,7 +63,7 @@ class PathLimits:
 
     trajectory: Trajectory
     climber: Climber
-    attachment: Attachment
+    contact: Contact
     wall: Wall
     limits: Limits
     s: Array  # (n,)
@@ -81,7 +81,7 @@ class PathLimits:
         cls,
         trajectory: Trajectory,
         climber: Climber,
-        attachment: Attachment,
+        contact: Contact,
         wall: Wall,
         limits: Limits,
         s: Array,
@@ -99,7 +99,7 @@ class PathLimits:
             trajectory.at_progress((s, by * rate, of + 0 * s, 0 * s))
             for by, of in ((1.0, 0.0), (np.sqrt(2.0), 0.0), (1.0, 1.0))
         ]
-        found = [reserves(each, climber, attachment, wall=wall) for each in at]
+        found = [reserves(each, climber, contact, wall=wall) for each in at]
         _check_tip(found[0], one)
         affine = partial(Affine.of, rate**2)
         most = np.minimum(_leg_speed(trajectory, s), limits.speed)
@@ -111,7 +111,7 @@ class PathLimits:
         return cls(
             trajectory=trajectory,
             climber=climber,
-            attachment=attachment,
+            contact=contact,
             wall=wall,
             limits=limits,
             s=s,
@@ -133,7 +133,7 @@ class PathLimits:
             return np.asarray(of)[rest]
 
         tighter, radius = at(self.tighter), self.climber.wheel_radius
-        grip = self.attachment.grip.wheel_friction_coefficient / self.limits.margin
+        grip = self.contact.grip.wheel_friction_coefficient / self.limits.margin
         loads = [np.maximum(at(c) + at(x) * X, 0.0) for c, x in zip(*self.loads[:2], strict=True)]
         load = np.maximum(loads[0] + loads[1], 1e-12)
         lateral = (at(self.lateral.c) + at(self.lateral.x) * X) / load

@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import is_pulled_off
+from climber_uk.mechanics.contact import Contact, is_pulled_off
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import PLANE, Wall
 from climber_uk.path_check.demands import Resistance, reserves, times
@@ -120,7 +119,7 @@ def _interval(row: Mapping[str, Any]) -> tuple[str, Interval | None]:
 def chances(
     trajectory: Trajectory,
     climber: Climber,
-    attachment: Attachment,
+    contact: Contact,
     posterior: Posterior,
     runs: int,
     seed: int = 0,
@@ -138,7 +137,7 @@ def chances(
         changes: dict[str, Any] = {name: drawn[name] for name in OF_CLIMBER if name in drawn}
         these = replace(climber, **changes)
         resists = {of: drawn[name] for of, name in RESISTING.items() if name in drawn}
-        left = reserves(reference, these, attachment, Resistance(**resists), wall)
+        left = reserves(reference, these, contact, Resistance(**resists), wall)
         happens = is_pulled_off(these, left.normal) | (left.tip < 1), left.slip < 1, left.torque < 1
         number = min(block, runs - first)
         for event, where in zip(counts, happens, strict=True):

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.fastest_law import DEGREE, Tabulated, spline
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import PLANE, Wall
@@ -44,7 +44,7 @@ class TimeOptimal(NamedTuple):
 def time_optimal(
     trajectory: Trajectory,
     climber: Climber,
-    attachment: Attachment,
+    contact: Contact,
     limits: Limits,
     period: float = PERIOD,
     wall: Wall = PLANE,
@@ -58,7 +58,7 @@ def time_optimal(
     inner = (rests > 0) & (rests < trajectory.course.length)
     places = np.concatenate([[0.0], rests[inner], [trajectory.course.length]])
     s = _grid(trajectory, places)
-    along = PathLimits.of(trajectory, climber, attachment, wall, limits, s, AT_FIRST)
+    along = PathLimits.of(trajectory, climber, contact, wall, limits, s, AT_FIRST)
     dwells = np.append(dwell[inner], 0.0)
     X, U = _optimum(along, places)
     abrupt = _sampled(s, X, U, places, dwells, period)[1]
@@ -194,7 +194,7 @@ def _tightened(along: PathLimits, period: float, table: Array) -> Any:
     progress = tuple(law(time, order) for order in range(4))
     moves = progress[1] > 0
     reference = along.trajectory.at_progress(tuple(of[moves] for of in progress))
-    left = reserves(reference, along.climber, along.attachment, wall=along.wall)
+    left = reserves(reference, along.climber, along.contact, wall=along.wall)
     reserve = np.full(count - 1, np.inf)
     reserve[moves] = along.reserve(left, reference)
     if reserve.min() >= KEPT:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from climber_uk.bags.bag import Bag
+from climber_uk.bags.restarts import restarts
 from climber_uk.bags.topics import Topics
 from climber_uk.localization.gate import Fix
 from climber_uk.localization.localizer import Localizer
@@ -57,7 +58,7 @@ class RecordedSensors:
 def read_sensors(bag: Bag, namespace: str, names: Names, frames: SensorFrames) -> RecordedSensors:
     """Sensors of the climber in `namespace`; what is unfit is counted, with the reason.
 
-    Raises `ValueError` if there are no encoders, or none that are fit.
+    Raises `ValueError` if there are no encoders, or none that are fit, or several runs.
     """
     found, names = RecordedSensors(), names.within(namespace)
     topics = {Topics().full(name, namespace): name for name in (IMU, JOINTS, POSE, TRUTH)}
@@ -72,8 +73,13 @@ def read_sensors(bag: Bag, namespace: str, names: Names, frames: SensorFrames) -
         topic = Topics().full(JOINTS, namespace)
         lacking = bag.lacks(topic, "sensor_msgs/msg/JointState")
         raise ValueError("; ".join([f"{bag.path} has {lacking}", *bag.losses]))
-    if not any(order == ORDER[JOINTS] for _, order, _ in found.events):
+    stamps = np.array([stamp for stamp, order, _ in found.events if order == ORDER[JOINTS]])
+    if not len(stamps):
         raise ValueError(f"{bag.path}: {found.refused.most_common(1)[0][0]}")
+    if again := len(restarts(stamps)):
+        topic = Topics().full(JOINTS, namespace)
+        runs = f"there are {again + 1} runs: want one"
+        raise ValueError(f"{bag.path}: {topic}: time starts again, {runs}")
     return found
 
 

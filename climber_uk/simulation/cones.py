@@ -83,11 +83,11 @@ def _by_newton(
     problem = velocity, np.diag(masses), limits, rows
     sliding = rows @ start
     directions = sliding / np.sqrt((sliding**2).sum(axis=1) + EPSILONS[1] ** 2)[:, None]
-    found = _newton(*problem, EPSILONS[-1], start, directions, FEW_STEPS)
+    found = _newton(*problem, EPSILONS[-1], (start, directions), FEW_STEPS)
     if found is None:
         found = velocity, np.zeros(rows.shape[:2])
         for epsilon in EPSILONS:
-            found = _newton(*problem, epsilon, *found, MAX_STEPS)
+            found = _newton(*problem, epsilon, found, MAX_STEPS)
             if found is None:
                 return None
     sliding = rows @ found[0]
@@ -100,11 +100,11 @@ def _newton(
     limits: Array,
     rows: Array,
     epsilon: float,
-    found: Array,
-    directions: Array,
+    begin: tuple[Array, Array],
     max_steps: int,
 ) -> tuple[Array, Array] | None:
-    """ν⁺ (n,) and directions (contacts, k) for one ε, beginning with `found` and `directions`."""
+    """ν⁺ (n,) and directions (contacts, k) for one ε, from such a pair to begin with."""
+    found, directions = begin
     flat = rows.reshape(-1, len(velocity))
     for _ in range(max_steps):
         s = rows @ found

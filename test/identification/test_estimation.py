@@ -293,6 +293,18 @@ def test_nearly_the_same_speed_is_no_reason_to_tell_one_friction_for_both():
         assert "speeds hardly differ: together 55" in told[name]["reason"]
 
 
+def test_a_moment_that_hides_the_inertia_is_told_all_the_same():
+    round_and_round = 0.3 * TIME, 0.3 + 0 * TIME, 0 * TIME
+    motion = moved(heading=round_and_round, scrub=30.0, effective=1.2, noise=1.0, wheels=True)
+    found = identify(motion, replace(BELIEVED, yaw_inertia=0.5))
+    assert {"yaw_inertia", "turning_friction", "turning_resistance"} <= found.reasons.keys()
+    (row,) = (row for row in rows(found, BELIEVED) if row["parameter"] == "turning_moment")
+    assert row["estimate"] == pytest.approx(30.0, abs=1.5 * row["half_width"] + 0.01)
+    assert row["half_width"] < 0.5
+    assert "turning is resisted, by 30" in said_of(found)
+    assert "wheels scrub: their angles show an effective one of 0.36" in table(found, BELIEVED)
+
+
 THETA, OMEGA, _ = WINDING
 HEIGHT = since_start(PULSING[0] * np.sin(THETA))
 # A force and a moment that the equations lack, by what they come from.

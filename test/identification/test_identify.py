@@ -10,6 +10,7 @@ import yaml
 from made_bag import JOINTS, ODOMETRY, SECOND, blank, message, turn, write
 
 from climber_uk.identification import excitation, identify
+from climber_uk.identification.integral_equations import Site
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.shapes import SHAPES
 from climber_uk.mechanics.time_laws import RestToRest
@@ -60,6 +61,14 @@ def test_a_plan_keeps_within_its_limits():
     assert best.trajectory.duration <= LIMITS.duration
     _, torques = excitation.driven(best.trajectory, Climber())
     assert np.abs(torques).max() <= LIMITS.torque
+
+
+def test_a_plan_for_wheels_that_scrub_has_no_bend_that_turns_one_back():
+    scrubbing = excitation.plan(Climber(), LIMITS, site=Site(scrubs=True)).trajectory
+    time = np.linspace(0.0, scrubbing.duration, 5000)
+    reference = scrubbing.at(time)
+    rims = np.abs(reference.speed) - 0.3 * np.abs(reference.yaw_rate)
+    assert rims.min() > -1e-3
 
 
 def test_a_plan_tells_more_than_a_line_does():

@@ -11,6 +11,7 @@ from climber_uk.mechanics.lanes import Lanes, joined, lanes_of
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.waypoints import Polyline
 
 FACADE = Path(__file__).parents[2] / "config" / "facade.csv"
 TOLERANCE, STEP = 0.004, 0.02  # [m] of the path, and of the raster
@@ -34,6 +35,15 @@ def made(folder, text, **parameters):
     file = folder / "area.txt"
     file.write_text(text)
     return Lanes(area=str(file), tolerance=TOLERANCE, **parameters)
+
+
+def nearest_turns(way):
+    """Least distance [m] along a way from one turn to the next."""
+    legs = np.diff(way, axis=0)
+    legs = legs[np.hypot(*legs.T) > TOLERANCE / 6]  # nearer places are one
+    bends = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(*legs.T[::-1])))))
+    along = np.cumsum(np.hypot(*legs.T))[:-1]
+    return np.diff(along[bends > 0.2]).min(initial=np.inf)
 
 
 def distance(points, area):
@@ -83,6 +93,60 @@ def test_lanes_cover_what_can_be_reached_and_keep_clear(text, direction, tmp_pat
     assert is_inside(path, area).all()
     assert distance(path, area).min() >= lanes.clearance - 1e-4
     assert covered(area, path, lanes.width) >= 0.99
+    assert nearest_turns(lanes.given()) >= lanes.width / 4
+
+
+def some_area(random):
+    """Corners of a rectangle, a polygon, an L, or a rectangle with a square or a polygon in it."""
+    kind, (w, h) = random.integers(5), random.uniform(1, 4, 2)
+    if kind == 1:
+        number = random.integers(4, 9)
+        angles = 2 * np.pi / number * (np.arange(number) + random.uniform(0, 0.8, number))
+        return [np.c_[np.cos(angles), np.sin(angles)] * random.uniform(1, 2, (number, 1))]
+    if kind == 2:
+        u, v = random.uniform(0.4, 0.8, 2) * (w, h)
+        return [[(0, 0), (w, 0), (w, v), (u, v), (u, h), (0, h)]]
+    if kind > 2:
+        w, h = w + 2, h + 2
+    rings = [np.array([(0, 0), (w, 0), (w, h), (0, h)])]
+    if kind == 3:
+        x, y = random.uniform(0.7, w - 1.7), random.uniform(0.7, h - 1.7)
+        rings.append(np.array([(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]))
+    if kind == 4:
+        number, turn = random.integers(3, 7), random.uniform(0, 6)
+        angles = 2 * np.pi * np.arange(number) / number + turn
+        radius = random.uniform(0.2, min(w, h) / 2 - 0.6)
+        rings.append((w / 2, h / 2) + radius * np.c_[np.cos(angles), np.sin(angles)])
+    return rings
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(6, 100))]
+)
+def test_of_any_area_the_lanes_cover_it_keep_clear_and_have_no_zigzag(seed, tmp_path):
+    random = np.random.default_rng(seed)
+    rings = some_area(random)
+    text = "\n\n".join("\n".join(f"{x} {y}" for x, y in ring) for ring in rings)
+    width, overlap = random.choice([0.15, 0.2, 0.3]), random.choice([0.0, 0.05])
+    direction = random.choice([0.0, np.pi / 2, random.uniform(-3, 3)])
+    lanes = made(tmp_path, text, width=width, overlap=overlap, direction=direction)
+    # what is kept clear of, so that corners that are rounded do as well: a raster's row beyond
+    # may be 1 % of a small area
+    path, area = Polyline.through(lanes.given(), lanes), read_area(lanes.area, 0.2 + TOLERANCE / 4)
+    places = path.derivatives(np.linspace(0, path.length, 10_001))[0]
+    assert distance(places[::3], area).min() >= lanes.clearance - 1e-4
+    assert covered(area, places, width) >= 0.99
+    assert nearest_turns(lanes.given()) >= (width - overlap) / 4
+
+
+def test_lanes_beside_a_hole_lie_on_those_along_its_edges(tmp_path):
+    """Or it would go to and fro between the two."""
+    lanes = made(tmp_path, FACADE.read_text())
+    area = read_area(lanes.area, 0.2 + TOLERANCE / 4)
+    found = lanes_of(area, 0.2, edges=True)
+    heights = np.unique(found[found[:, 0, 1] == found[:, 1, 1], 0, 1].round(5))
+    assert {0.201, 0.399, 1.601, 1.799} < set(heights.round(3))
+    assert np.diff(heights).min() > 0.15
 
 
 def test_without_lanes_along_edges_it_is_shorter_and_leaves_their_ends(tmp_path):
@@ -113,6 +177,21 @@ def test_it_begins_at_the_corner_that_is_nearest(tmp_path):
         assert np.hypot(*(lanes.given()[0] - [x, y])) <= 0.3
 
 
+def test_where_the_way_down_counts_more_it_goes_up_from_lane_to_lane(tmp_path):
+    """No turn from down to level is left, in which a climber whose turns scrub would sag."""
+    descended = []
+    for direction in (0.0, np.pi):
+        lanes = made(tmp_path, FACADE.read_text(), direction=direction, descent=4.0)
+        legs = np.diff(lanes.given(), axis=0)
+        legs = legs[np.hypot(*legs.T) > 1e-3]
+        slope = legs[:, 1] / np.hypot(*legs.T)
+        turns = np.abs(np.sum(legs[1:] * legs[:-1], axis=1)) < 0.1 * np.prod(
+            np.hypot(*np.stack([legs[1:], legs[:-1]]).T), axis=1
+        )
+        descended.append(np.sum((slope[:-1] < -0.9) & (np.abs(slope[1:]) < 0.1) & turns))
+    assert descended == [0, 0]
+
+
 def test_every_lane_is_driven_whole_from_end_to_end():
     area = Area((np.array([[0, 0], [3, 0], [3, 2], [0, 2.0]]),), 0.2)
     lanes = lanes_of(area, 0.2, edges=True)
@@ -128,6 +207,8 @@ def test_every_lane_is_driven_whole_from_end_to_end():
         ("\n\n", {}, "no corners in it"),
         ("0 0\n1 0", {}, r"area='.*': ring 1: 2 corner\(s\), want >= 3"),
         ("0 0\n1 0\n1 1\n\n0 0\n1 x\n0 1", {}, "ring 2: line 2: 'x' must be a number"),
+        ("0 0\n2 2\n2 0\n0 2", {}, r"ring 1 crosses itself at \(1, 1\) m"),
+        ("0 0\n3 0\n3 3\n0 3\n\n2 1\n4 1\n4 2\n2 2", {}, r"ring 1 crosses ring 2 at \(3, 1\) m"),
         ("0 0\n0.3 0\n0.3 0.3\n0 0.3", {}, "m between the clearances"),
         ("0 0\n3000 0\n3000 2000\n0 2000", {}, "want 0 to 500 lanes of 0.2 m"),
         ("0 0\n1 0\n1 1\n0 1", {"overlap": 0.2}, "overlap=0.2 must be < width=0.2"),

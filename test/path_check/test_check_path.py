@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from climber_uk.mechanics.adhesion import Attachment, Grip, Magnetic, Suction
+from climber_uk.mechanics.adhesion import Grip, Magnetic, Suction
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.contact import Contact, FourWheeled
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Circle, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
@@ -42,7 +42,7 @@ WALLS = {
     "roof": Cone(6.0),
     "sphere": Sphere(5.0),
 }
-HELD = Attachment(adhesion=Suction(), grip=Grip())
+HELD = Contact(adhesion=Suction(), grip=Grip())
 FRICTION = 0.6 * 0.2 * 8000 * 0.06  # [N] of the seal, by hand
 
 
@@ -131,6 +131,92 @@ def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatc
 
 
 @pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("shape:=line line.length:=1e300", "the path leads to (1.25e+299, 3) m, beyond 1e+06 m of"),
+        ("shape:=line line.length:=1e-300", "the path is 1e-300 m wide and high, want >= 0.0001 m"),
+        ("shape:=circle circle.radius:=1e18", "beyond 1e+06 m of the origin"),
+        ("shape:=circle circle.radius:=1e-9", "want >= 0.0001 m"),
+        ("shape:=ellipse ellipse.semi_axis_y:=1e-9", "the path turns on the spot"),
+        ("shape:=lemniscate lemniscate.half_height:=1e-300", "the path turns on the spot"),
+        ("shape:=sine_wave sine_wave.wavelength:=1e-300", "too large or too small"),
+        ("origin_x:=1e300", "beyond 1e+06 m of the origin"),
+        ("rest_to_rest.rate:=1e-300", "s, more than 1e+09 s"),
+        ("rest_to_rest.ramp_time:=1e300", "s, more than 1e+09 s"),
+        ("rest_to_rest.ramp_time:=1e-300", "rest_to_rest.ramp_time=1e-300 must be >= 0.001 [s]"),
+        ("rest_to_rest.laps:=1000000000000", "s, more than 1e+09 s"),
+        ("time_law:=constant_rate constant_rate.rate:=1e300", "changes its speed at once"),
+        ("shape:=waypoints rest_to_rest.rate:=1e300", "too large or too small"),
+        ("shape:=waypoints waypoints.tolerance:=1e-300", "tolerance=1e-300 must be >= 1e-05 [m]"),
+        ("shape:=waypoints waypoints.max_yaw_rate:=1e-300", "too large or too small"),
+        ("shape:=lanes lanes.clearance:=1e300", "m between the clearances"),
+        ("shape:=lanes lanes.dwell:=1e300", "s, more than 1e+09 s"),
+    ],
+)
+def test_absurd_numbers_are_refused_in_words(monkeypatch, capsys, words, said):
+    files = f"waypoints.file:={CONFIG / 'lanes.csv'}", f"lanes.area:={CONFIG / 'facade.csv'}"
+    changes = [part for word in (*files, *words.split()) for part in ("-p", word)]
+    monkeypatch.setattr(
+        "sys.argv", ["check_path", "--params", str(CONFIG / "climber.yaml"), *changes]
+    )
+    with pytest.raises(SystemExit) as ended:
+        check_path.main()
+    told = capsys.readouterr()
+    assert ended.value.code == 2
+    assert said in told.err
+    assert (told.err.count("\n"), told.out) == (1, "")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x,y\n0,0\n1,1e300\n", "line 3: point 2 at (1, 1e+300) m is beyond 1e+06 m"),
+        ("x,y,speed\n0,0,1e-300\n1,0,\n", "the path"),
+        ("x,y,dwell\n0,0,\n1,0,1e300\n2,0,\n", "s, more than 1e+09 s"),
+    ],
+)
+def test_absurd_numbers_of_files_are_refused_too(monkeypatch, capsys, tmp_path, text, said):
+    (tmp_path / "points.csv").write_text(text)
+    words = "-p", "shape:=waypoints", "-p", f"waypoints.file:={tmp_path / 'points.csv'}"
+    monkeypatch.setattr(
+        "sys.argv", ["check_path", "--params", str(CONFIG / "climber.yaml"), *words]
+    )
+    with pytest.raises(SystemExit) as ended:
+        check_path.main()
+    told = capsys.readouterr()
+    assert ended.value.code == 2
+    assert said in told.err
+    assert told.err.count("\n") == 1
+
+
+def test_what_scrubs_resists_a_turn():
+    """By hand: on a floor, four wheels in a circle at a steady speed."""
+    floor, wheels = replace(CLIMBER, inclination=0.0), FourWheeled(0.8, wheelbase=0.25)
+    contact = Contact(adhesion=Suction(), grip=Grip(), locomotion=wheels)
+    circle = Trajectory(Circle(1.0), ConstantRate(0.2))
+    found = demands(circle, floor, contact, 1.0)
+    moment = 0.8 * (0.8 * 480 + 5 * 9.81) * 0.25 / 2
+    right, left = (0.027 * (FRICTION + side * moment / 0.3) / 2 for side in (1, -1))
+    np.testing.assert_allclose(found.torques, [[right, left]] * len(found.time), rtol=1e-6)
+    straight = Trajectory(Line(1.0), RestToRest(rate=0.2))
+    turns_not = (demands(straight, floor, of, 1.0).torques for of in (contact, HELD))
+    np.testing.assert_array_equal(*turns_not)
+
+
+def test_what_the_plant_runs_on_is_in_what_a_circle_asks_for(monkeypatch, capsys):
+    words = "--params", CONFIG / "four_wheels.yaml"
+    status, said = run(monkeypatch, capsys, *words)
+    trajectory, climber, contact, _ = check_path.read(CONFIG / "four_wheels.yaml", {}, [])
+    left, without = (
+        {limit.name: limit.reserve for limit in demands(trajectory, climber, of, 1.5).least()}
+        for of in (contact, HELD)
+    )
+    assert left["torque"] < 0.7 * without["torque"]
+    assert f"torque: {left['torque']:.3g} times what is asked for" in said
+    assert status == (min(left.values()) < 1)
+
+
+@pytest.mark.parametrize(
     ("text", "words", "line"),
     [
         (None, ["-p", "shape:=nothing"], "shape='nothing' must be one of "),
@@ -157,8 +243,8 @@ def test_what_is_wrong_is_said_in_one_line(monkeypatch, capsys, tmp_path, text, 
 
 def test_margins_are_those_that_the_nodes_tell():
     """The paper's: 0.54 to 0.53, as the controller publishes them."""
-    trajectory, climber, attachment, _ = check_path.read(CONFIG / "paper.yaml", {}, [])
-    found = demands(trajectory, climber, attachment, 1.0)
+    trajectory, climber, contact, _ = check_path.read(CONFIG / "paper.yaml", {}, [])
+    found = demands(trajectory, climber, contact, 1.0)
     slip = next(iter(found.reserves.values()))
     assert np.min(slip) == pytest.approx(0.53, abs=0.02)
 
@@ -193,7 +279,7 @@ def test_the_command_takes_the_wall_of_the_controller(monkeypatch, capsys, tmp_p
 
 def test_the_fastest_law_keeps_its_margin_on_a_sphere_which_would_throw_it_off():
     """Outside of one of 2 m; v²/R takes from what presses it on, up to lifting it off."""
-    sphere, held = Sphere(-2.0), Attachment(adhesion=Magnetic(force_at_contact=150.0))
+    sphere, held = Sphere(-2.0), Contact(adhesion=Magnetic(force_at_contact=150.0))
     circle = Trajectory(Circle(1.0), RestToRest(rate=0.2))
     free = replace(CLIMBER, seal_friction_coefficient=0.0, inclination=0.0)
     law = time_optimal(circle, free, held, Limits(margin=1.5), wall=sphere).trajectory

@@ -16,7 +16,8 @@ from climber_uk.control.guidance import Guidance
 from climber_uk.identification.identified import NAMES
 from climber_uk.identification.integral_equations import Site
 from climber_uk.identification.report import EFFECTIVE, label_of
-from climber_uk.mechanics.adhesion import Attachment, Grip, Magnetic
+from climber_uk.mechanics.adhesion import Grip, Magnetic
+from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.shapes import Circle, Line
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
@@ -58,7 +59,7 @@ def test_the_wider_the_interval_of_a_climber_that_holds_the_more_probably_it_sli
 def test_it_falls_where_the_adhesion_does_not_carry_what_it_may_weigh():
     """By hand, upside down: magnets of 60 N and a mass whose median they can just hold."""
     ceiling = replace(CLIMBER, inclination=180.0)
-    magnets = Attachment(adhesion=Magnetic(force_at_contact=60.0), grip=Grip())
+    magnets = Contact(adhesion=Magnetic(force_at_contact=60.0), grip=Grip())
     posterior = {"mass": Interval(60 / 9.81, 0.5, "kg")}
     circle = Trajectory(Circle(1.0), ConstantRate(0.2))
     found = chances(circle, ceiling, magnets, posterior, 4000)["falls"].numbers

@@ -16,7 +16,7 @@ PERIOD, SPEED, HEADING, CREEP = 0.02, 0.2, 0.5, 0.05
 RADIUS = 0.027
 
 
-def a_bag(path, seconds=20.0, late=0.3, has_imu=True):
+def a_bag(path, seconds=20.0, late=0.3, has_imu=True, runs=1):
     """A climber that goes straight and sags; fixes of 2 cm, five a second, that come late."""
     random, messages = np.random.default_rng(0), []
     for number in range(round(seconds / PERIOD)):
@@ -50,7 +50,8 @@ def a_bag(path, seconds=20.0, late=0.3, has_imu=True):
             fix.pose.pose.orientation = turn(0.0)
             fix.pose.covariance = np.diag([4e-4, 4e-4, 1.0, 1.0, 1.0, 100.0]).ravel()
             messages.append(("/pose", POSE, stamp + round(late * SECOND), fix))
-    return write(path, messages)
+    later = range(0, 100 * runs * SECOND, 100 * SECOND)
+    return write(path, [(*what, when + at, one) for at in later for *what, when, one in messages])
 
 
 @pytest.fixture
@@ -108,3 +109,8 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, run, arguments, said):
     assert said in message
     assert message.startswith("localize: ")
     assert not (tmp_path / "bag" / "localization").exists()
+
+
+def test_two_runs_are_not_taken_for_one(tmp_path, run):
+    _, message = run(a_bag(tmp_path / "bag", seconds=0.5, runs=2))
+    assert "/joint_states: time starts again, there are 2 runs: want one" in message
