@@ -6,7 +6,7 @@ what was to act at that time, and before: the delay that leaves the least varian
 """
 
 import math
-from collections import deque
+from bisect import bisect_right
 from collections.abc import Sequence
 
 from climber_uk.control.actuator_check import SLIDES, Variance
@@ -19,6 +19,7 @@ MEMORY = 0.15  # [s] in which a difference is forgotten
 EXCITED = 0.03  # of the largest force: standard deviation of what no delay leaves unexplained
 UNEXPLAINED = 4.0  # times as much is unexplained with any delay that is borne as with a longer one
 IN_A_ROW = 3  # odometry messages
+KEPT = 100  # of them, that are too old, before they are forgotten
 
 
 class Axis:
@@ -54,8 +55,8 @@ class DelayCheck:
 
     def restart(self) -> None:
         """Compare from now on."""
-        # the last first: for how long [s] it was to act, drive, and yaw at the rims [N]
-        self._asked: deque[tuple[float, float, float]] = deque()
+        self._time = 0.0  # [s] of the last stamp, since the first
+        self._until, self._asked = list[float](), list[tuple[float, float]]()
         self._drive, self._yaw, self._rests = Axis(), Axis(), 0.0
 
     def add(self, climber: Climber, observed: Observed) -> bool:
@@ -63,8 +64,10 @@ class DelayCheck:
         before, after, time = observed.before, observed.after, observed.time
         d, new = climber.half_track, 1 - math.exp(-time / MEMORY)
         force, moment = climber.wrench(*observed.torques)
-        self._asked.appendleft((time, force, moment / d))
-        drives, yaws = zip(*self._at_delays(time / 2), strict=True)
+        self._time += time
+        self._until.append(self._time)
+        self._asked.append((force, moment / d))
+        drives, yaws = zip(*self._at_delays(self._time - time / 2), strict=True)
         mass, inertia, friction, weight = climber.inertial
         self._yaw.add(inertia * (after.yaw_rate - before.yaw_rate) / time / d, yaws, new)
         if min(abs(before.speed), abs(after.speed)) < SLIDES:
@@ -79,16 +82,14 @@ class DelayCheck:
         largest = 2 * climber.max_wheel_torque / climber.wheel_radius
         return self._drive.is_late(largest) or self._yaw.is_late(largest)
 
-    def _at_delays(self, middle: float) -> list[tuple[float, float]]:
-        """Drive and yaw [N] that were to act, of each delay, `middle` [s] before the last stamp."""
-        found = list[tuple[float, float]]()
-        until, delays = 0.0, [middle + it for it in BORNE + LATE]
-        for number, (time, drive, yaw) in enumerate(self._asked):
-            until += time
-            while len(found) < len(delays) and delays[len(found)] <= until:
-                found.append((drive, yaw))
-            if len(found) == len(delays):
-                for _ in range(len(self._asked) - number - 1):
-                    self._asked.pop()
-                break
-        return found + [(0.0, 0.0)] * (len(delays) - len(found))
+    def _at_delays(self, time: float) -> list[tuple[float, float]]:
+        """Drive, and yaw at the rims [N], that were to act each delay before a `time` [s]."""
+        last = len(self._until) - 1
+        places = [bisect_right(self._until, time - delay, hi=last) for delay in BORNE + LATE]
+        found = [
+            self._asked[place] if time >= delay else (0.0, 0.0)
+            for place, delay in zip(places, BORNE + LATE, strict=True)
+        ]
+        if (forgotten := places[-1]) > KEPT:
+            del self._until[:forgotten], self._asked[:forgotten]
+        return found
