@@ -23,14 +23,25 @@ KEPT = 100  # of them, that are too old, before they are forgotten
 
 
 class Axis:
-    """A force that acts, beside one that was to act, at the time of each delay."""
+    """A force that acts, beside one that was to act, at the time of each delay, while it moves."""
 
     def __init__(self) -> None:
+        self._rests = 0.0  # [s]
+        self._restart()
+
+    def _restart(self) -> None:
         self._acted, self._unexplained = Variance(), [Variance() for _ in BORNE + LATE]
         self._late = 0  # messages in a row
 
+    def rest(self, time: float) -> None:
+        """For some time [s] more it stands: what rubs holds it, by as much as is asked."""
+        self._rests += time
+        if self._rests > MEMORY:
+            self._restart()
+
     def add(self, acted: float, asked: Sequence[float], weight: float) -> None:
         """Add the force [N] that acted, and those that were to act, each with its delay."""
+        self._rests = 0.0
         self._acted.add(acted, weight)
         for variance, force in zip(self._unexplained, asked, strict=True):
             variance.add(acted - force, weight)
@@ -48,7 +59,7 @@ class Axis:
 
 
 class DelayCheck:
-    """Compares what acts with what was to act: of the drive while it slides, and of the yaw."""
+    """Compares what acts with what was to act: of the drive, and of the yaw, while they move."""
 
     def __init__(self) -> None:
         self.restart()
@@ -57,7 +68,7 @@ class DelayCheck:
         """Compare from now on."""
         self._time = 0.0  # [s] of the last stamp, since the first
         self._until, self._asked = list[float](), list[tuple[float, float]]()
-        self._drive, self._yaw, self._rests = Axis(), Axis(), 0.0
+        self._drive, self._yaw = Axis(), Axis()
 
     def add(self, climber: Climber, observed: Observed) -> bool:
         """Take what an odometry tells of the time since the last: does that show a delay?"""
@@ -69,13 +80,14 @@ class DelayCheck:
         self._asked.append((force, moment / d))
         drives, yaws = zip(*self._at_delays(self._time - time / 2), strict=True)
         mass, inertia, friction, weight = climber.inertial
-        self._yaw.add(inertia * (after.yaw_rate - before.yaw_rate) / time / d, yaws, new)
-        if min(abs(before.speed), abs(after.speed)) < SLIDES:
-            self._rests += time  # a seal holds it, by as much as is asked
-            if self._rests > MEMORY:
-                self._drive = Axis()
+        if d * min(abs(before.yaw_rate), abs(after.yaw_rate)) < SLIDES:
+            self._yaw.rest(time)
         else:
-            self._rests = 0.0
+            turn = inertia * (after.yaw_rate - before.yaw_rate) / time / d
+            self._yaw.add(turn, yaws, new)
+        if min(abs(before.speed), abs(after.speed)) < SLIDES:
+            self._drive.rest(time)
+        else:
             drive = mass * (after.speed - before.speed) / time + weight * after.sine
             drive += math.copysign(friction, after.speed) - observed.pull
             self._drive.add(drive, drives, new)
