@@ -204,7 +204,8 @@ def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_le
     wheels = replay(paper_bags[0], "-p", more)["wheels"]
     assert wheels["difference, largest [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
     assert wheels["largest at [s]"] == [0.0, 0.0]
-    assert max(wheels["difference, RMS [N m]"]) < by_hand / 20
+    # no more in all of the 5 s than if it were wrong for 25 ms, and then right
+    assert max(wheels["difference, RMS [N m]"]) < by_hand * (0.025 / 5) ** 0.5
 
 
 def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
@@ -219,7 +220,7 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
     )
     # these sensors have no errors; the recorder may have ended between the two
     number = min(odometry.num_poses, truth.num_poses)
-    assert number >= 2000
+    assert number >= 1000
     for one in ("timestamps", "positions_xyz", "orientations_quat_wxyz"):
         np.testing.assert_array_equal(getattr(odometry, one)[:number], getattr(truth, one)[:number])
     run = read_run(paper_bags[0])
