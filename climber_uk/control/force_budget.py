@@ -121,8 +121,6 @@ class ForceBudget:
             self._most_pushes = STOPPED_PUSHES if stops else PUSHES
         elif self.pushes and after[:3] != before[:3] and not self._lives:
             self._lives = True
-            if self._still > LATE + observed.reaction:
-                self.paused = 0.0  # is it what that push did? See what it becomes
         push = _push(climber, observed.torques, _weight(climber, observed))
         holds = self._holds(climber)
         self.speed = _rolled(self.speed, push, holds, time / climber.driven_mass)
