@@ -9,12 +9,13 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from climber_uk.control.actuator_check import SLIDES, Variance
+from climber_uk.control.actuator_check import Variance
 from climber_uk.control.estimator import Observed
 from climber_uk.mechanics.climber import Climber
 
 BORNE = 0.0, 0.02, 0.04  # [s] that the loop bears, beside what it has learnt
 LATE = 0.06, 0.08, 0.1, 0.14, 0.2  # [s] that it does not
+MOVES = 0.03  # [m/s] from which on noise does not make it that
 MEMORY = 0.15  # [s] in which a difference is forgotten
 EXCITED = 0.03  # of the largest force: standard deviation of what no delay leaves unexplained
 UNEXPLAINED = 4.0  # times as much is unexplained with any delay that is borne as with a longer one
@@ -80,12 +81,12 @@ class DelayCheck:
         self._asked.append((force, moment / d))
         drives, yaws = zip(*self._at_delays(self._time - time / 2), strict=True)
         mass, inertia, friction, weight = climber.inertial
-        if d * min(abs(before.yaw_rate), abs(after.yaw_rate)) < SLIDES:
+        if d * min(abs(before.yaw_rate), abs(after.yaw_rate)) < MOVES:
             self._yaw.rest(time)
         else:
             turn = inertia * (after.yaw_rate - before.yaw_rate) / time / d
             self._yaw.add(turn, yaws, new)
-        if min(abs(before.speed), abs(after.speed)) < SLIDES:
+        if min(abs(before.speed), abs(after.speed)) < MOVES:
             self._drive.rest(time)
         else:
             drive = mass * (after.speed - before.speed) / time + weight * after.sine
