@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from climber_uk.control.actuator_check import Variance
 from climber_uk.control.estimator import Observed
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import Motion
 
 BORNE = 0.0, 0.02, 0.04  # [s] that the loop bears, beside what it has learnt
 LATE = 0.06, 0.08, 0.1, 0.14, 0.2  # [s] that it does not
@@ -19,8 +20,10 @@ MOVES = 0.03  # [m/s] from which on noise does not make it that
 MEMORY = 0.15  # [s] in which a difference is forgotten
 EXCITED = 0.03  # of the largest force: standard deviation of what no delay leaves unexplained
 UNEXPLAINED = 4.0  # times as much is unexplained with any delay that is borne as with a longer one
-IN_A_ROW = 3  # odometry messages
-KEPT = 100  # of them, that are too old, before they are forgotten
+TICK = 1e-6  # [s]
+WINDOW = 0.015  # [s] at least, over which a force is told: noise of the twist is shared out
+IN_A_ROW = 2  # windows
+KEPT = 100  # odometry messages that are too old, before they are forgotten
 
 
 class Axis:
@@ -32,7 +35,7 @@ class Axis:
 
     def _restart(self) -> None:
         self._acted, self._unexplained = Variance(), [Variance() for _ in BORNE + LATE]
-        self._late = 0  # messages in a row
+        self._late = 0  # windows in a row
 
     def rest(self, time: float) -> None:
         """For some time [s] more it stands: what rubs holds it, by as much as is asked."""
@@ -67,42 +70,64 @@ class DelayCheck:
 
     def restart(self) -> None:
         """Compare from now on."""
-        self._time = 0.0  # [s] of the last stamp, since the first
-        self._until, self._asked = list[float](), list[tuple[float, float]]()
+        self._time = self._begin = 0.0  # [s] of the last stamp, and of the window's begin
+        self._first: Motion | None = None  # of the window
+        # until when, and with what impulse of drive, and of yaw at the rims [N s], it was to act
+        self._until, self._impulse = [0.0], [(0.0, 0.0)]
         self._drive, self._yaw = Axis(), Axis()
 
     def add(self, climber: Climber, observed: Observed) -> bool:
         """Take what an odometry tells of the time since the last: does that show a delay?"""
-        before, after, time = observed.before, observed.after, observed.time
-        d, new = climber.half_track, 1 - math.exp(-time / MEMORY)
-        force, moment = climber.wrench(*observed.torques)
-        self._time += time
+        d, (force, moment) = climber.half_track, climber.wrench(*observed.torques)
+        drive, yaw = self._impulse[-1]
+        self._time += observed.time
         self._until.append(self._time)
-        self._asked.append((force, moment / d))
-        drives, yaws = zip(*self._at_delays(self._time - time / 2), strict=True)
+        self._impulse.append((drive + observed.time * force, yaw + observed.time * moment / d))
+        before, after = self._first or observed.before, observed.after
+        time = self._time - self._begin
+        if time < WINDOW - TICK:
+            self._first = before
+            return False
+        drives, yaws = self._asked(time)
+        self._first, self._begin, new = None, self._time, 1 - math.exp(-time / MEMORY)
         mass, inertia, friction, weight = climber.inertial
-        if d * min(abs(before.yaw_rate), abs(after.yaw_rate)) < MOVES:
+        if d * _slowest(before.yaw_rate, after.yaw_rate) < MOVES:
             self._yaw.rest(time)
         else:
             turn = inertia * (after.yaw_rate - before.yaw_rate) / time / d
             self._yaw.add(turn, yaws, new)
-        if min(abs(before.speed), abs(after.speed)) < MOVES:
+        if _slowest(before.speed, after.speed) < MOVES:
             self._drive.rest(time)
         else:
-            drive = mass * (after.speed - before.speed) / time + weight * after.sine
-            drive += math.copysign(friction, after.speed) - observed.pull
-            self._drive.add(drive, drives, new)
+            acted = mass * (after.speed - before.speed) / time + weight * after.sine
+            acted += math.copysign(friction, after.speed) - observed.pull
+            self._drive.add(acted, drives, new)
         largest = 2 * climber.max_wheel_torque / climber.wheel_radius
         return self._drive.is_late(largest) or self._yaw.is_late(largest)
 
-    def _at_delays(self, time: float) -> list[tuple[float, float]]:
-        """Drive, and yaw at the rims [N], that were to act each delay before a `time` [s]."""
-        last = len(self._until) - 1
-        places = [bisect_right(self._until, time - delay, hi=last) for delay in BORNE + LATE]
-        found = [
-            self._asked[place] if time >= delay else (0.0, 0.0)
-            for place, delay in zip(places, BORNE + LATE, strict=True)
-        ]
-        if (forgotten := places[-1]) > KEPT:
-            del self._until[:forgotten], self._asked[:forgotten]
-        return found
+    def _asked(self, time: float) -> tuple[list[float], list[float]]:
+        """Drives, and yaws at the rims [N], that were to act in the last `time` [s]; each later."""
+        ends = [self._at(self._time - delay) for delay in BORNE + LATE]
+        begins = [self._at(self._time - time - delay) for delay in BORNE + LATE]
+        drives, yaws = (
+            [(end[axis] - begin[axis]) / time for end, begin in zip(ends, begins, strict=True)]
+            for axis in (0, 1)
+        )
+        if (forgotten := bisect_right(self._until, self._begin - LATE[-1]) - 1) > KEPT:
+            del self._until[:forgotten], self._impulse[:forgotten]
+        return drives, yaws
+
+    def _at(self, time: float) -> tuple[float, float]:
+        """Impulse of drive and of yaw until a `time` [s]."""
+        if time <= self._until[0]:
+            return self._impulse[0]
+        place = bisect_right(self._until, time, hi=len(self._until) - 1)
+        since, until = self._until[place - 1], self._until[place]
+        share = (time - since) / (until - since)
+        (drive, yaw), (drive_1, yaw_1) = self._impulse[place - 1], self._impulse[place]
+        return drive + share * (drive_1 - drive), yaw + share * (yaw_1 - yaw)
+
+
+def _slowest(before: float, after: float) -> float:
+    """The lower speed of two, 0 if it turned round between them."""
+    return min(abs(before), abs(after)) if before * after > 0 else 0.0
