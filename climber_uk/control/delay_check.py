@@ -20,9 +20,10 @@ MOVES = 0.03  # [m/s] from which on noise does not make it that
 MEMORY = 0.15  # [s] in which a difference is forgotten
 EXCITED = 0.03  # of the largest force: standard deviation of what no delay leaves unexplained
 UNEXPLAINED = 4.0  # times as much is unexplained with any delay that is borne as with a longer one
-TICK = 1e-6  # [s]
+TICK = 1e-6  # [s] by which times that are added may be off
 WINDOW = 0.015  # [s] at least, over which a force is told: noise of the twist is shared out
-IN_A_ROW = 2  # windows
+IN_A_ROW = 2  # windows; one in which it rests leaves what was found
+ENOUGH = 5  # windows, of fewer a variance is chance
 KEPT = 100  # odometry messages that are too old, before they are forgotten
 
 
@@ -51,13 +52,14 @@ class Axis:
             variance.add(acted - force, weight)
 
     def is_late(self, largest: float) -> bool:
-        """Whether it acts later than is borne, by forces of `largest` [N] at most."""
+        """Whether, once a window, it acts later than is borne, by `largest` [N] at most."""
         variances = [it.variance for it in self._unexplained]
         least = min(variances[len(BORNE) :])
         is_excited = variances[0] > (EXCITED * largest) ** 2
         # where nothing answers, what was to act before may be as steady
         without = min(self._acted.variance, *variances[: len(BORNE)])
-        is_later = is_excited and without > UNEXPLAINED * least
+        is_known = self._acted.number >= ENOUGH
+        is_later = is_known and is_excited and without > UNEXPLAINED * least
         self._late = self._late + 1 if is_later else 0
         return self._late >= IN_A_ROW
 
@@ -103,10 +105,10 @@ class DelayCheck:
             acted += math.copysign(friction, after.speed) - observed.pull
             self._drive.add(acted, drives, new)
         largest = 2 * climber.max_wheel_torque / climber.wheel_radius
-        return self._drive.is_late(largest) or self._yaw.is_late(largest)
+        return any([self._drive.is_late(largest), self._yaw.is_late(largest)])
 
     def _asked(self, time: float) -> tuple[list[float], list[float]]:
-        """Drives, and yaws at the rims [N], that were to act in the last `time` [s]; each later."""
+        """Drives, and yaws at the rims [N], of the last `time` [s], had they come by each delay."""
         ends = [self._at(self._time - delay) for delay in BORNE + LATE]
         begins = [self._at(self._time - time - delay) for delay in BORNE + LATE]
         drives, yaws = (

@@ -119,7 +119,7 @@ class ForceBudget:
             self._lives, self._still = False, 0.0
             stops = self._wanted > STOPPED and self._slid > KNOWN
             self._most_pushes = STOPPED_PUSHES if stops else PUSHES
-        elif self.pushes and after[:3] != before[:3] and not self._lives:
+        elif self.pushes and after[:3] != before[:3]:
             self._lives = True
         push = _push(climber, observed.torques, _weight(climber, observed))
         holds = self._holds(climber)

@@ -4,7 +4,6 @@ The newest goal is driven; the one before it is aborted once that is taken up. W
 definition has not, of fields and of error codes, is left out.
 """
 
-import gc
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +17,6 @@ from climber_uk.planning.progress import APPROACHING, FOLLOWING, Odometer
 from climber_uk.ros.running import ClimberNode
 
 if TYPE_CHECKING:
-    from rclpy.action import ActionServer
     from rclpy.action.server import ServerGoalHandle
 
     from climber_uk.mechanics.trajectory import Trajectory
@@ -29,25 +27,6 @@ try:
     from nav2_msgs.action import FollowPath
 except ImportError:  # it comes with Nav2, not with the wheels
     FollowPath = None
-
-
-def _uncollected(server: type["ActionServer"]) -> type["ActionServer"]:
-    """The same, which reads goals without the garbage collector: a quarter less of the time.
-
-    rclpy makes six objects of each pose, none of which is garbage; meanwhile nothing else is done.
-    """
-
-    class Server(server):  # type: ignore[misc, valid-type]
-        def take_data(self) -> Any:
-            was_on = gc.isenabled()
-            gc.disable()
-            try:
-                return super().take_data()
-            finally:
-                if was_on:
-                    gc.enable()
-
-    return Server
 
 
 @dataclass(eq=False)
@@ -78,7 +57,7 @@ class PathGoals:
         self._mode = ""  # of the controller; empty: none has told
         self._heard_at = self._followed_at = 0  # [ns]
         self._goals: dict[bytes, Goal] = {}
-        self._server = _uncollected(ActionServer)(
+        self._server = ActionServer(
             node,
             FollowPath,
             FOLLOW_PATH,

@@ -130,6 +130,23 @@ def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatc
     assert "TOO MUCH" in said
 
 
+@pytest.fixture
+def refusal(monkeypatch, capsys):
+    """The one line by which check_path refuses climber.yaml with some changes, and status 2."""
+
+    def told(*changes):
+        words = [part for change in changes for part in ("-p", change)]
+        file = str(CONFIG / "climber.yaml")
+        monkeypatch.setattr("sys.argv", ["check_path", "--params", file, *words])
+        with pytest.raises(SystemExit) as ended:
+            check_path.main()
+        out, err = capsys.readouterr()
+        assert (ended.value.code, err.count("\n"), out) == (2, 1, "")
+        return err
+
+    return told
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -153,18 +170,9 @@ def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatc
         ("shape:=lanes lanes.dwell:=1e300", "s, more than 1e+09 s"),
     ],
 )
-def test_absurd_numbers_are_refused_in_words(monkeypatch, capsys, words, said):
+def test_absurd_numbers_are_refused_in_words(refusal, words, said):
     files = f"waypoints.file:={CONFIG / 'lanes.csv'}", f"lanes.area:={CONFIG / 'facade.csv'}"
-    changes = [part for word in (*files, *words.split()) for part in ("-p", word)]
-    monkeypatch.setattr(
-        "sys.argv", ["check_path", "--params", str(CONFIG / "climber.yaml"), *changes]
-    )
-    with pytest.raises(SystemExit) as ended:
-        check_path.main()
-    told = capsys.readouterr()
-    assert ended.value.code == 2
-    assert said in told.err
-    assert (told.err.count("\n"), told.out) == (1, "")
+    assert said in refusal(*files, *words.split())
 
 
 @pytest.mark.parametrize(
@@ -175,18 +183,9 @@ def test_absurd_numbers_are_refused_in_words(monkeypatch, capsys, words, said):
         ("x,y,dwell\n0,0,\n1,0,1e300\n2,0,\n", "s, more than 1e+09 s"),
     ],
 )
-def test_absurd_numbers_of_files_are_refused_too(monkeypatch, capsys, tmp_path, text, said):
+def test_absurd_numbers_of_files_are_refused_too(refusal, tmp_path, text, said):
     (tmp_path / "points.csv").write_text(text)
-    words = "-p", "shape:=waypoints", "-p", f"waypoints.file:={tmp_path / 'points.csv'}"
-    monkeypatch.setattr(
-        "sys.argv", ["check_path", "--params", str(CONFIG / "climber.yaml"), *words]
-    )
-    with pytest.raises(SystemExit) as ended:
-        check_path.main()
-    told = capsys.readouterr()
-    assert ended.value.code == 2
-    assert said in told.err
-    assert told.err.count("\n") == 1
+    assert said in refusal("shape:=waypoints", f"waypoints.file:={tmp_path / 'points.csv'}")
 
 
 def test_what_scrubs_resists_a_turn():
