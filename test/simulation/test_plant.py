@@ -264,7 +264,10 @@ def test_it_stays_where_it_is_with_whatever_sticks(friction, options):
     assert not end.velocity.any()
 
 
-@pytest.mark.parametrize(("heading", "slip"), [(0.3, False), (0.3, True), (np.pi / 2, False)])
+@pytest.mark.parametrize(
+    ("heading", "slip"),
+    [pytest.param(0.3, False, marks=pytest.mark.soak), (0.3, True), (np.pi / 2, False)],
+)
 def test_lugre_gives_way_a_little_and_then_does_not_drift(heading, slip):
     law, start = LuGre(), State(np.array([0.0, 6.0, heading]), np.zeros(3))
     plant = Plant(PAPER, 0.0025, Contact(friction=law), slip=slip)
@@ -321,7 +324,7 @@ def energy(plant, state):
     return speeds / 2 + climber.mass * 9.81 * height
 
 
-@pytest.mark.parametrize("seconds", [20, pytest.param(60, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("seconds", [6, pytest.param(60, marks=pytest.mark.soak)])
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=() if name in OFTEN else pytest.mark.soak) for name in BALANCES],
