@@ -20,14 +20,14 @@ pytestmark = pytest.mark.nodes
 
 
 class Operated(Waiting):
-    """A climb with an operator, in a time twice as fast as theirs: else it would end meanwhile."""
+    """A climb with an operator, in their time: else it would end meanwhile."""
 
     def __init__(self, world, changed):
         slow = {
-            name: [word.replace("period:=0.01", "period:=0.02") for word in words]
+            name: [word.replace("period:=0.02", "period:=0.04") for word in words]
             for name, words in LOCK_STEP.items()
         }
-        slow[PLANT].append("real_time_factor:=2.0")
+        slow[PLANT].append("real_time_factor:=1.0")
         super().__init__(world, changed, slow)
         self.progress = world.listen(DiagnosticArray, f"{PLANNER}/progress")
 
@@ -68,12 +68,12 @@ class Operated(Waiting):
 
     def drives(self, low, high, since=None):
         """Wait until its speed [m/s] is, or `since` odometry of this number was, so for 0.5 s."""
-        first = max(len(self.odometry) - 25, 0) if since is None else since
+        first = max(len(self.odometry) - 12, 0) if since is None else since
 
         def is_so():
             speeds = [m.twist.twist.linear.x for m in self.odometry[first:]]
             fits = "".join("+" if low <= speed <= high else "-" for speed in speeds)
-            return 25 * "+" in fits
+            return 12 * "+" in fits
 
         self.world.wait(is_so, f"a speed of {low} to {high} m/s")
 

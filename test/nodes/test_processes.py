@@ -106,7 +106,8 @@ def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(
     family = descendants(process.pid)
     assert len(family) == 4 + by_another
     end(process)
-    process.stdout.read()  # or it would wait for somebody to read how far it is
+    said = process.stdout.read()  # or it would wait for somebody to read how far it is
+    assert by_another or "Traceback" not in said  # the other one is told, too
     gone(world, {*family, process.pid})
     assert (tmp_path / "run" / "bag" / "metadata.yaml").is_file()
     assert len(read_run(tmp_path / "run" / "bag").time) > 10
