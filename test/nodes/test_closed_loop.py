@@ -302,11 +302,11 @@ def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     # The machine may be busy, and not keep to it all the time: what an idle one does is shown by
     # `make demo CLOCK=wall`
-    demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6")
+    demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "4")
     finished(world)
     run = read_run(tmp_path / "run" / "bag")
-    assert 5 < run.time[-1] < 20  # that of the configuration
-    assert np.median(run.distance[run.time > 4.0]) < 0.05
+    assert 3 < run.time[-1] < 20  # that of the configuration
+    assert np.median(run.distance[run.time > 2.5]) < 0.05
     assert np.median(np.abs(run.error[:, 1])) < 0.05
     assert run.distance.max() < 0.3  # where the guard is late, too: it does not run away
 

@@ -227,7 +227,10 @@ def test_a_terminal_that_is_closed_does_not_end_what_nohup_started(world):
 @pytest.mark.parametrize("end", [interrupt_twice, kill])
 @pytest.mark.parametrize(
     "command",
-    [["reproduce_paper", "-o"], ["campaign", CONFIG / "campaign.yaml", "--jobs", "2", "-o"]],
+    [
+        pytest.param(["reproduce_paper", "-o"], marks=pytest.mark.soak),
+        ["campaign", CONFIG / "campaign.yaml", "--jobs", "2", "-o"],
+    ],
     ids=lambda command: command[0],
 )
 def test_what_computes_in_many_processes_ends_with_all_of_them(
