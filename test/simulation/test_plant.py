@@ -245,7 +245,11 @@ def test_a_tilted_plane_pulls_along_x():
     np.testing.assert_allclose(end.pose, [9.81 / 2, 0, 0], atol=1e-9)
 
 
-@pytest.mark.parametrize("friction", [Coulomb(), Stribeck()], ids=["coulomb", "stribeck"])
+@pytest.mark.parametrize(
+    "friction",
+    [Coulomb(), pytest.param(Stribeck(), marks=pytest.mark.soak)],
+    ids=["coulomb", "stribeck"],
+)
 @pytest.mark.parametrize(
     "options",
     [{}, {"slip": True}, {"radius": 0.12}, {"tracks": True}, {"radius": 0.12, "slip": True}],
