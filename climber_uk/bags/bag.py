@@ -21,6 +21,8 @@ from climber_uk.bags.connection import Connection, Logged, StorageFile, listed, 
 from climber_uk.bags.definitions import LONGEST, defined, known
 from climber_uk.bags.unpacking import LARGEST_MESSAGE, ZSTD_MAGIC, Allowance, unpack
 
+# what reading a message can raise that has the name of a type, but not its fields
+UNFIT = ValueError, AttributeError, TypeError
 MOST_LOSSES = 20  # lines on what could not be read
 MOST_DEFINITIONS = 4  # times `LONGEST`: the characters of all definitions together
 

@@ -7,7 +7,9 @@
 import argparse
 import json
 import sys
+from collections import Counter
 from dataclasses import fields, replace
+from os.path import realpath
 from pathlib import Path
 from typing import Any
 
@@ -134,10 +136,13 @@ def main() -> None:
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
     untold: list[str] = []
+    written = list(filter(None, (options.output, options.json, options.figure, options.plan)))
     with failing_in_a_line("identify") as doubtful:
-        for file in (options.output, options.json, options.figure, options.plan):
-            if file:
-                check_writable(file.parent)
+        places = Counter(map(realpath, filter(None, (*written, options.bag, options.params))))
+        for file in written:
+            if places[realpath(file)] > 1:
+                raise ValueError(f"{file} is given twice, and would be written over")
+            check_writable(file.parent)
         if options.plan:
             plan(options, doubtful)
         else:

@@ -32,9 +32,9 @@ from climber_uk.path_check.findings import lines, told, told_of
 from climber_uk.path_check.path_limits import Limits
 from climber_uk.path_check.posterior import chances, read_posterior
 from climber_uk.path_check.time_optimal import PERIOD, time_optimal
-from climber_uk.report.outputs import failing_in_a_line, printable
+from climber_uk.report.outputs import failing_in_a_line
 from climber_uk.simulation.simulated_robot import Physics
-from climber_uk.system.command_line import Parser, between
+from climber_uk.system.command_line import Parser, between, printable, whole
 
 NAMES = {
     prefix + field.name
@@ -81,13 +81,6 @@ def _planner(file: Path, changes: dict[str, Any], remarks: list[str]) -> dict[st
     for name in PATHS & planner.keys() - changes.keys():
         planner[name] = located(planner[name], name, f"/{PLANNER}", words)
     return planner
-
-
-def _count(text: str) -> int:
-    """A number of climbers; `ValueError` if it is none."""
-    if not (text.isdecimal() and 1 <= int(text) <= MOST_CLIMBERS):
-        raise argparse.ArgumentTypeError(f"{text!r} must be an integer from 1 to {MOST_CLIMBERS}")
-    return int(text)
 
 
 def _fastest_law(
@@ -163,7 +156,7 @@ def main() -> None:
     )
     parser.add_argument(
         "--climbers",
-        type=_count,
+        type=whole(1, MOST_CLIMBERS),
         default=1000,
         help="that are drawn of the posterior (default: 1000)",
     )
@@ -185,7 +178,7 @@ def main() -> None:
             runs = options.climbers
             events = chances(trajectory, *asked, posterior, runs, wall=wall)
             numbers["posterior"] = told_of(posterior, events, runs)
-        print("\n".join(lines(numbers, found.is_whole)))
+        print(printable("\n".join(lines(numbers, found.is_whole))))
         if options.output:
             from climber_uk.path_check.figure import draw  # matplotlib, which takes a second
 

@@ -14,9 +14,9 @@ from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics import Array
 from climber_uk.report.figures import STYLE, thinned
-from climber_uk.report.outputs import failing_in_a_line, output, printable
+from climber_uk.report.outputs import failing_in_a_line, output
 from climber_uk.report.plotting import plt
-from climber_uk.system.command_line import Parser, between
+from climber_uk.system.command_line import Parser, between, printable
 
 SIZE, DPI = (8.0, 4.2), 90  # [in]
 FORMATS = "webp", "gif"

@@ -14,8 +14,8 @@ from climber_uk.bags.run_reader import NoRunError, RunReader
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
-from climber_uk.report.outputs import failing_in_a_line, output, printable
-from climber_uk.system.command_line import Parser
+from climber_uk.report.outputs import failing_in_a_line, output
+from climber_uk.system.command_line import Parser, printable
 
 Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
 

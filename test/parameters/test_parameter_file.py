@@ -112,9 +112,10 @@ def test_values_fill_dataclasses_and_are_checked_by_name():
 
 
 def test_arguments_are_read_as_yaml():
-    said = ("mass:=6e0", "predict:=n", "constraints:=exact")
+    said = ("mass:=6e0", "predict:=n", "constraints:=exact", "mass:=!!int x", "mass:=" + "[" * 5000)
     read = [read_argument(argument) for argument in said]
-    assert read == [("mass", 6.0), ("predict", False), ("constraints", "exact")]
+    assert read[:3] == [("mass", 6.0), ("predict", False), ("constraints", "exact")]
+    assert read[3:] == [("mass", "!!int x"), ("mass", "[" * 5000)]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ from test_restarts import at_once, two_runs
 from climber_uk.identification import identify
 from climber_uk.replay import replay_controller
 from climber_uk.report import analyze_bag, compare_bags, export_tum
-from climber_uk.report.outputs import output, printable
+from climber_uk.report.outputs import output
+from climber_uk.system.command_line import printable
 
 TOOLS = {
     analyze_bag: ("analysis", "metrics.csv"),
