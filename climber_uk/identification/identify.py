@@ -16,6 +16,7 @@ from typing import Any
 from climber_uk.bags.run_reader import RunReader
 from climber_uk.bags.topics import Topics
 from climber_uk.closed_loop.node_parameters import names_of, read_parameters
+from climber_uk.control.timing import Timing
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
@@ -50,7 +51,7 @@ def identify_bag(options: argparse.Namespace, doubtful: list[str]) -> list[str]:
     assumed, site = Values(parameters).read(Climber), site_of(parameters, plant)
     reader.check_one_run(climber)
     then = {**file, **recorded}
-    delay = then.get("transport_delay", 0.0) if options.delay is None else options.delay
+    delay = Values(then).read(Timing).transport_delay if options.delay is None else options.delay
     motion, unfit = read_motion(reader, climber, then, assumed.suction_pressure, delay)
     doubtful += [f"{options.bag}: {loss}" for loss in reader.bag.losses]
     found = identify(motion, assumed, cut, site)

@@ -9,6 +9,7 @@ from typing import Any, dataclass_transform
 
 import numpy as np
 
+SMALLEST, LARGEST = 1e-12, 1e12  # of any number that is divided by, or multiplied: see `check`
 QOS = "qos_overrides."  # with which rclpy's own parameters begin
 
 
@@ -67,7 +68,10 @@ def parameters(cls: type | None = None, *, slots: bool = False) -> Any:
 
 
 def check(instance: Any) -> None:
-    """Raise `ValueError` naming field, value and bound unless all `parameter` fields are valid."""
+    """Raise `ValueError` naming field, value and bound unless all `parameter` fields are valid.
+
+    No number is so large, or if it has to be positive so small, that its powers are none.
+    """
     for field in dataclasses.fields(instance):
         if field.metadata:
             check_value(field, getattr(instance, field.name))
@@ -81,7 +85,7 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
     rule = field.metadata
     said = f"{field.name}={value!r} must be"
     unit = f" [{rule['unit']}]" if rule["unit"] else ""
-    if rule["choices"] is not None and value not in rule["choices"]:
+    if rule["choices"] is not None and not (isinstance(value, str) and value in rule["choices"]):
         raise ValueError(f"{said} one of {', '.join(rule['choices'])}")
     if isinstance(field.default, bool | str):
         if type(value) is not type(field.default):
@@ -104,6 +108,9 @@ def _check_number(rule: Mapping[str, Any], said: str, value: Any, unit: str) -> 
         raise ValueError(f"{said} a finite number{unit}")
     if rule["above"] is not None and not value > rule["above"]:
         raise ValueError(f"{said} > {rule['above']}{unit}")
+    size = abs(float(value))
+    if size > LARGEST or (rule["above"] is not None and size < SMALLEST):
+        raise ValueError(f"{said} of a size from {SMALLEST:g} to {LARGEST:g}{unit}")
     if rule["at_least"] is not None and not value >= rule["at_least"]:
         raise ValueError(f"{said} >= {rule['at_least']}{unit}")
     if rule["at_most"] is not None and not value <= rule["at_most"]:

@@ -26,11 +26,14 @@ TEXT, QUOTED = "tag:yaml.org,2002:str", ("'", '"')
 TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
 FALSE = {"n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
 INTEGER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)")
-HEXADECIMAL = re.compile(r"[-+]?0x([\da-f]+\.?[\da-f]*|\.[\da-f]+)(p[-+]?\d+)?", re.IGNORECASE)
+HEXADECIMAL = re.compile(
+    r"[-+]?0x([\da-f]+\.?[\da-f]*|\.[\da-f]+)(p[-+]?\d+)?", re.IGNORECASE | re.ASCII
+)
 SPECIAL = re.compile(r"[-+]?(\.?(inf|nan)|infinity)", re.IGNORECASE)
-FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
-ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE)
+FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
+ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
 LEAST = sys.float_info.min
+DEEPEST = 100  # tables
 NO_ALIAS = "an alias (*) is not taken"
 
 
@@ -266,6 +269,8 @@ class _Tables:
         elif isinstance(event, yaml.MappingStartEvent):
             self._expect_value()
             self.keys.append("")
+            if len(self.keys) > DEEPEST:
+                raise ValueError(f"more than {DEEPEST} tables in each other")
         elif isinstance(event, yaml.MappingEndEvent):
             self.keys.pop()
             self.keys[-1:] = [""] * bool(self.keys)

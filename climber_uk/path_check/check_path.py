@@ -79,7 +79,8 @@ def _planner(file: Path, changes: dict[str, Any], remarks: list[str]) -> dict[st
     refuse_unknown(changes, NAMES, "a path")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
-        planner[name] = located(planner[name], name, f"/{PLANNER}", words)
+        if isinstance(planner[name], str):  # else what reads it says so
+            planner[name] = located(planner[name], name, f"/{PLANNER}", words)
     return planner
 
 

@@ -53,7 +53,7 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
 def lines(poses: Poses) -> str:
     """Poses as lines of a TUM trajectory; numbers are written so that they read back exactly."""
     return "".join(
-        f"{stamp // SECOND}.{stamp % SECOND:09} {x!r} {y!r} 0 "
+        f"{'-' * (stamp < 0)}{abs(stamp) // SECOND}.{abs(stamp) % SECOND:09} {x!r} {y!r} 0 "
         f"0 0 {math.sin(heading / 2)!r} {math.cos(heading / 2)!r}\n"
         for stamp, (x, y, heading) in zip(*(array.tolist() for array in poses), strict=True)
     )

@@ -242,6 +242,12 @@ def of_other_fields(bag):
     mcap(bag, [(topic, kind, at, text) for topic, kind, at, _ in messages], schemas=other)
 
 
+def with_other_parameters(bag):
+    made = a_whole_run()
+    made.add_parameters(transport_delay="late")
+    made.write(bag)
+
+
 def not_to_be_read(bag):
     """A file of somebody else; who is root reads it all the same."""
     mcap(bag, raw(a_whole_run()))
@@ -259,6 +265,7 @@ SPOILT = {
     "the file twice": spoilt_bytes(lambda data: data * 2),
     "without metadata": without_metadata,
     "not to be read": not_to_be_read,
+    "other parameters": with_other_parameters,
     "other sensors": of_other_sensors,
     "other fields": of_other_fields,
     "a directory in the place of the file": lambda bag: (bag / "bag_0.mcap").mkdir(parents=True),

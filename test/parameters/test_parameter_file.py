@@ -60,6 +60,7 @@ def test_namespaces_may_be_nested_and_later_entries_win(file):
         *("a: [", "\x00", "5", "", "mass: 5.0", "[[[", "[" * 100_000, "{" * 100_000),
         "x:\n  ros__parameters: {mass: }",
         "x:\n  ros__parameters: {mass: &m 5.0, half_track: *m}",
+        "x:\n  ros__parameters: " + "{a: " * 101 + "1" + "}" * 101,
         "x:\n  ros__parameters: {mass: [[1.0]]}",
         "x:\n  ros__parameters: {? [mass] : 5.0}",
     ],

@@ -228,3 +228,8 @@ def test_a_bound_that_nothing_exceeds_is_refused(tmp_path, run, bound):
 )
 def test_nothing_that_is_printed_commands_a_terminal(text, printed):
     assert printable(text) == printed
+
+
+def test_a_stamp_before_1970_is_a_negative_number():
+    line = export_tum.lines((np.array([-SECOND // 2]), np.zeros((1, 3))))
+    assert line.split()[0] == "-0.500000000"
