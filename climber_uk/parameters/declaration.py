@@ -94,7 +94,10 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
     # bounds are intervals: all are within if the extremes are, and these are nan if any is
     is_many = isinstance(value, np.ndarray)
     for number in (value.min().item(), value.max().item()) if is_many else (value,):
-        _check_number(rule, f"{field.name}={number!r} must be", number, unit)
+        said = f"{field.name}={number!r} must be"
+        _check_number(rule, said, number, unit)
+        if isinstance(field.default, float):
+            _check_size(rule, said, abs(float(number)), unit)
 
 
 def bounds(rule: Mapping[str, Any]) -> list[str]:
@@ -108,10 +111,12 @@ def _check_number(rule: Mapping[str, Any], said: str, value: Any, unit: str) -> 
         raise ValueError(f"{said} a finite number{unit}")
     if rule["above"] is not None and not value > rule["above"]:
         raise ValueError(f"{said} > {rule['above']}{unit}")
-    size = abs(float(value))
-    if size > LARGEST or (rule["above"] is not None and size < SMALLEST):
-        raise ValueError(f"{said} of a size from {SMALLEST:g} to {LARGEST:g}{unit}")
     if rule["at_least"] is not None and not value >= rule["at_least"]:
         raise ValueError(f"{said} >= {rule['at_least']}{unit}")
     if rule["at_most"] is not None and not value <= rule["at_most"]:
         raise ValueError(f"{said} <= {rule['at_most']}{unit}")
+
+
+def _check_size(rule: Mapping[str, Any], said: str, size: float, unit: str) -> None:
+    if size > LARGEST or (rule["above"] is not None and size < SMALLEST):
+        raise ValueError(f"{said} of a size from {SMALLEST:g} to {LARGEST:g}{unit}")

@@ -168,7 +168,7 @@ def main() -> None:
         posterior = read_posterior(options.posterior) if options.posterior else None
         asked, law = (climber, contact), None
         found = demands(trajectory, *asked, options.margin, wall)
-        numbers = told(found, trajectory, climber.half_track)
+        numbers = told(found, trajectory, climber.half_track, remarks)
         if options.fastest and trajectory.law.rate > 0:
             best = fastest(trajectory, *asked, options.margin, wall)
             numbers["fastest rate"] = best and best.law.rate

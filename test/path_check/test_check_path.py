@@ -120,6 +120,15 @@ def test_the_configuration_of_lanes_is_feasible_and_drawn(monkeypatch, capsys, t
     assert (tmp_path / "out" / "check_path.png").stat().st_size > 10_000
 
 
+def test_what_looks_like_a_mistake_is_said(monkeypatch, capsys):
+    line = "-p", "shape:=line", "-p", "rest_to_rest.laps:=3"
+    words = ["check_path", "--params", CONFIG / "climber.yaml", *line]
+    monkeypatch.setattr("sys.argv", [*map(str, words)])
+    with pytest.raises(SystemExit):
+        check_path.main()
+    assert capsys.readouterr().err == "check_path: laps=3 has no effect: the path is open\n"
+
+
 def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatch, capsys):
     fast = "-p", "rest_to_rest.rate:=2.0", "-p", "rest_to_rest.ramp_time:=0.05"
     words = "--params", CONFIG / "climber.yaml", *fast
