@@ -318,4 +318,5 @@ def in_a_line(error: Exception) -> str:
     """Message of an error in one line, without rcl's file names."""
     if isinstance(error, UnknownROSArgsError):
         return f"not known after --ros-args: {str(error).strip('[]')}"
-    return re.sub(r", at /[^, ]*:\d+", "", " ".join(in_words(error).split()))
+    said = " ".join(in_words(error).split()) or type(error).__name__
+    return re.sub(r", at /[^, ]*:\d+", "", said)
