@@ -50,20 +50,21 @@ class Operated(Waiting):
     def ask(self, service):
         return self.world.call(Trigger, f"{PLANNER}/{service}", Trigger.Request())
 
-    def told(self):
-        """What was told last of the progress: its state, and numbers by name."""
-        (status,) = self.progress[-1].status
-        return status.message, {
-            pair.key: float(pair.value) for pair in status.values if pair.key != "mode"
-        }
+    def is_told_to_be(self, state, since=None):
+        """Wait until progress is in a state, or was `since` that many were told.
 
-    def is_told_to_be(self, state):
-        """Wait until progress is in a state, and until odometry of then has come as well."""
-        self.progress.clear()
-        self.world.wait(lambda: self.progress and self.told()[0] == state, state)
-        told, then = self.told()[1], stamp_of(self.progress[-1])
+        Numbers of then by name, once odometry of then has come as well.
+        """
+        first = len(self.progress) if since is None else since
+
+        def told():
+            return next((m for m in self.progress[first:] if m.status[0].message == state), None)
+
+        found = self.world.wait(told, state)
+        then = stamp_of(found)
         self.world.wait(lambda: stamp_of(self.odometry[-1]) >= then, "odometry of then")
-        return told
+        values = found.status[0].values
+        return {pair.key: float(pair.value) for pair in values if pair.key != "mode"}
 
     def drives(self, low, high, since=None):
         """Wait until its speed [m/s] is, or `since` odometry of this number was, so for 0.5 s."""
@@ -174,8 +175,9 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.command("speed", "1.0") == (0, "speed 1\n")
     assert climb.ask("start").message == "starts at the next odometry"
     climb.drives(0.28, 0.31)
+    since = len(climb.progress)
     assert climb.ask("start").message == "comes to rest, then starts"
-    climb.is_told_to_be("approaching")
+    climb.is_told_to_be("approaching", since)
     climb.is_told_to_be("done")
     assert climb.odometry[-1].pose.pose.position.x == pytest.approx(2.0, abs=0.01)
     assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
