@@ -43,7 +43,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import given, read_file, read_sections
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import free_domain, use_udp
-from climber_uk.system.command_line import Parser, between, whole
+from climber_uk.system.command_line import Parser, between, in_words, whole
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
@@ -288,7 +288,7 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument(
         "--controller",
-        type=shlex.split,
+        type=_words,
         default=[],
         help="command of a controller of yours, in the place of uk_torque_controller",
     )
@@ -297,6 +297,13 @@ def parse() -> argparse.Namespace:
         "--with-parent", action="store_true", help="end when what started it does, as make demo"
     )
     return parser.arguments()
+
+
+def _words(command: str) -> list[str]:
+    try:
+        return shlex.split(command)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{command!r}: {error}") from None
 
 
 def main() -> None:
@@ -356,7 +363,7 @@ def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequen
         lines = log_of(error.name, options.output).read_text(errors="replace").splitlines()
         said = f"{error}" + (f": {lines[-1]}" if lines else "")
     except (RuntimeError, ValueError, OSError) as error:
-        said = str(error)
+        said = in_words(error)
     finally:
         if demo is not None:
             demo.destroy_node()

@@ -120,7 +120,6 @@ def main() -> None:
         *("-p", "--param"),
         action="append",
         default=[],
-        type=read_argument,
         metavar="NAME:=VALUE",
         help="of the path, in place of the file's",
     )
@@ -164,7 +163,8 @@ def main() -> None:
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
     with failing_in_a_line("check_path") as remarks:
-        trajectory, climber, contact, wall = read(options.params, dict(options.param), remarks)
+        changes = dict(map(read_argument, options.param))
+        trajectory, climber, contact, wall = read(options.params, changes, remarks)
         posterior = read_posterior(options.posterior) if options.posterior else None
         asked, law = (climber, contact), None
         found = demands(trajectory, *asked, options.margin, wall)
@@ -187,8 +187,8 @@ def main() -> None:
             (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
             print(printable(str(draw(found, options.output / "check_path.png"))))
             if law:
-                planner = _planner(options.params, dict(options.param), remarks)
+                planner = _planner(options.params, changes, remarks)
                 files = {name: str(Path(planner[name]).absolute()) for name in PATHS & {*planner}}
-                changes = {**dict(options.param), **files}
+                changes |= files
                 print(printable(str(write_fastest(law, options.params, changes, options.output))))
     sys.exit(not numbers["feasible"])

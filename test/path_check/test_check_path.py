@@ -235,6 +235,7 @@ def test_what_the_plant_runs_on_is_in_what_a_circle_asks_for(monkeypatch, capsys
     ("text", "words", "line"),
     [
         (None, ["-p", "shape:=nothing"], "shape='nothing' must be one of "),
+        (None, ["-p", "shape"], "'shape' must be name:=value"),
         (None, ["-p", "shape:=[circle]"], "shape=['circle'] must be one of "),
         ("shape: waypoints\n    waypoints: {file: [a]}", [], "waypoints.file=['a'] must be a str"),
         (None, ["-p", "rest_to_rest.ratee:=5.0"], "(did you mean rest_to_rest.rate?)"),
