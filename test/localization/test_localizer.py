@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from climber_uk.localization.encoders import LARGEST_SPEED, Rolled
+from climber_uk.localization.encoders import LARGEST_SPEED, Encoders, Rolled
 from climber_uk.localization.gate import Fix
 from climber_uk.localization.imu import MOST, Imu
 from climber_uk.localization.localizer import Localizer
@@ -218,6 +218,15 @@ def test_an_imu_whose_encoders_have_stopped_does_not_grow():
     for number in range(3 * MOST):
         imu.add(number * SECOND, 0.0, 0.0, 0.0)
     assert len(imu._samples) <= MOST
+
+
+@pytest.mark.parametrize("lowest", [0.0, -math.pi])
+def test_angles_that_begin_anew_each_turn_are_travelled_on(lowest):
+    encoders, period = Encoders(LocalizationOptions()), 0.02
+    for speed in (0.3, -0.3):  # [m/s], of a wheel of 27 mm
+        angles = lowest + (np.arange(100) * period * speed / 0.027 - lowest) % (2 * math.pi)
+        rolled = [encoders.roll(angle, angle, period) for angle in angles.tolist()]
+        assert sum(one.distance for one in rolled[1:]) == pytest.approx(99 * period * speed)
 
 
 def test_a_counter_that_begins_anew_is_no_travel():
