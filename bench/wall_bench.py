@@ -58,12 +58,17 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", help="of the rows, those that begin so")
     options = parser.parse_args()
     rows = load((HERE / "wall_bench.yaml").read_text())
+    if options.only:
+        rows = {name: row for name, row in rows.items() if name.startswith(tuple(options.only))}
+    if not rows:
+        parser.error(f"no row begins with {' or '.join(options.only)}")
     print(f"{'':36}" + "".join(f"{name:>15}" for name in HEAD))
     for name, changes in rows.items():
-        if options.only and not name.startswith(tuple(options.only)):
-            continue
         with TemporaryDirectory() as folder:
-            run = drive(changes, options.controller, Path(folder))
+            try:
+                run = drive(changes, options.controller, Path(folder))
+            except subprocess.CalledProcessError as error:  # run_demo has said why
+                sys.exit(f"wall_bench: {name}: run_demo ended with status {error.returncode}")
         print(f"{name:36}" + "".join(f"{text:>15}" for text in numbers(run)), flush=True)
 
 

@@ -4,9 +4,12 @@ import json
 import re
 import subprocess
 import sys
+from argparse import ArgumentTypeError
 from importlib.metadata import entry_points, version
 
 import pytest
+
+from climber_uk.system.command_line import whole
 
 pytestmark = pytest.mark.slow
 
@@ -37,6 +40,12 @@ SILENT = {
     *("wall_odometry", "climber"),
 }  # they write no files
 TRIES = ["--help", "--version", "--foo", "-o"]
+
+
+@pytest.mark.parametrize("text", ["0", "101", "-3", "1.5", "1e1", "x", "", "9" * 5000, "²"])
+def test_a_number_that_is_to_be_whole_is_refused_beyond_its_bounds(text):
+    with pytest.raises(ArgumentTypeError, match="must be an integer from 1 to 100"):
+        whole(1, 100)(text)
 
 
 def test_all_executables_of_the_package_are_tried():

@@ -21,6 +21,9 @@ from climber_uk.bags.connection import Connection, Logged, StorageFile, listed, 
 from climber_uk.bags.definitions import LONGEST, defined, known
 from climber_uk.bags.unpacking import LARGEST_MESSAGE, ZSTD_MAGIC, Allowance, unpack
 
+# what reading a message can raise that has the name of a type, but not its fields
+UNFIT = ValueError, AttributeError, TypeError
+NO_TYPE = "without a name"
 MOST_LOSSES = 20  # lines on what could not be read
 MOST_DEFINITIONS = 4  # times `LONGEST`: the characters of all definitions together
 
@@ -53,7 +56,7 @@ class Bag:
         types = self.types
         others = sorted(name for name, kind in types.items() if kind == type_name)
         if types.get(topic, type_name) != type_name:
-            return f"no message on {topic} (it is {types[topic]}, not {type_name})"
+            return f"no message on {topic} (it is {types[topic] or NO_TYPE}, not {type_name})"
         there = f" ({type_name} is on {listed(others)})" if others and topic not in others else ""
         return f"no message on {topic}{there}"
 
@@ -99,7 +102,7 @@ class Bag:
         if name not in self._stores:
             self._stores[name] = self._read_definition(connection)
             if self._stores[name] is None:
-                self.lose(f"{connection.topic}: type {name} is unknown")
+                self.lose(f"{connection.topic}: type {name or NO_TYPE} is unknown")
         return self._stores[name]
 
     def _read_definition(self, connection: Connection) -> Typestore | None:

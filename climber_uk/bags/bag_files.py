@@ -15,6 +15,7 @@ from climber_uk.bags.mcap_file import McapFile
 from climber_uk.bags.sqlite_database import MAGIC as SQLITE_MAGIC
 from climber_uk.bags.sqlite_file import SqliteFile
 from climber_uk.bags.unpacking import PIECE, ZSTD_MAGIC, Allowance, zstandard_reader
+from climber_uk.parameters.parameter_file import load
 
 METADATA = "metadata.yaml"
 LARGEST_METADATA = 2**24  # [bytes]
@@ -169,7 +170,7 @@ def _listed_files(metadata: Path) -> list[str]:
 def _unquoted(name: str) -> str:
     if name.startswith('"'):  # escapes
         with suppress(yaml.YAMLError):
-            return str(yaml.safe_load(name))
+            return str(load(name))
     return name.strip("'\"")
 
 

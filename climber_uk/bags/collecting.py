@@ -40,7 +40,9 @@ class Collected:
     def add(self, name: str, batch: Batch) -> None:
         """Add the numbers of a batch; raises `KeyError` or `ValueError` if a field is not right."""
         if name == topics.REFERENCE:
-            self.reference.append(previews := Previews.of(batch))
+            previews = Previews.of(batch)
+            self._check_frame(name, batch)
+            self.reference.append(previews)
             self.lost_previews += len(batch) - len(previews.arrivals)
         elif name == topics.PARAMETERS:
             self.parameters += _parameters(batch)
@@ -48,10 +50,13 @@ class Collected:
             self.joints[name].append(Joints.of(batch))
         else:
             extracted = EXTRACTORS[name](batch)  # raises, if the type is another, before `frames`
-            frame = batch.strings["header.frame_id"]
-            if frame != (first := self.frames.setdefault(name, frame)):
-                raise ValueError(f"frame_id={frame!r}, others have {first!r}")
+            self._check_frame(name, batch)
             self.samples[name].append(Samples(batch.stamps, batch.log_times, *extracted))
+
+    def _check_frame(self, name: str, batch: Batch) -> None:
+        frame = batch.strings["header.frame_id"]
+        if frame != (first := self.frames.setdefault(name, frame)):
+            raise ValueError(f"frame_id={frame!r}, others have {first!r}")
 
     @property
     def first_parameters(self) -> dict[str, Any]:

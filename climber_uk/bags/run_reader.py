@@ -21,9 +21,11 @@ from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.time_series import TimeSeries
 from climber_uk.bags.topics import KNOWN, TYPES, Topics
+from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages import topics
+from climber_uk.messages.names import Names
 from climber_uk.parameters.parameter_file import Values
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
@@ -67,7 +69,7 @@ class RunReader:
         if collected.lost_previews:
             topic = self.topic(topics.REFERENCE)
             self.bag.lose(f"{topic}: {collected.lost_previews} messages left out: a point is unfit")
-        self.check_truth(collected)
+        self.check_frames(collected)
         parts = self.split(collected)
         runs, reasons = [], []
         for number, part in enumerate(parts, start=1):
@@ -102,12 +104,17 @@ class RunReader:
         if collected.disagreement:
             raise ValueError(f"{path}: no run on {topic}: {collected.disagreement}")
 
-    def check_truth(self, collected: Collected) -> None:
-        """Drop the ground truth, and note it, if its frame is another than the odometry's."""
-        here, there = (collected.frames.get(name, "") for name in (topics.ODOMETRY, topics.TRUTH))
-        if here and there and here != there:
-            del collected.samples[topics.TRUTH]
-            topic = self.topic(topics.TRUTH)
+    def check_frames(self, collected: Collected) -> None:
+        """Drop the ground truth or the reference, and note it, if it is not in odometry's frame."""
+        here = collected.frames.get(topics.ODOMETRY, "")
+        for name in topics.TRUTH, topics.REFERENCE:
+            there = collected.frames.get(name, "")
+            if not (here and there) or here == there:
+                continue
+            collected.samples.pop(name, None)
+            if name == topics.REFERENCE:
+                collected.reference.clear()
+            topic = self.topic(name)
             self.bag.lose(f"{topic}: not used, frame_id={there!r} is not the odometry's, {here!r}")
 
     def check_agreement(self, collected: Collected) -> None:
@@ -129,6 +136,9 @@ class RunReader:
             first, last = known[0], known[-1]
             odometry = odometry.within(whole.stamps[first], whole.stamps[last])
             reference = reference[first : last + 1]
+        elif any(len(part.arrivals) for part in collected.reference):
+            topic = self.topic(topics.REFERENCE)
+            self.bag.lose(f"{topic}: no message has a time of the odometry's")
         if len(odometry) < 2:
             raise NoRunError(self.too_few(whole))
         self.check_agreement(collected)
@@ -215,7 +225,8 @@ class RunReader:
         """Parameters of the controller as last recorded; none, and a note why, if one is wrong."""
         _, values = max(collected.parameters, key=itemgetter(0), default=(0, {}))
         try:
-            Values(values).read(Climber)
+            for kind in Climber, ControllerChoice, Names:
+                Values(values).read(kind)
         except (ValueError, TypeError) as error:
             self.bag.lose(f"{self.topic(topics.PARAMETERS)}: not used, {error}")
             return {}

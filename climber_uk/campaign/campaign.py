@@ -20,6 +20,7 @@ from climber_uk.mechanics import Array
 from climber_uk.messages.topics import NODES, PLANT
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import load
+from climber_uk.parameters.text_file import text_of
 from climber_uk.simulation.options import SimulationOptions
 
 SEEDS = Uniform(0, 2**31)  # of the nodes, rounded down
@@ -86,7 +87,7 @@ def read(path: Path, runs: int | None = None) -> Campaign:
     Raises `OSError`, or `ValueError` naming the file and what is wrong in it.
     """
     try:
-        tree = load(path.read_text(encoding="utf-8"))
+        tree = load(text_of(path))
         return _campaign(tree, path.parent, {} if runs is None else {"runs": runs})
     except (yaml.YAMLError, ValueError) as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from None

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from climber_uk.campaign.campaign import Campaign, read
 from climber_uk.report.outputs import failing_in_a_line
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, whole
 
 EXTRA = ["pyarrow", "matplotlib", "tqdm"]  # packages that no node needs
 
@@ -45,21 +45,17 @@ def _options() -> argparse.Namespace:
     )
     parser.add_argument("--output", "-o", type=Path, help="(default: campaign_output/FILE)")
     parser.add_argument("--runs", type=int, help="how many (default: what the file says)")
-    parser.add_argument("--jobs", type=_number, help="processes (default: one for each core)")
+    parser.add_argument(
+        "--jobs", type=whole(1, 10_000), help="processes (default: one for each core)"
+    )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to run it on")
     parser.add_argument(
         "--rerun",
-        type=_number,
+        type=whole(0, 2**62),
         metavar="RUN",
         help="run this one again, through the nodes, into a bag (default output: run_RUN)",
     )
     return parser.arguments()
-
-
-def _number(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} must be an integer >= 0")
-    return int(text)
 
 
 def _check_installed(packages: list[str]) -> None:

@@ -53,11 +53,29 @@ class Normal:
             raise ValueError(f"deviation={self.deviation} must be > 0")
         if not self.lowest < self.highest:
             raise ValueError(f"highest={self.highest} must be > lowest={self.lowest}")
+        low, high = self._shares
+        if not low < high:
+            raise ValueError(
+                f"lowest={self.lowest}, highest={self.highest}: too far from mean={self.mean} to "
+                f"be drawn with deviation={self.deviation}"
+            )
+
+    @property
+    def _sign(self) -> float:
+        """-1 for the upper tail, which is drawn as the lower one: shares near 0 are exact."""
+        return -1.0 if self.lowest > self.mean else 1.0
+
+    @property
+    def _shares(self) -> tuple[float, float]:
+        ends = self._sign * (np.array([self.lowest, self.highest]) - self.mean) / self.deviation
+        low, high = sorted(ndtr(ends).tolist())
+        return low, high
 
     def quantile(self, share: Array) -> Array:
         """See `Distribution`."""
-        low, high = ndtr((np.array([self.lowest, self.highest]) - self.mean) / self.deviation)
-        value = self.mean + self.deviation * ndtri(low + (high - low) * share)
+        low, high = self._shares
+        share = share if self._sign > 0 else 1 - share
+        value = self.mean + self._sign * self.deviation * ndtri(low + (high - low) * share)
         return np.clip(value, self.lowest, self.highest)
 
 

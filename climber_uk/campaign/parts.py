@@ -8,6 +8,7 @@ A file is there once it is complete: after an end on the way, the missing parts 
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from pyarrow import parquet
 from climber_uk.campaign.campaign import Campaign
 from climber_uk.campaign.limits import METRICS, verdicts
 from climber_uk.mechanics import Array
+from climber_uk.parameters.text_file import text_of
 
 PART = 4096  # runs
 
@@ -54,7 +56,7 @@ class Store:
         self.runs = campaign.size.runs
         about, now = directory / "campaign.json", {**campaign.described(), "part": str(PART)}
         if about.exists():
-            _check_same(directory, json.loads(about.read_text(encoding="utf-8")), now)
+            _check_same(directory, _described(about), now)
         self.directory.mkdir(parents=True, exist_ok=True)
         _write(about, json.dumps(now, indent=1).encode())
 
@@ -78,18 +80,36 @@ class Store:
     def batches(self, names: Sequence[str]) -> Iterator[dict[str, Array]]:
         """Columns (n,) of these names, a part at a time, as memory may not hold all."""
         for part in self.parts:
-            file = parquet.ParquetFile(self._path(part.number))
-            table = file.read([*dict.fromkeys(names)], use_threads=False)
+            table = self._table(part.number, [*dict.fromkeys(names)])
             yield {name: table[name].to_numpy() for name in table.column_names}
 
     def row(self, run: int) -> dict[str, object]:
         """Row of a run: number, values drawn, metrics, verdict."""
-        table = parquet.ParquetFile(self._path(run // PART)).read()
+        table = self._table(run // PART)
         row: dict[str, object] = table.slice(run % PART, 1).to_pylist()[0]
         return row
 
+    def _table(self, number: int, names: Sequence[str] | None = None) -> pa.Table:
+        path = self._path(number)
+        try:
+            table = parquet.ParquetFile(path).read(names, use_threads=False)
+        except (OSError, ValueError) as error:
+            said = str(error).partition("\n")[0]
+            raise ValueError(f"{path}: {said}: remove it, and it is computed again") from None
+        if missing := set(names or ()) - set(table.column_names):
+            raise ValueError(f"{path} has no {', '.join(sorted(missing))}: remove it")
+        return table
+
     def _path(self, number: int) -> Path:
         return self.directory / f"part-{number:05}.parquet"
+
+
+def _described(about: Path) -> dict[str, str]:
+    with suppress(ValueError, RecursionError):
+        found = json.loads(text_of(about))
+        if isinstance(found, dict):
+            return found
+    raise ValueError(f"{about} is not what a campaign writes")
 
 
 def _check_same(directory: Path, before: dict[str, str], now: dict[str, str]) -> None:

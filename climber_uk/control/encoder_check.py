@@ -7,6 +7,7 @@ grows until the climber slides, which nobody sees. Its wheels do.
 import math
 
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.elementary import turned
 from climber_uk.mechanics.quantities import Motion
 
 MEMORY = 0.5  # [s] in which a difference is forgotten
@@ -37,8 +38,10 @@ class EncoderCheck:
         else:
             steps = zip(self._turned, self._angles, before, strict=True)
             r = climber.wheel_radius
-            turned_right, turned_left = (way + r * (now - then) for way, now, then in steps)
-            self._turned = turned_right, turned_left
+            right_way, left_way = (
+                way + r * turned(now, then, self._unheard) for way, now, then in steps
+            )
+            self._turned = right_way, left_way
         self._silent = self._unheard = 0.0
 
     @property
@@ -63,7 +66,7 @@ class EncoderCheck:
         """By how much they differ, if that is more than `most` [m]; else ''."""
         if self._silent > LONGEST_SILENCE:
             return ""
-        for name, turned, gone in zip(("right", "left"), self._turned, self._gone, strict=True):
-            if abs(turned - gone) - SHARE * max(abs(turned), abs(gone)) > most:
-                return f"the {name} one by {turned:.3f} m, {gone:.3f} m by odometry"
+        for name, way, gone in zip(("right", "left"), self._turned, self._gone, strict=True):
+            if abs(way - gone) - SHARE * max(abs(way), abs(gone)) > most:
+                return f"the {name} one by {way:.3f} m, {gone:.3f} m by odometry"
         return ""

@@ -43,7 +43,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import given, read_file, read_sections
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import free_domain, use_udp
-from climber_uk.system.command_line import Parser
+from climber_uk.system.command_line import Parser, between, in_words, whole
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
@@ -54,6 +54,7 @@ RECORDED = REFERENCE_PATH, PARAMETERS, JOINTS
 COUNT = re.compile(r"^ +name: (\S+)$.*?^ +message_count: (\d+)$", re.MULTILINE | re.DOTALL)
 FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
+MOST_CLIMBERS = 100
 START_TIMEOUT = 60.0  # [s]
 STOP_TIMEOUT = 20.0  # [s] for the recorder, and then for the nodes
 HURRIED_TIMEOUTS = 3.8, 1.0  # [s] of recorder and nodes, after more than one signal
@@ -277,13 +278,17 @@ def parse() -> argparse.Namespace:
     parser = Parser("run_demo", __doc__)
     parser.add_argument("--config", type=Path, required=True, help="parameter file of all nodes")
     parser.add_argument("--output", "-o", type=Path, required=True, help="new directory")
-    parser.add_argument("--duration", type=float, help="[s] (default: that of the config)")
     parser.add_argument(
-        "--climbers", type=int, help="how many, in namespaces climber_1, ... (default: one in none)"
+        "--duration", type=between(1e-3, 1e9), help="[s] (default: that of the config)"
+    )
+    parser.add_argument(
+        "--climbers",
+        type=whole(1, MOST_CLIMBERS),
+        help="how many, in namespaces climber_1, ... (default: one in none)",
     )
     parser.add_argument(
         "--controller",
-        type=shlex.split,
+        type=_words,
         default=[],
         help="command of a controller of yours, in the place of uk_torque_controller",
     )
@@ -292,6 +297,13 @@ def parse() -> argparse.Namespace:
         "--with-parent", action="store_true", help="end when what started it does, as make demo"
     )
     return parser.arguments()
+
+
+def _words(command: str) -> list[str]:
+    try:
+        return shlex.split(command)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{command!r}: {error}") from None
 
 
 def main() -> None:
@@ -351,7 +363,7 @@ def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequen
         lines = log_of(error.name, options.output).read_text(errors="replace").splitlines()
         said = f"{error}" + (f": {lines[-1]}" if lines else "")
     except (RuntimeError, ValueError, OSError) as error:
-        said = str(error)
+        said = in_words(error)
     finally:
         if demo is not None:
             demo.destroy_node()

@@ -63,6 +63,9 @@ def gravity(seen: Evidence) -> Finding:
         [pull * np.sin(heading), pull * np.cos(heading), np.full(len(heading), off_wall)], axis=1
     )
     force = seen.imu.values[:, 3:]
+    if not np.linalg.norm(force, axis=1).min() > 0.0:  # nan, too
+        hint = "publish specific force, with gravity in it, as sensor_msgs/Imu says"
+        return failed("some samples are without gravity", hint)
     off = [angle_between(force @ turn.T, expected) for turn in TURNS]
     angle = off[0] / DEGREE
     if angle > thresholds.TILTED[1]:

@@ -7,13 +7,16 @@
 import argparse
 import json
 import sys
+from collections import Counter
 from dataclasses import fields, replace
+from os.path import realpath
 from pathlib import Path
 from typing import Any
 
 from climber_uk.bags.run_reader import RunReader
 from climber_uk.bags.topics import Topics
 from climber_uk.closed_loop.node_parameters import names_of, read_parameters
+from climber_uk.control.timing import Timing
 from climber_uk.identification import excitation
 from climber_uk.identification import figure as identification_figure
 from climber_uk.identification.estimation import identify
@@ -48,7 +51,7 @@ def identify_bag(options: argparse.Namespace, doubtful: list[str]) -> list[str]:
     assumed, site = Values(parameters).read(Climber), site_of(parameters, plant)
     reader.check_one_run(climber)
     then = {**file, **recorded}
-    delay = then.get("transport_delay", 0.0) if options.delay is None else options.delay
+    delay = Values(then).read(Timing).transport_delay if options.delay is None else options.delay
     motion, unfit = read_motion(reader, climber, then, assumed.suction_pressure, delay)
     doubtful += [f"{options.bag}: {loss}" for loss in reader.bag.losses]
     found = identify(motion, assumed, cut, site)
@@ -134,10 +137,13 @@ def main() -> None:
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
     untold: list[str] = []
+    written = list(filter(None, (options.output, options.json, options.figure, options.plan)))
     with failing_in_a_line("identify") as doubtful:
-        for file in (options.output, options.json, options.figure, options.plan):
-            if file:
-                check_writable(file.parent)
+        places = Counter(map(realpath, filter(None, (*written, options.bag, options.params))))
+        for file in written:
+            if places[realpath(file)] > 1:
+                raise ValueError(f"{file} is given twice, and would be written over")
+            check_writable(file.parent)
         if options.plan:
             plan(options, doubtful)
         else:

@@ -50,12 +50,15 @@ class Site:
     scrubs: bool = False  # whether wheels or tracks do as it turns
 
 
+FEWEST = 4  # odometry messages in a window
+
+
 @parameters
 class Cut:
     """How a motion is cut into windows, in which its direction does not change."""
 
     window: float = parameter(
-        1.0, "s", "length of a window: longer ones are less noisy, but fewer", above=0
+        1.0, "s", "length of a window: longer ones are less noisy, but fewer", at_least=0.02
     )
     least_speed: float = parameter(
         0.02, "m/s", "speed that counts as motion: too low, and rest spoils the friction", above=0
@@ -82,7 +85,8 @@ class Cut:
             # smoothed rates do not show rest, without friction, so close to a change of direction
             inner = run[(time >= time[0] + SMOOTHING) & (time <= time[-1] - SMOOTHING)]
             duration = np.ptp(motion.time[inner]) if len(inner) else 0.0
-            count = int(duration / self.window + 1e-6) * int(moving[run[0]])
+            count = min(int(duration / self.window + 1e-6), len(inner) // FEWEST)
+            count *= int(moving[run[0]])
             windows += np.array_split(inner, count) if count else []
         return windows
 

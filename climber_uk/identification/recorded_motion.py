@@ -203,4 +203,6 @@ def _angles(time: Array, wheels: TimeSeries) -> Array | None:
     angles = wheels.values[:, 2:4]
     if len(angles) < 2 or not np.isfinite(angles).all() or not angles.any():
         return None
+    if np.ptp(angles) <= 2 * np.pi:  # they may begin anew each turn
+        angles = np.unwrap(angles, axis=0)
     return np.stack([np.interp(time, _seconds(wheels), wheel) for wheel in angles.T], axis=1)

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from climber_uk.localization.options import LocalizationOptions
+from climber_uk.mechanics.elementary import turned
 
 LARGEST_SPEED = 10.0  # [m/s] of a wheel's rim, above which a counter has begun anew
 REST = 0.3  # [s] without a count, from which on a climber rests
@@ -38,13 +39,14 @@ class Encoders:
         """
         before, self._last = self._last or (right, left), (right, left)
         radius, half_track = self.options.wheel_radius, self.options.turning_lever
-        ways = [radius * (now - then) for now, then in zip(self._last, before, strict=True)]
+        angles = zip(self._last, before, strict=True)
+        ways = [radius * turned(now, then, duration) for now, then in angles]
         fastest = max(map(abs, ways)) / duration
         if fastest > LARGEST_SPEED:
             raise ValueError(
                 f"a wheel of {fastest:.3g} m/s, above {LARGEST_SPEED:g}: counted anew from there"
             )
         self._resting = 0.0 if any(ways) else self._resting + duration
-        distance, turned = (ways[0] + ways[1]) / 2, (ways[0] - ways[1]) / (2 * half_track)
+        distance, angle = (ways[0] + ways[1]) / 2, (ways[0] - ways[1]) / (2 * half_track)
         path = (abs(ways[0]) + abs(ways[1])) / 2
-        return Rolled(duration, distance, path, turned / duration, self._resting >= REST)
+        return Rolled(duration, distance, path, angle / duration, self._resting >= REST)

@@ -16,6 +16,7 @@ TIME = 0.04  # [s] τ
 DELAY = 2 * TIME  # [s] of all that went through
 FILLED = 4 * TIME  # [s] over which that is a mean, once it is no more one of all samples
 SPACING = 0.02  # [s] from one weight to the next: in between they tell hardly anything new
+MOST = 1000  # samples that wait for encoders, which may have stopped
 STALE = 0.25  # [s] without a sample, after which there is no IMU
 
 
@@ -77,13 +78,16 @@ class Imu:
     def add(self, stamp: int, yaw_rate: float, forwards: float, left: float) -> None:
         """Take yaw rate [rad/s] and specific force [m/s²] of a `stamp` [ns], all in the body's."""
         if self.stamp is not None:
-            if stamp <= self.stamp:
+            passed = (stamp - self.stamp) * 1e-9
+            if -STALE < passed <= 0:
                 return
-            self.period = min((stamp - self.stamp) * 1e-9, STALE)
+            if passed > 0:  # else one of the two has a wrong stamp, or time has started anew
+                self.period = min(passed, STALE)
         self.stamp = stamp
         if self._is_used:
             self._samples.clear()
         self._is_used = False
+        del self._samples[: -MOST + 1]
         self._samples.append((yaw_rate, forwards))
         self._known, self._unused = self._known + self.period, self._unused + self.period
         self._forwards.add(forwards, self.period)

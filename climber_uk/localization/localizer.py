@@ -36,7 +36,7 @@ from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
 
 DISAGREES = 0.5  # [s] of gravity that tells another heading, after which it is believed
-BACK = 1.0  # [s] that stamps go back, from which on everything starts anew
+LEAP = 1.0  # [s] between two stamps, from which on one alone is taken for a mistake
 EARLIEST = 0.001  # [s] that the first sample of the encoders stands for
 MOST_EARLY = 20  # fixes that wait for the encoders
 SPEED_NOISE = 0.003  # [m/s] of a speed by encoders, deviation
@@ -74,6 +74,7 @@ class Localizer:
         self.gate, self.smoothing = Gate(options), Smoothing(options)
         self.counts, self.doubts = Counts(), Doubts(options)
         self.stamp: int | None = None  # [ns] of the last sample of the encoders
+        self._leapt: int | None = None  # [ns] the last stamp, if it was far off that
         self.last_was_taken = True  # of the fixes
         self.fixed: int | None = None  # [ns] stamp of the last fix that was taken
         self.located: Located | None = None
@@ -109,7 +110,9 @@ class Localizer:
         What has no newer stamp gets the answer of before, if there was one. Raises as
         `Encoders.roll` does.
         """
-        if self.stamp is not None and self.stamp - stamp >= BACK * SECOND:
+        if self._leaps(stamp):
+            return self.located
+        if self.stamp is not None and self.stamp - stamp >= LEAP * SECOND:
             self.remarks.append("stamps went back: started anew")
             self._start()
         if self.stamp is not None and (
@@ -131,6 +134,15 @@ class Localizer:
             self.located = self._locate(rolled, sample.travel)
             self.doubts.look(self.estimate)
         return self.located
+
+    def _leaps(self, stamp: int) -> bool:
+        """Whether a stamp [ns] is far off the one before, and the last that was is elsewhere."""
+        ahead = (stamp - (stamp if self.stamp is None else self.stamp)) / SECOND
+        before, self._leapt = self._leapt, stamp if abs(ahead) >= LEAP else None
+        if self._leapt is None or (before is not None and abs(stamp - before) < LEAP * SECOND):
+            return False
+        self.remarks.append(f"a stamp of the encoders is {ahead:+.3g} s off the last: left out")
+        return True
 
     def _sample(self, rolled: Rolled) -> tuple[Sample, Weight | None]:
         assert self.stamp is not None

@@ -17,6 +17,7 @@ import numpy as np
 from climber_uk.mechanics import Array, namespace
 
 FULL_TURN = 2 * math.pi  # [rad]
+AT_ONCE = 0.05  # [s] from one angle of a wheel to the next
 Derivatives = tuple[Any, Any, Any, Any]  # (...) of order 0, 1, 2, 3
 
 
@@ -187,3 +188,14 @@ def compose(f: Derivatives, inner: tuple[Any, Any, Any]) -> Derivatives:
         f_2 * s_1**2 + f_1 * s_2,
         f_3 * s_1**3 + 3 * f_2 * s_1 * s_2 + f_1 * s_3,
     )
+
+
+def turned(now: float, before: float, time: float) -> float:
+    """Turn of a wheel [rad] between two angles [rad], which may begin anew each turn.
+
+    By 3/4 to 5/4 of a turn within `AT_ONCE` [s] no wheel of a climber goes.
+    """
+    turn = now - before
+    if time < AT_ONCE and 0.75 < abs(turn) / FULL_TURN < 1.25:
+        turn -= math.copysign(FULL_TURN, turn)
+    return turn

@@ -17,6 +17,7 @@ from climber_uk.mechanics import Array
 from climber_uk.mechanics.elementary import Derivatives
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.parameters.declaration import parameter, parameters
+from climber_uk.parameters.text_file import at_home, text_of
 
 DEGREE = 5
 MATCHES = 1e-6  # of the path's extent
@@ -95,7 +96,7 @@ class Fastest(TabulatedLaw):
     def given(self) -> tuple[float, Array]:  # type: ignore[override]
         """See `TabulatedLaw`."""
         try:
-            return read_table(Path(self.file).expanduser())
+            return read_table(at_home(self.file))
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or " ".join(str(error).split())
             raise ValueError(f"{self.source}: {reason}") from None
@@ -111,7 +112,7 @@ def spline(period: float, table: Array) -> Any:
 
 def read_table(path: Path) -> tuple[float, Array]:
     """Period [s] and table (n,) of a file; raises `OSError`, or `ValueError` for a bad one."""
-    lines = path.read_text(encoding="utf-8").splitlines()[1:]
+    lines = text_of(path).splitlines()[1:]
     rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.empty((0, 2))
     if rows.shape[1:] != (2,) or len(rows) < 2 * DEGREE + 2 or not np.isfinite(rows).all():
         raise ValueError(f"must have {2 * DEGREE + 2} rows or more of two finite numbers, t and s")

@@ -4,14 +4,16 @@ import codecs
 import math
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from climber_uk.mechanics import Array
+from climber_uk.parameters.text_file import at_home, content_of
 
 COMMENT = re.compile(r"#.*|^\s*(//|%).*")
+BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")
 UNIT = re.compile(r"[\[(](.*)[\])]")
+LINE_END = re.compile(r"\r\n?")
 METRES = "m", "metre", "meter", "metres", "meters"
 FARTHEST = 1e6  # [m] of the origin; beyond it a path has no millimetres left
 NUMBERS = {  # columns that are, and their units
@@ -52,13 +54,13 @@ def read_waypoints(file: str) -> tuple[Array, Marks]:
 
 def read_text(file: str) -> str:
     """Text of a file, of any encoding that is found there; `ValueError` if it is none."""
-    path = Path(file).expanduser()
+    path = at_home(file)
     if not path.exists():
         raise ValueError("not found")
     if not path.is_file():
         raise ValueError("is not a file")
     try:
-        content = path.read_bytes()
+        content = content_of(path)
         is_wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         text = content.decode("utf-16" if is_wide else "utf-8-sig")
     except OSError as error:
@@ -67,7 +69,7 @@ def read_text(file: str) -> str:
         raise ValueError("is not a text file") from None
     if "\0" in text:
         raise ValueError("is not a text file")
-    return text
+    return LINE_END.sub("\n", text)
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ class _Columns:
 
 def read_waypoint_text(text: str) -> tuple[Array, Marks]:
     """Points (n, 2) [m] of the text of a file, and marks; `ValueError` naming the line."""
-    lines = list(enumerate(re.split(r"\r\n|\r|\n", text), start=1))
+    lines = list(enumerate(text.split("\n"), start=1))
     rows = [(n, bare) for n, line in lines if (bare := COMMENT.sub("", line).strip(" \t"))]
     if not rows:
         raise ValueError("no points in it: want x and y [m] of a point a line")
@@ -139,11 +141,14 @@ def _columns(
     """Columns, by a header (which may be a comment) if there is one, and the lines below it."""
     number, first = lines[0][0], _shortened(lines[0][1], 2)
     if not any(_is_number(cell) for cell in first):
-        return _named(f"line {number}", first), lines[1:]
+        header = BEFORE_UNIT.sub("", " ".join(first)).split() if separator is None else first
+        return _named(f"line {number}", header), lines[1:]
     for line in reversed(above):
-        names = _shortened(_split(line.strip().lstrip("#/%").strip(), separator), 2)
-        if len(names) == len(first) and {"x", "y"} <= {_name(name) for name in names}:
-            return _named("comment", names), lines
+        bare = BEFORE_UNIT.sub("", line.strip().lstrip("#/%").strip())
+        for mark in (separator, None, ",", ";"):  # which may be others than below
+            names = _shortened(_split(bare, mark), 2)
+            if len(names) == len(first) and {"x", "y"} <= {_name(name) for name in names}:
+                return _named("comment", names), lines
     if len(first) == 2 or len(first) < 2:
         return _Columns(2), lines
     raise ValueError(

@@ -1,11 +1,11 @@
 """Names of frames and joints in messages, as parameters."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
-from climber_uk.parameters.declaration import parameter
+from climber_uk.parameters.declaration import parameter, parameters
 
 
 class WheelJoints(NamedTuple):
@@ -50,7 +50,7 @@ def listed(joints: Iterable[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-@dataclass(frozen=True)
+@parameters
 class Names:
     """Frames and joints, as the robot's description calls them."""
 

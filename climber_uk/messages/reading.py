@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 
 STAMP = "header.stamp.sec", "header.stamp.nanosec"
+LAST_STAMP = 2**31 * SECOND - 1  # [ns] that a message can tell
 LARGEST = 1e6  # of any quantity of a climber, in SI units
 NORM_TOLERANCE = 0.01  # of a quaternion's norm, which is 1; the same as tf2's
 MOST_TILT = 0.1  # of a unit quaternion's hypot(x, y): 11.5° off a rotation about z
@@ -33,6 +34,12 @@ MOST_TILT = 0.1  # of a unit quaternion's hypot(x, y): 11.5° off a rotation abo
 def nanoseconds(time: "Time | Duration") -> int:
     """Nanoseconds of a stamp or a duration."""
     return int(time.sec) * SECOND + int(time.nanosec)
+
+
+def check_stamp(stamp: int) -> None:
+    """Raise `ValueError` for a stamp [ns] that no answer could have: nanosec may be 4e9."""
+    if not -LAST_STAMP <= stamp <= LAST_STAMP:
+        raise ValueError(f"stamp {stamp / SECOND:.0f} must be within ± 2**31 [s]")
 
 
 class OdometryFields(NamedTuple):
@@ -119,6 +126,7 @@ def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motio
         if frame != wanted:
             raise ValueError(f"{name}={frame!r} must be {wanted!r}")
     _, _, x, y, q_x, q_y, q_z, q_w, v_x, v_y, yaw_rate, _, _ = fields
+    check_stamp(fields.stamp)
     heading = heading_of(q_x, q_y, q_z, q_w)
     if not all(abs(number) <= LARGEST for number in (x, y, v_x, v_y, yaw_rate)):
         check_size(position=[x, y], twist=[v_x, v_y, yaw_rate])

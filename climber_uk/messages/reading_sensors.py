@@ -7,7 +7,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 from climber_uk.messages.names import wheel_joints
-from climber_uk.messages.reading import check_size, heading_of, nanoseconds
+from climber_uk.messages.reading import check_size, check_stamp, heading_of, nanoseconds
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -50,6 +50,7 @@ def stamp_of(message: "Imu | JointState | PoseWithCovarianceStamped") -> int:
     stamp = nanoseconds(message.header.stamp)
     if stamp <= 0:
         raise ValueError(f"stamp {stamp} must be > 0 [ns]")
+    check_stamp(stamp)
     return stamp
 
 

@@ -17,7 +17,7 @@ from climber_uk.mechanics.preview import Preview
 from climber_uk.messages import writing
 from climber_uk.messages.cdr_layout import Layout
 from climber_uk.messages.in_place import Layouts, serialized
-from climber_uk.messages.reading import STAMP, check_size, heading_of, nanoseconds
+from climber_uk.messages.reading import STAMP, check_size, check_stamp, heading_of, nanoseconds
 
 PARTS = "transforms", "velocities", "accelerations"  # of a point
 TRANSFORM = "translation.x", "translation.y", *(f"rotation.{axis}" for axis in "xyzw")
@@ -125,6 +125,8 @@ def _preview(start: int, frame: str, rows: list[Row], odom_frame: str) -> Previe
     velocities, accelerations = [row[6:9] for row in rows], [row[9:12] for row in rows]
     check_size(pose=poses, velocity=velocities, acceleration=accelerations)
     times = [start + sec * SECOND + nanosec for sec, nanosec in (row[12:] for row in rows)]
+    for time in times[:1] + times[-1:]:
+        check_stamp(time)
     return Preview(
         times=np.array(times, np.int64),
         pose=np.array(poses),

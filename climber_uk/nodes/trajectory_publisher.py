@@ -222,13 +222,14 @@ class TrajectoryPublisher(ClimberNode):
                 return
             if now > 0 and abs(now - stamp) > ODOMETRY_AGE * SECOND:
                 raise ValueError("stamp is too far from the clock")
+            start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
+            reading.check_stamp(start)
         except ValueError as error:
             self.report("start", "odometry refused", str(error))
             return
         self.report("start", "")
         self.destroy_subscription(self.odometry)
         self.odometry = None
-        start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
         what = self.shape if self.journey.next == PATH else self.journey.next
         goes_on = self.journey.next == BACK
         self.journey.start(start, state.pose, self.position)

@@ -55,6 +55,7 @@ from climber_uk.ros.running import (
 )
 from climber_uk.ros.suction_setpoint import SuctionSetpoint
 
+SHORTEST = 0.002  # [s] of a timeout that is looked for: a timer of no time leaves no time
 LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points, which take a quarter of a second to read
 
 
@@ -123,7 +124,7 @@ class UkTorqueController(ManagedNode):
         self.parameter_values = self.publisher(ParameterEvent, private(PARAMETERS), LATCHED)
         self.publish_parameters()
         safety = self.controller.safety
-        shortest = min(safety.odometry_timeout, safety.reference_timeout)
+        shortest = max(min(safety.odometry_timeout, safety.reference_timeout), SHORTEST)
         # on the wall clock: one in simulated time would not notice that there is no clock
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
         self.start_diagnostics(self.values, alone_on=(ODOMETRY, REFERENCE, TORQUES))

@@ -34,7 +34,7 @@ from climber_uk.messages import writing
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PROGRESS, PUSH
 from climber_uk.operating import watching
 from climber_uk.ros.transport import use_udp
-from climber_uk.system.command_line import Parser, between
+from climber_uk.system.command_line import Parser, between, printable
 from climber_uk.system.signals import Interrupted, ignore_end, on_end
 
 REFUSED, SILENT = 1, 3  # exit statuses
@@ -182,13 +182,15 @@ def main() -> None:
     except NoAnswerError as error:
         print(f"climber: {error}", file=sys.stderr)
         sys.exit(SILENT)
+    except (KeyError, ValueError) as error:  # others publish there, too
+        is_done, said = False, f"{PROGRESS} is not what it should be ({error})"
     except Interrupted:
         is_done, said = True, ""
     finally:
         ignore_end()
         node.destroy_node()
         rclpy.try_shutdown()
-    print(said)
+    print(printable(said))
     sys.exit(0 if is_done else REFUSED)
 
 

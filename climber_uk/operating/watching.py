@@ -17,6 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from climber_uk.messages.topics import CONTROLLER, MARGINS, ODOMETRY, PARAMETERS, PROGRESS, TORQUES
+from climber_uk.system.command_line import printable
 
 ERROR = f"{CONTROLLER}/tracking_error"
 HEARD = {
@@ -66,6 +67,7 @@ class Screen:
 
     def show(self, lines: list[str]) -> None:
         """Write the lines, as much of each as fits in."""
+        lines = [printable(line) for line in lines]
         if not sys.stdout.isatty():
             if time.monotonic() >= self._after:
                 self._after = time.monotonic() + ALONE

@@ -2,7 +2,8 @@
 
 A dataclass with fields made by `declaration.parameter` says default, unit, bounds and meaning once:
 for the node (`ros.parameters`), for a tool without ROS (`parameter_file.Values`), for docs and
-campaigns. `parameter_files` and `parameter_paths` find what a node's files have for it,
-`changed_parameters` writes a file anew, `plausibility` doubts numbers in another unit. `registry`
-has the variants that a name chooses among, those of other packages included.
+campaigns. `parameter_files` and `parameter_paths` find what a node's files have for it, `text_file`
+keeps what is read within bounds, `changed_parameters` writes a file anew, `plausibility` doubts
+numbers in another unit. `registry` has the variants that a name chooses among, those of other
+packages included.
 """

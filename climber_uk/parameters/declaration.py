@@ -9,6 +9,7 @@ from typing import Any, dataclass_transform
 
 import numpy as np
 
+SMALLEST, LARGEST = 1e-12, 1e12  # of any number that is divided by, or multiplied: see `check`
 QOS = "qos_overrides."  # with which rclpy's own parameters begin
 
 
@@ -67,7 +68,10 @@ def parameters(cls: type | None = None, *, slots: bool = False) -> Any:
 
 
 def check(instance: Any) -> None:
-    """Raise `ValueError` naming field, value and bound unless all `parameter` fields are valid."""
+    """Raise `ValueError` naming field, value and bound unless all `parameter` fields are valid.
+
+    No number is so large, or if it has to be positive so small, that its powers are none.
+    """
     for field in dataclasses.fields(instance):
         if field.metadata:
             check_value(field, getattr(instance, field.name))
@@ -81,7 +85,7 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
     rule = field.metadata
     said = f"{field.name}={value!r} must be"
     unit = f" [{rule['unit']}]" if rule["unit"] else ""
-    if rule["choices"] is not None and value not in rule["choices"]:
+    if rule["choices"] is not None and not (isinstance(value, str) and value in rule["choices"]):
         raise ValueError(f"{said} one of {', '.join(rule['choices'])}")
     if isinstance(field.default, bool | str):
         if type(value) is not type(field.default):
@@ -90,7 +94,10 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
     # bounds are intervals: all are within if the extremes are, and these are nan if any is
     is_many = isinstance(value, np.ndarray)
     for number in (value.min().item(), value.max().item()) if is_many else (value,):
-        _check_number(rule, f"{field.name}={number!r} must be", number, unit)
+        said = f"{field.name}={number!r} must be"
+        _check_number(rule, said, number, unit)
+        if isinstance(field.default, float):
+            _check_size(rule, said, abs(float(number)), unit)
 
 
 def bounds(rule: Mapping[str, Any]) -> list[str]:
@@ -108,3 +115,8 @@ def _check_number(rule: Mapping[str, Any], said: str, value: Any, unit: str) -> 
         raise ValueError(f"{said} >= {rule['at_least']}{unit}")
     if rule["at_most"] is not None and not value <= rule["at_most"]:
         raise ValueError(f"{said} <= {rule['at_most']}{unit}")
+
+
+def _check_size(rule: Mapping[str, Any], said: str, size: float, unit: str) -> None:
+    if size > LARGEST or (rule["above"] is not None and size < SMALLEST):
+        raise ValueError(f"{said} of a size from {SMALLEST:g} to {LARGEST:g}{unit}")

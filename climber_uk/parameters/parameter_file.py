@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 import yaml
 
 from climber_uk.parameters.declaration import QOS
+from climber_uk.parameters.text_file import at_home, text_of
 
 T = TypeVar("T")
 PARAMETERS = "ros__parameters"
@@ -25,12 +26,15 @@ TEXT, QUOTED = "tag:yaml.org,2002:str", ("'", '"')
 TRUE = {"y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"}
 FALSE = {"n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"}
 INTEGER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)")
-HEXADECIMAL = re.compile(r"[-+]?0x([\da-f]+\.?[\da-f]*|\.[\da-f]+)(p[-+]?\d+)?", re.IGNORECASE)
+HEXADECIMAL = re.compile(
+    r"[-+]?0x([\da-f]+\.?[\da-f]*|\.[\da-f]+)(p[-+]?\d+)?", re.IGNORECASE | re.ASCII
+)
 SPECIAL = re.compile(r"[-+]?(\.?(inf|nan)|infinity)", re.IGNORECASE)
-FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
-ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE)
+FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
+ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
 LEAST = sys.float_info.min
-LARGEST = 2**24  # [bytes] of a file
+DEEPEST = 100  # tables
+NO_ALIAS = "an alias (*) is not taken"
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,7 @@ def read_sections(path: Path) -> list[Section]:
         if parameter in section.values:
             raise ValueError(f"{path} has {parameter} of {name} twice")
         if keys[-1].split(".")[-1] == FILE and isinstance(value, str) and value:
-            value = str(path.parent / Path(value).expanduser())
+            value = str(path.parent / at_home(value))
         section.values[parameter] = value
     return list(found.values())
 
@@ -163,8 +167,16 @@ def read_argument(argument: str) -> tuple[str, Any]:
 
 
 def load(text: str) -> Any:
-    """Content of a YAML text, its plain scalars as rcl takes them; raises `YAMLError`."""
-    return yaml.load(text, _Loader)
+    """Content of a YAML text, its plain scalars as rcl takes them.
+
+    Raises `YAMLError`, also for a name that a table has twice, and for an alias.
+    """
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError:
+        raise
+    except Exception as error:  # of many kinds: too deep, or a tag that does not fit
+        raise yaml.YAMLError(f"not to be read: {error}") from None
 
 
 def scalar(text: str) -> bool | int | float | str:
@@ -189,6 +201,18 @@ def scalar(text: str) -> bool | int | float | str:
 class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers = {}  # noqa: RUF012 - as yaml has it
 
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):  # a few of which can stand for any amount of memory
+            raise yaml.composer.ComposerError(None, None, NO_ALIAS, self.peek_event().start_mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        found = super().construct_mapping(node, deep)
+        if len(found) < len(node.value):
+            said = f"one of {', '.join(map(str, found))} is there twice"
+            raise yaml.constructor.ConstructorError(None, None, said, node.start_mark)
+        return found
+
     def construct_yaml_str(self, node: yaml.ScalarNode) -> Any:
         return _value(node.value, node.style) if node.value or node.style else None
 
@@ -203,7 +227,11 @@ def _value(text: str, style: str | None) -> bool | int | float | str:
 
 def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Keys and value of each entry of a file, in its order."""
-    tables, line, text = _Tables(), 1, _text(path)
+    tables, line = _Tables(), 1
+    try:
+        text = text_of(path)
+    except ValueError as error:
+        raise ValueError(f"{path} is no parameter file: {error}") from None
     try:
         for event in yaml.parse(text, PARSER):
             line = event.start_mark.line + 1  # type: ignore[union-attr]
@@ -227,18 +255,6 @@ def _in_words(error: yaml.YAMLError, text: str) -> str:
     return f"line {mark.line + 1}, column {mark.column + 1}: {said}"
 
 
-def _text(path: Path) -> str:
-    with path.open("rb") as stream:
-        content = stream.read(LARGEST + 1)
-    if len(content) > LARGEST:
-        raise ValueError(f"{path} is no parameter file: larger than {LARGEST >> 20} MiB")
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise ValueError(f"{path} is no parameter file: line {line}: not a text in UTF-8") from None
-
-
 class _Tables:
     """Keys of the tables around YAML's events: as strict as rcl, and without recursion."""
 
@@ -253,6 +269,8 @@ class _Tables:
         elif isinstance(event, yaml.MappingStartEvent):
             self._expect_value()
             self.keys.append("")
+            if len(self.keys) > DEEPEST:
+                raise ValueError(f"more than {DEEPEST} tables in each other")
         elif isinstance(event, yaml.MappingEndEvent):
             self.keys.pop()
             self.keys[-1:] = [""] * bool(self.keys)
@@ -263,7 +281,7 @@ class _Tables:
             yield self.sequence
             self.sequence = None
         elif isinstance(event, yaml.AliasEvent):
-            raise ValueError("no node takes an alias (*)")
+            raise ValueError(NO_ALIAS)
 
     def _take_scalar(self, event: yaml.ScalarEvent) -> Iterator[Any]:
         if not self.keys:

@@ -1,9 +1,9 @@
 """Paths in parameter files: relative to the parameter file, not to the working directory."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from climber_uk.parameters.parameter_files import paths
+from climber_uk.parameters.text_file import at_home
 
 
 def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
@@ -12,7 +12,7 @@ def located(path: str, name: str, node: str, arguments: Sequence[str]) -> str:
     It was relative to the last of the `arguments`' parameter files that gives the parameter;
     a path from the command line stays as it is, and so does one that `read_file` has located.
     """
-    given = Path(path).expanduser()
+    given = at_home(path)
     if given.is_absolute():
         return path
     # with yaml, which is slow to import

@@ -32,9 +32,9 @@ from climber_uk.path_check.findings import lines, told, told_of
 from climber_uk.path_check.path_limits import Limits
 from climber_uk.path_check.posterior import chances, read_posterior
 from climber_uk.path_check.time_optimal import PERIOD, time_optimal
-from climber_uk.report.outputs import failing_in_a_line, printable
+from climber_uk.report.outputs import failing_in_a_line
 from climber_uk.simulation.simulated_robot import Physics
-from climber_uk.system.command_line import Parser, between
+from climber_uk.system.command_line import Parser, between, printable, whole
 
 NAMES = {
     prefix + field.name
@@ -79,15 +79,9 @@ def _planner(file: Path, changes: dict[str, Any], remarks: list[str]) -> dict[st
     refuse_unknown(changes, NAMES, "a path")
     words = ["--ros-args", "--params-file", str(file)]
     for name in PATHS & planner.keys() - changes.keys():
-        planner[name] = located(planner[name], name, f"/{PLANNER}", words)
+        if isinstance(planner[name], str):  # else what reads it says so
+            planner[name] = located(planner[name], name, f"/{PLANNER}", words)
     return planner
-
-
-def _count(text: str) -> int:
-    """A number of climbers; `ValueError` if it is none."""
-    if not (text.isdecimal() and 1 <= int(text) <= MOST_CLIMBERS):
-        raise argparse.ArgumentTypeError(f"{text!r} must be an integer from 1 to {MOST_CLIMBERS}")
-    return int(text)
 
 
 def _fastest_law(
@@ -126,7 +120,6 @@ def main() -> None:
         *("-p", "--param"),
         action="append",
         default=[],
-        type=read_argument,
         metavar="NAME:=VALUE",
         help="of the path, in place of the file's",
     )
@@ -163,18 +156,19 @@ def main() -> None:
     )
     parser.add_argument(
         "--climbers",
-        type=_count,
+        type=whole(1, MOST_CLIMBERS),
         default=1000,
         help="that are drawn of the posterior (default: 1000)",
     )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
     options = parser.arguments()
     with failing_in_a_line("check_path") as remarks:
-        trajectory, climber, contact, wall = read(options.params, dict(options.param), remarks)
+        changes = dict(map(read_argument, options.param))
+        trajectory, climber, contact, wall = read(options.params, changes, remarks)
         posterior = read_posterior(options.posterior) if options.posterior else None
         asked, law = (climber, contact), None
         found = demands(trajectory, *asked, options.margin, wall)
-        numbers = told(found, trajectory, climber.half_track)
+        numbers = told(found, trajectory, climber.half_track, remarks)
         if options.fastest and trajectory.law.rate > 0:
             best = fastest(trajectory, *asked, options.margin, wall)
             numbers["fastest rate"] = best and best.law.rate
@@ -185,7 +179,7 @@ def main() -> None:
             runs = options.climbers
             events = chances(trajectory, *asked, posterior, runs, wall=wall)
             numbers["posterior"] = told_of(posterior, events, runs)
-        print("\n".join(lines(numbers, found.is_whole)))
+        print(printable("\n".join(lines(numbers, found.is_whole))))
         if options.output:
             from climber_uk.path_check.figure import draw  # matplotlib, which takes a second
 
@@ -193,8 +187,8 @@ def main() -> None:
             (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
             print(printable(str(draw(found, options.output / "check_path.png"))))
             if law:
-                planner = _planner(options.params, dict(options.param), remarks)
+                planner = _planner(options.params, changes, remarks)
                 files = {name: str(Path(planner[name]).absolute()) for name in PATHS & {*planner}}
-                changes = {**dict(options.param), **files}
+                changes |= files
                 print(printable(str(write_fastest(law, options.params, changes, options.output))))
     sys.exit(not numbers["feasible"])

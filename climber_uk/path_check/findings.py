@@ -8,9 +8,12 @@ from climber_uk.path_check.demands import Demands
 from climber_uk.path_check.posterior import Chance, Posterior
 
 
-def told(found: Demands, trajectory: Trajectory, half_track: float) -> dict[str, Any]:
-    """What is found, as numbers by name."""
+def told(
+    found: Demands, trajectory: Trajectory, half_track: float, remarks: list[str]
+) -> dict[str, Any]:
+    """What is found, as numbers by name; `remarks` gets what looks like a mistake."""
     about = summary(trajectory, half_track)
+    remarks += about.remarks
     limits: dict[str, Any] = {
         least.name: {"reserve": least.reserve, "at [s]": least.time, "place [m]": least.place}
         for least in found.least()

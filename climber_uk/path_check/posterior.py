@@ -19,6 +19,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact, is_pulled_off
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import PLANE, Wall
+from climber_uk.parameters.text_file import text_of
 from climber_uk.path_check.demands import Resistance, reserves, times
 from climber_uk.report.proportion import wilson
 
@@ -77,9 +78,9 @@ class Chance:
 def read_posterior(path: Path) -> Posterior:
     """What `identify --json` wrote; raises `OSError`, or `ValueError` naming file and fault."""
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
+        rows = json.loads(text_of(path))
         found = dict(_intervals(rows))
-    except (ValueError, RecursionError) as error:
+    except (ValueError, RecursionError, OverflowError) as error:
         said = " ".join(str(error).split())
         raise ValueError(f"{path} is not what identify --json writes: {said}") from None
     return {name: of for name, of in found.items() if name not in OF_ODOMETRY}

@@ -24,6 +24,7 @@ PEAK_RATE = 15 / 8  # of a smooth start's ramp, of its mean
 NEAREST_STEP = 0.05  # [s] in which the nearest place is looked for
 AS_NEAR, AROUND = 0.05, 2.0  # [m] and [s], of places that are about as near
 HELD = 0.02  # [m, rad] from where a course rests
+MOST_POINTS = 1500  # of a preview: what a controller takes
 SAMPLES = 4001  # of a trajectory, to find its highest speed and acceleration
 Row = TypeVar("Row")
 
@@ -34,7 +35,7 @@ class CourseOptions:
 
     preview: float = parameter(1.0, "s", "how far ahead the reference is published", above=0)
     point_period: float = parameter(0.05, "s", "time between two points of a preview", above=0)
-    publish_period: float = parameter(0.1, "s", "time between two previews", above=0)
+    publish_period: float = parameter(0.1, "s", "time between two previews", at_least=0.001)
     reaction: float = parameter(
         0.3,
         "s",
@@ -52,6 +53,12 @@ class CourseOptions:
         if self.preview < 2 * self.publish_period:
             raise ValueError(
                 f"preview={self.preview} must be >= 2 publish_period={self.publish_period} [s]"
+            )
+        ahead = self.preview + self.reaction + self.stop_time
+        if ahead > MOST_POINTS * self.point_period:
+            raise ValueError(
+                f"point_period={self.point_period} must be >= {ahead / MOST_POINTS:.3g} [s], a "
+                f"{MOST_POINTS}th of preview + reaction + stop_time"
             )
 
 

@@ -22,8 +22,8 @@ from climber_uk.replay import localization_figure
 from climber_uk.replay.localized import Localized, localized
 from climber_uk.replay.recorded_sensors import RecordedSensors, read_sensors
 from climber_uk.report.export_tum import lines
-from climber_uk.report.outputs import failing_in_a_line, output, printable
-from climber_uk.system.command_line import Parser
+from climber_uk.report.outputs import failing_in_a_line, output
+from climber_uk.system.command_line import Parser, printable
 
 MOST_REMARKS = 10  # that are printed
 

@@ -8,18 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from climber_uk.bags.bag import Bag
+from climber_uk.bags.bag import UNFIT, Bag
 from climber_uk.bags.restarts import restarts
 from climber_uk.bags.topics import Topics
 from climber_uk.localization.gate import Fix
 from climber_uk.localization.localizer import Localizer
 from climber_uk.localization.sensor_frames import SensorFrames
 from climber_uk.mechanics import SECOND, Array, Stamps
-from climber_uk.messages import reading_sensors
+from climber_uk.messages import reading, reading_sensors
 from climber_uk.messages.names import Names
 from climber_uk.messages.topics import IMU, JOINTS, POSE, TRUTH
 
 Tell = Callable[[Localizer], Any]
+TYPES = {
+    IMU: "sensor_msgs/msg/Imu",
+    JOINTS: "sensor_msgs/msg/JointState",
+    POSE: "geometry_msgs/msg/PoseWithCovarianceStamped",
+    TRUTH: "nav_msgs/msg/Odometry",
+}
 ORDER = {IMU: 0, JOINTS: 1, POSE: 2}  # of one stamp
 
 
@@ -61,17 +67,20 @@ def read_sensors(bag: Bag, namespace: str, names: Names, frames: SensorFrames) -
     Raises `ValueError` if there are no encoders, or none that are fit, or several runs.
     """
     found, names = RecordedSensors(), names.within(namespace)
-    topics = {Topics().full(name, namespace): name for name in (IMU, JOINTS, POSE, TRUTH)}
+    topics = {Topics().full(name, namespace): name for name in TYPES}
     for connection, _, _, message in bag.messages(topics):
         name = topics[connection.topic]
+        if connection.msgtype != TYPES[name]:
+            bag.lose(f"{connection.topic}: it is {connection.msgtype}, not {TYPES[name]}")
+            continue
         found.counts[name] += 1
         try:
             _take(found, name, message, names, frames)
-        except ValueError as error:
+        except UNFIT as error:
             found.refused[f"{name}: {error}"] += 1
     if not found.counts[JOINTS]:
         topic = Topics().full(JOINTS, namespace)
-        lacking = bag.lacks(topic, "sensor_msgs/msg/JointState")
+        lacking = bag.lacks(topic, TYPES[JOINTS])
         raise ValueError("; ".join([f"{bag.path} has {lacking}", *bag.losses]))
     stamps = np.array([stamp for stamp, order, _ in found.events if order == ORDER[JOINTS]])
     if not len(stamps):
@@ -87,10 +96,8 @@ def _take(
     found: RecordedSensors, name: str, message: Any, names: Names, frames: SensorFrames
 ) -> None:
     if name == TRUTH:
-        position, q = message.pose.pose.position, message.pose.pose.orientation
-        heading = 2 * math.atan2(q.z, q.w)
-        stamp = reading_sensors.stamp_of(message)
-        found.true.append((stamp, float(position.x), float(position.y), heading))
+        true = reading.motion(message, names.odom_frame, message.child_frame_id)
+        found.true.append((reading_sensors.stamp_of(message), true.x, true.y, true.heading))
         return
     if name == JOINTS:
         joints = names.left_wheel_joint, names.right_wheel_joint

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from climber_uk.bags.bag import Bag
+from climber_uk.bags.bag import UNFIT, Bag
 from climber_uk.bags.publishing_order import read_published
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.build import KINDS, build_controller, settings
@@ -83,7 +83,10 @@ class Replay:
             missing.discard(topic)
             self.look_until(at)
             self.pass_time(at)
-            callbacks[names[topic]](at, message)
+            try:
+                callbacks[names[topic]](at, message)
+            except UNFIT as error:
+                raise ValueError(f"{bag.path}: {topic} is not what it should be: {error}") from None
         if missing:
             said = " and ".join(bag.lacks(topic, types[topic]) for topic in sorted(missing))
             raise ValueError(f"{bag.path} has {said}")

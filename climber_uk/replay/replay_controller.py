@@ -20,9 +20,9 @@ from climber_uk.parameters.parameter_file import read_argument, refuse_unknown
 from climber_uk.replay.recorded_controller import TOPICS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
 from climber_uk.replay.torque_comparison import Comparison, compare, summary, table, write_csv
-from climber_uk.report.outputs import failing_in_a_line, output, printable
+from climber_uk.report.outputs import failing_in_a_line, output
 from climber_uk.report.plotting import plt, saved
-from climber_uk.system.command_line import Parser, between
+from climber_uk.system.command_line import Parser, between, printable
 
 
 def replayed(options: argparse.Namespace, remarks: list[str]) -> Comparison:

@@ -49,8 +49,14 @@ class Comparison:
 def compare(recorded: RecordedController, replay: Replay) -> Comparison:
     """Compare what both have answered; `ValueError` if that is nothing."""
     stamps = sorted(recorded.torques.keys() & replay.torques.keys())
+    if not recorded.torques:
+        raise ValueError("no torques of the bag are finite")
     if not stamps:
-        raise ValueError("no odometry is answered both in the bag and in the replay")
+        mode, detail = replay.controller.mode.value, replay.controller.detail
+        said = f"{mode} ({detail})" if detail else mode
+        raise ValueError(
+            f"no odometry is answered both in the bag and in the replay, which ends with {said}"
+        )
     return Comparison(
         stamps=np.array(stamps, np.int64),
         recorded=np.array([recorded.torques[stamp] for stamp in stamps]),

@@ -14,9 +14,9 @@ from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics import Array
 from climber_uk.report.figures import STYLE, thinned
-from climber_uk.report.outputs import failing_in_a_line, output, printable
+from climber_uk.report.outputs import failing_in_a_line, output
 from climber_uk.report.plotting import plt
-from climber_uk.system.command_line import Parser, between
+from climber_uk.system.command_line import Parser, between, printable
 
 SIZE, DPI = (8.0, 4.2), 90  # [in]
 FORMATS = "webp", "gif"
@@ -24,6 +24,7 @@ QUALITY = 60  # of WebP, of 100
 # Outline in lengths of the climber, x forwards: a wedge, so that one sees where it goes
 OUTLINE = np.array([[-0.5, -0.4], [0.3, -0.4], [0.6, 0.0], [0.3, 0.4], [-0.5, 0.4]])
 SMALLEST = 0.05  # of the picture, that a climber is drawn at least
+STANDING = 0.1  # [m] of a climber of unknown size that goes nowhere
 RIGHT, LEFT = "tab:blue", "tab:orange"
 
 
@@ -41,7 +42,7 @@ class Film:
         places = np.concatenate([run.pose[:, :2], reference[np.isfinite(reference[:, 0]), :2]])
         low, high = places.min(axis=0), places.max(axis=0)
         track = 2 * run.climber.half_track if run.climber else 0.0
-        self.length = max(track, SMALLEST * float((high - low).max()))
+        self.length = max(track, SMALLEST * float((high - low).max())) or STANDING
         self.body = self.wall.add_patch(Polygon(OUTLINE, facecolor="0.3", zorder=3))
         (left, bottom), (right, top) = low - self.length, high + self.length
         self.wall.set(xlim=(left, right), ylim=(bottom, top))

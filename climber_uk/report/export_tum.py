@@ -14,8 +14,8 @@ from climber_uk.bags.run_reader import NoRunError, RunReader
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
-from climber_uk.report.outputs import failing_in_a_line, output, printable
-from climber_uk.system.command_line import Parser
+from climber_uk.report.outputs import failing_in_a_line, output
+from climber_uk.system.command_line import Parser, printable
 
 Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
 
@@ -53,7 +53,7 @@ def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[
 def lines(poses: Poses) -> str:
     """Poses as lines of a TUM trajectory; numbers are written so that they read back exactly."""
     return "".join(
-        f"{stamp // SECOND}.{stamp % SECOND:09} {x!r} {y!r} 0 "
+        f"{'-' * (stamp < 0)}{abs(stamp) // SECOND}.{abs(stamp) % SECOND:09} {x!r} {y!r} 0 "
         f"0 0 {math.sin(heading / 2)!r} {math.cos(heading / 2)!r}\n"
         for stamp, (x, y, heading) in zip(*(array.tolist() for array in poses), strict=True)
     )

@@ -72,8 +72,3 @@ def check_writable(directory: Path) -> None:
         raise OSError(
             f"cannot write into {directory} ({error.strerror}): --output says where else"
         ) from None
-
-
-def printable(text: str) -> str:
-    """Text that is safe to print: control characters, other than new lines, are escaped."""
-    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)

@@ -11,6 +11,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.report.cards import cards, verdict
 from climber_uk.report.page_template import PAGE
 from climber_uk.report.tables import Column, groups, ratio_heads, unknown
+from climber_uk.system.command_line import printable
 
 MOST_EVENTS = 200  # of a run
 CODE = re.compile("`([^`]*)`")
@@ -21,21 +22,21 @@ TIME_LINE = "modes"
 def page(title: str, columns: Sequence[Column], figures: Mapping[str, bytes]) -> str:
     """HTML of some runs, each a column, and of their figures, PNG by name."""
     return PAGE.substitute(
-        title=escape(title),
+        title=_safe(title),
         summaries="".join(map(_summary, columns)),
         losses="".join(map(_losses, columns)),
         modes="".join(_figure(name, figures[name]) for name in figures if name == TIME_LINE),
         figures="".join(_figure(name, figures[name]) for name in figures if name != TIME_LINE),
         events="".join(map(_events, columns)) or "<p>Nothing was reported.</p>",
         table=_table(columns),
-        unknown=escape(", ".join(unknown(columns)) or "none"),
+        unknown=_safe(", ".join(unknown(columns)) or "none"),
     )
 
 
 def _summary(column: Column) -> str:
     tiles = "".join(
-        f'<div class="tile {LEVELS[level]}"><h3>{name}</h3><b>{escape(main)}</b>'
-        f"<p>{escape(note)}</p></div>"
+        f'<div class="tile {LEVELS[level]}"><h3>{name}</h3><b>{_safe(main)}</b>'
+        f"<p>{_safe(note)}</p></div>"
         for name, main, note, level in cards(column)
     )
     run = column.case.run
@@ -45,16 +46,16 @@ def _summary(column: Column) -> str:
         f"{recorded:%Y-%m-%d at %H:%M:%S} UTC: {column.bag}"
     )
     return (
-        f'<h2>{escape(column.label)}</h2><p class="about">{escape(about)}</p>'
-        f'<div class="tiles">{tiles}</div><p>{escape(verdict(column))}</p>'
+        f'<h2>{_safe(column.label)}</h2><p class="about">{_safe(about)}</p>'
+        f'<div class="tiles">{tiles}</div><p>{_safe(verdict(column))}</p>'
     )
 
 
 def _losses(column: Column) -> str:
     if not column.losses:
         return ""
-    items = "".join(f"<li>{escape(loss)}</li>" for loss in column.losses)
-    return f'<div class="losses"><h3>To know of {escape(column.bag)}</h3><ul>{items}</ul></div>'
+    items = "".join(f"<li>{_safe(loss)}</li>" for loss in column.losses)
+    return f'<div class="losses"><h3>To know of {_safe(column.bag)}</h3><ul>{items}</ul></div>'
 
 
 def _figure(name: str, png: bytes) -> str:
@@ -67,12 +68,12 @@ def _events(column: Column) -> str:
     reported = column.case.run.events
     rows = "".join(
         f'<tr class="{LEVELS[event.level]}"><td class="number">{time:.3f} s</td>'
-        f"<td>{escape(event.node)}</td><td>{event.kind}</td><td>{escape(event.text)}</td></tr>"
+        f"<td>{_safe(event.node)}</td><td>{event.kind}</td><td>{_safe(event.text)}</td></tr>"
         for time, event in reported[:MOST_EVENTS]
     )
     more = f"<p>{len(reported) - MOST_EVENTS} more are in the JSON file.</p>"
     return (
-        f'<h3>{escape(column.label)}</h3><div class="wide"><table>{rows}</table></div>'
+        f'<h3>{_safe(column.label)}</h3><div class="wide"><table>{rows}</table></div>'
         f"{more if len(reported) > MOST_EVENTS else ''}"
         if reported
         else ""
@@ -82,7 +83,7 @@ def _events(column: Column) -> str:
 def _table(columns: Sequence[Column]) -> str:
     labels = [column.label for column in columns]
     heads = [*labels, "", *ratio_heads(columns)]
-    cells = "".join(f'<th class="number">{escape(head)}</th>' for head in heads)
+    cells = "".join(f'<th class="number">{_safe(head)}</th>' for head in heads)
     parts = [f"<tr><th></th>{cells}</tr>"] if len(columns) > 1 else []
     for title, rows in groups(columns):
         parts.append(f'<tr class="group"><td colspan="{len(heads) + 1}">{title}</td></tr>')
@@ -91,9 +92,14 @@ def _table(columns: Sequence[Column]) -> str:
                 "".join(f'<td class="number">{cell}</td>' for cell in cells)
                 for cells in (row.cells, row.ratios)
             )
-            meaning = CODE.sub(r"<code>\1</code>", escape(row.metric.definition))
+            meaning = CODE.sub(r"<code>\1</code>", _safe(row.metric.definition))
             parts.append(
                 f"<tr><td><code>{row.metric.name}</code><small>{meaning}</small></td>"
                 f"{numbers}<td>{row.unit}</td>{ratios}</tr>"
             )
     return f'<div class="wide"><table>{"".join(parts)}</table></div>'
+
+
+def _safe(text: str) -> str:
+    """Text of a bag as text of HTML, without characters that command who shows it."""
+    return escape(printable(text))

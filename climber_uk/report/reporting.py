@@ -16,10 +16,10 @@ from climber_uk.parameters.parameter_file import Values
 from climber_uk.report import figures
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import Case
-from climber_uk.report.outputs import check_writable, failing_in_a_line, output, printable
+from climber_uk.report.outputs import check_writable, failing_in_a_line, output
 from climber_uk.report.page import page
 from climber_uk.report.tables import Column, to_csv, to_json
-from climber_uk.system.command_line import Parser, between
+from climber_uk.system.command_line import Parser, between, printable
 
 OUTPUTS = {"analyze_bag": "analysis", "compare_bags": "comparison"}
 FAILED = 1  # exit status

@@ -19,6 +19,7 @@ FALLEN_BEHIND = 1.0  # [s] behind the wall clock, from which the rest is skipped
 LOOK_PERIOD = 0.1  # [s] of the wall clock, between two looks for the node `wait_for`
 LOOKS = 10  # in a row that must find it: other publishers have to find it, too
 MAX_LAG = 0.1  # [s] behind its pace that simulated time makes up for
+SHORTEST = 1e-5  # [s] of a timer: one of no time leaves no time
 TICK = SECOND // 100  # [ns] of simulated time between two messages on /clock, at least
 # options of all or none
 SHARED = "simulated_time", "control_period", "real_time_factor", "wait_for"
@@ -70,7 +71,8 @@ class PlantTime:
             self.topic = Output(publisher, ClockMessage(), (), ("clock.sec", "clock.nanosec"))
             node.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
             if options.real_time_factor > 0:
-                node.create_timer(self.pace / SECOND, self.step_if_due, clock=WALL_CLOCK)
+                pace = max(self.pace / SECOND, SHORTEST)
+                node.create_timer(pace, self.step_if_due, clock=WALL_CLOCK)
         else:
             node.create_timer(options.control_period, self.follow_clock)
 

@@ -24,12 +24,13 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
+from rclpy.time_source import TimeSource
 from rclpy.utilities import remove_ros_args
 
 from climber_uk.mechanics import SECOND
-from climber_uk.messages import writing
+from climber_uk.messages import reading, writing
 from climber_uk.messages.names import Names
-from climber_uk.messages.topics import DIAGNOSTICS
+from climber_uk.messages.topics import CLOCK, DIAGNOSTICS
 from climber_uk.parameters.declaration import QOS, parameter, parameters
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.parameters import NodeParameters
@@ -118,6 +119,23 @@ class ClimberNode(Node):
         self.exclusive = False  # whether what it obeys has to come from one publisher
         self._values: Callable[[], Mapping[str, object]] = dict
         self._diagnostics: Publisher | None = None
+
+    def create_subscription(
+        self, kind: type, topic: str, callback: Callable[..., None], *rest: Any, **options: Any
+    ) -> Subscription:
+        """As rclpy, but a time that is none does not end the node: rclpy's own callback raises."""
+        if isinstance(getattr(callback, "__self__", None), TimeSource):
+            callback = partial(self._take_time, callback)
+        return super().create_subscription(kind, topic, callback, *rest, **options)
+
+    def _take_time(self, take: Callable[[Any], None], message: Any) -> None:
+        try:
+            reading.check_stamp(reading.nanoseconds(message.clock))
+            take(message)
+        except ValueError as error:
+            self.report(CLOCK, "refused", str(error))
+            return
+        self.report(CLOCK, "")
 
     def on_parameters(self) -> None:
         """Called when parameters have changed."""
@@ -318,4 +336,5 @@ def in_a_line(error: Exception) -> str:
     """Message of an error in one line, without rcl's file names."""
     if isinstance(error, UnknownROSArgsError):
         return f"not known after --ros-args: {str(error).strip('[]')}"
-    return re.sub(r", at /[^, ]*:\d+", "", " ".join(in_words(error).split()))
+    said = " ".join(in_words(error).split()) or type(error).__name__
+    return re.sub(r", at /[^, ]*:\d+", "", said)

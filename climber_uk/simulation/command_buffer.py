@@ -4,6 +4,7 @@ from collections import deque
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
+MOST = 1000  # values that are kept, as time may stand still while others come
 
 
 class CommandBuffer(Generic[T]):
@@ -11,7 +12,7 @@ class CommandBuffer(Generic[T]):
 
     def __init__(self, timeout: int = 0) -> None:
         self.timeout = timeout
-        self._coming: deque[tuple[int, T]] = deque()
+        self._coming: deque[tuple[int, T]] = deque(maxlen=MOST)
 
     def add(self, begin: int, value: T) -> None:
         """Put `value` in force from `begin` [ns] on, in place of all that would begin later."""

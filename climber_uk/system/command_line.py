@@ -18,6 +18,11 @@ def in_words(error: Exception) -> str:
     return re.sub(r"^\[Errno -?\d+\] ", "", str(error))
 
 
+def printable(text: str) -> str:
+    """Text that is safe to print: control characters, other than new lines, are escaped."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+
+
 class Parser(argparse.ArgumentParser):
     """Parser with `--version`; wrong arguments end with one line and status 2."""
 
@@ -71,6 +76,17 @@ def between(least: float, most: float) -> Callable[[str], float]:
                 f"{text!r} must be a number from {least:g} to {most:g}"
             )
         return value
+
+    return read
+
+
+def whole(least: int, most: int) -> Callable[[str], int]:
+    """The same of an integer."""
+
+    def read(text: str) -> int:
+        if not (text.isdecimal() and len(text) < 20 and least <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"{text!r} must be an integer from {least} to {most}")
+        return int(text)
 
     return read
 

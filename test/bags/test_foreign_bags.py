@@ -155,6 +155,7 @@ INNER = "rosbag2_bagfile_information:\n  relative_file_paths: "
         ("[{file}.zstd]", "names {file}.zstd, not there: {file} read instead"),
         ("\n  - 'other_0.mcap'\n  - a\n", "names other_0.mcap, a, not there: {file} read instead"),
         ("[]", "names no file: {file} read instead"),
+        ('["\\UFFFFFFFF"]', "names \\UFFFFFFFF, not there: {file} read instead"),
         ("[..]", "names .., not there: {file} read instead"),
     ],
 )

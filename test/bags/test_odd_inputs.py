@@ -226,6 +226,28 @@ def without_metadata(bag):
     (bag / "metadata.yaml").unlink()
 
 
+def of_other_sensors(bag):
+    """On the names of sensors are messages of other types."""
+    made = a_whole_run()
+    for topic in "/imu", "/pose", "/ground_truth":
+        made.add(topic, POSE, BEGAN, message(POSE, BEGAN))
+    made.add_joint_states(["left_wheel_joint", "right_wheel_joint"], [1, 1], [1, 1])
+    made.write(bag)
+
+
+def of_other_fields(bag):
+    """The types of a run have their names, but are a text."""
+    messages, text = raw(a_whole_run()), coded(STRING, STORE.types[STRING]("x" * 100))
+    other = dict.fromkeys((kind for _, kind, *_ in messages), "string data")
+    mcap(bag, [(topic, kind, at, text) for topic, kind, at, _ in messages], schemas=other)
+
+
+def with_other_parameters(bag):
+    made = a_whole_run()
+    made.add_parameters(transport_delay="late")
+    made.write(bag)
+
+
 def not_to_be_read(bag):
     """A file of somebody else; who is root reads it all the same."""
     mcap(bag, raw(a_whole_run()))
@@ -243,6 +265,9 @@ SPOILT = {
     "the file twice": spoilt_bytes(lambda data: data * 2),
     "without metadata": without_metadata,
     "not to be read": not_to_be_read,
+    "other parameters": with_other_parameters,
+    "other sensors": of_other_sensors,
+    "other fields": of_other_fields,
     "a directory in the place of the file": lambda bag: (bag / "bag_0.mcap").mkdir(parents=True),
     "a directory without anything": lambda bag: bag.mkdir(),
     "without odometry": only("/reference", "/wheel_torques", "/joint_states"),
@@ -390,6 +415,8 @@ def test_odd_paths_are_told_in_one_line(tmp_path, run, monkeypatch, tool, words,
             for value in ("nan", "-1", "inf", "1e300")
         ),
         (["identify", "--plan", "p", "--duration", "1e300"], "duration=1e+300 must be <= 3600"),
+        (["identify", "bag", "--json", "x", "--figure", "./x"], "x is given twice"),
+        (["identify", "bag/bag_0.mcap", "--json", "bag/bag_0.mcap"], "bag_0.mcap is given twice"),
         (["identify", "--plan", "/proc/x"], "cannot write into /proc"),
         (
             ["identify", "bag", "--odometry", "joint_states"],

@@ -175,12 +175,21 @@ def test_parameters_are_those_that_the_controller_told_last(tmp_path):
     assert run.parameters["adhesion"] == "magnetic"
 
 
-def test_parameters_that_cannot_be_are_said_and_not_used(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("mass", -1.0, "must be > 0 [kg]"),
+        ("max_wheel_torque", 1e300, "must be of a size from 1e-12 to 1e+12 [N m]"),
+        ("adhesion", "glue", "must be one of suction, magnetic, none"),
+        ("left_wheel_joint", 5, "must be a str"),
+    ],
+)
+def test_parameters_that_cannot_be_are_said_and_not_used(tmp_path, name, value, said):
     made = a_run(N)
-    made.add_parameters(mass=-1.0)
-    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    made.add_parameters(**{name: value})
+    (run,), losses = read_runs(made.write(tmp_path / "bag"), Topics())
     assert run.climber is None
-    assert said == ["/uk_torque_controller/parameters: not used, mass=-1.0 must be > 0 [kg]"]
+    assert losses == [f"/uk_torque_controller/parameters: not used, {name}={value!r} {said}"]
 
 
 def test_names_that_a_parameter_file_does_not_give_are_those_that_the_controller_told(tmp_path):
@@ -197,13 +206,13 @@ def test_names_that_a_parameter_file_does_not_give_are_those_that_the_controller
 def test_that_a_topic_has_another_clock_is_said(tmp_path):
     made = a_run(N)
     made.add_truth(made.pose)
-    for topic in ("ground_truth", "wheel_torques"):
+    late = "ground_truth", "wheel_torques", "reference"
+    for topic in late:
         made.edit(topic, lambda sent: setattr(sent.header.stamp, "sec", 99))
     (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
     assert len(run.torques) == len(run.truth_distance) == 0
     assert sorted(said) == [
-        f"/{topic}: no message has a time of the odometry's"
-        for topic in ("ground_truth", "wheel_torques")
+        f"/{topic}: no message has a time of the odometry's" for topic in sorted(late)
     ]
 
 

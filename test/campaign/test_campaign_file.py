@@ -75,11 +75,17 @@ def refusal(path, said):
     assert len(str(refused.value).splitlines()) == 1
 
 
-@pytest.mark.parametrize("text", ["a: [", "- 1", "", "base: 3"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("a: [", "- 1", "", "base: 3", "[" * 5000, '"\\UFFFFFFFF"', "!!bool maybe", "!!int ''"),
+        *("a: &b [1]\nc: *b", "runs: 1\nruns: 2", "\udcff".encode(errors="surrogateescape")),
+    ],
+)
 def test_what_is_no_campaign_is_refused(tmp_path, text):
     path = tmp_path / "bad.yaml"
-    path.write_text(text)
-    refusal(path, "")
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    refusal(path, f"{path}: ")
 
 
 def test_a_base_file_with_a_parameter_that_no_node_has_is_refused(campaign_file, tmp_path):

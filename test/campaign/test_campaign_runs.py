@@ -127,6 +127,13 @@ def test_another_campaign_does_not_go_on_with_what_is_there(
     assert said in str(refused.value)
 
 
+@pytest.mark.parametrize("text", ["", "[]", "[" * 10**5, "{"])
+def test_what_no_campaign_has_written_is_not_gone_on_with(campaign, tmp_path, text):
+    (tmp_path / "campaign.json").write_text(text)
+    with pytest.raises(ValueError, match=r"campaign\.json is not what a campaign writes"):
+        Store(tmp_path, campaign())
+
+
 @pytest.mark.slow
 def test_a_killed_campaign_goes_on_and_leaves_no_process(campaign_file, tmp_path):
     file, output = campaign_file(runs=8 * parts.PART, duration=0.01), tmp_path / "out"

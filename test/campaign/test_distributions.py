@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.special import log_ndtr, ndtr
 
 from climber_uk.campaign.distributions import (
     EXTREMES,
@@ -21,10 +21,14 @@ SHIFT = -np.diff(DENSITY)[0]
 CUT = 2.0 + 0.4 * SHIFT, 0.4 * math.sqrt(1 - np.diff(BOUNDS * DENSITY)[0] - SHIFT**2)
 # the second moment of exp(x), x normal, is exp(2 μ + 2 σ²)
 SPREAD = 0.7 * math.sqrt(math.exp(0.5**2) * (math.exp(0.5**2) - 1))
+# of the standard normal one beyond 10: density by share
+TAIL = math.exp(-(10.0**2) / 2 - math.log(math.sqrt(2 * math.pi)) - log_ndtr(-10.0))
 MOMENTS = {
     "uniform": ([1.0, 4.0], 2.5, 3 / math.sqrt(12)),
     "normal": ([2.0, 0.4], 2.0, 0.4),
     "normal, cut": ([2.0, 0.4, 1.6, 2.2], *CUT),
+    "normal, upper tail": ([0.0, 1.0, 10.0, 20.0], TAIL, math.sqrt(1 + 10 * TAIL - TAIL**2)),
+    "normal, lower tail": ([0.0, 1.0, -20.0, -10.0], -TAIL, math.sqrt(1 + 10 * TAIL - TAIL**2)),
     "lognormal": ([0.7, 0.5], 0.7 * math.exp(0.5**2 / 2), SPREAD),
     "choice": ([1.0, 2.0, 6.0], 3.0, math.sqrt(14 / 3)),
     "choice, weighed": ({0.0: 3.0, 4.0: 1.0}, 1.0, math.sqrt(3)),
@@ -81,6 +85,7 @@ def test_what_has_no_weight_is_never_chosen():
         ({"uniform": [0.0, math.inf]}, "must be finite"),
         ({"normal": [0.0, 0.0]}, "deviation=0.0 must be > 0"),
         ({"normal": [0.0, 1.0, 2.0, 1.0]}, "highest=1.0 must be > lowest=2.0"),
+        ({"normal": [0.0, 1.0, 50.0, 60.0]}, "too far from mean=0.0 to be drawn"),
         ({"lognormal": [-1.0, 0.1]}, "median=-1.0"),
         ({"choice": []}, "must be"),
         ({"choice": {1.0: -1.0, 2.0: 2.0}}, "weights=[-1.0, 2.0] must be >= 0"),

@@ -16,18 +16,23 @@ CLIMBER, PERIOD, MOST = Climber(), 0.01, 0.005
 ON = {"guard.encoder_distance": MOST}
 
 
-def troubles(speed, yaw_rate, share, seconds=1.0, silent_after=math.inf):
+def troubles(speed, yaw_rate, share, seconds=1.0, silent_after=math.inf, anew=math.inf):
     """What is found of a motion whose wheels turn by a share of it; '' is left out."""
     check, found, angles = EncoderCheck(), [], [3.0, -2.0]
     motion = Motion(0.0, 0.0, 0.0, 1.0, 0.0, speed, yaw_rate)
     for number in range(round(seconds / PERIOD)):
         if number * PERIOD < silent_after:
-            check.turn(CLIMBER, *angles)
+            check.turn(CLIMBER, *(math.remainder(angle, anew) for angle in angles))
         check.go(CLIMBER, motion, PERIOD)
         rates = CLIMBER.rim_rates(motion)
         angles = [angle + share * PERIOD * rate for angle, rate in zip(angles, rates, strict=True)]
         found.append(check.trouble(MOST))
     return [*filter(None, found)]
+
+
+def test_angles_may_begin_anew_each_turn():
+    for speed in (0.5, -0.5):
+        assert not troubles(speed, 0.3, 1.0, anew=2 * math.pi)
 
 
 @pytest.mark.parametrize(("speed", "yaw_rate"), [(0.2, 0.0), (-0.2, 0.0), (0.0, 0.5), (0.2, -1.0)])

@@ -144,6 +144,14 @@ def test_each_fault_is_found_by_its_name_in_its_row_and_in_no_other(name):
     assert others <= {PASS, SKIP}
 
 
+@pytest.mark.parametrize("value", [0.0, math.nan])
+def test_an_imu_that_tells_nothing_in_another_frame_is_found(value):
+    spoil = {"frames": ["other"] * COUNT, "values": np.full((COUNT, 6), value)}
+    found = checks.report(changed("imu", lambda _: spoil))
+    assert found["gravity"].verdict is FAIL
+    assert "without gravity" in found["gravity"].said
+
+
 @pytest.mark.parametrize(("sensor", "row"), [("imu", "imu"), ("fixes", "fixes")])
 def test_another_frame_is_a_warning_as_it_can_be_told(sensor, row):
     found = checks.report(changed(sensor, lambda told: {"frames": ["other"] * len(told.stamp)}))

@@ -35,6 +35,7 @@ def run(monkeypatch, *arguments):
         (["nowhere", "--params", "nothing.yaml"], "nothing.yaml"),
         (["--plan", "p.yaml", "--speed", "-1"], "identify: speed=-1.0 must be > 0 [m/s]"),
         (["--plan", "p.yaml", "--torque", "0.1"], "identify: no trajectory keeps within"),
+        (["nowhere", "--window", "1e-9"], "identify: window=1e-09 must be >= 0.02 [s]"),
         (["nowhere", "--window", "nan"], "identify: window=nan must be a finite number [s]"),
     ],
 )

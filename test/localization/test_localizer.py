@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from climber_uk.localization.encoders import LARGEST_SPEED, Rolled
+from climber_uk.localization.encoders import LARGEST_SPEED, Encoders, Rolled
 from climber_uk.localization.gate import Fix
-from climber_uk.localization.imu import Imu
+from climber_uk.localization.imu import MOST, Imu
 from climber_uk.localization.localizer import Localizer
 from climber_uk.localization.models import BIAS, CREEP, HEADING
 from climber_uk.localization.options import LocalizationOptions
@@ -201,6 +201,32 @@ def test_stamps_that_go_back_begin_everything_anew():
     located = told.go_on(0.2).located[-1]
     assert "stamps went back: started anew" in told.localizer.remarks
     assert (located.motion.x, located.motion.y) == pytest.approx((0, 0), abs=0.05)
+
+
+@pytest.mark.parametrize("stamp", [1, 2**31 * SECOND - 1])
+def test_one_stamp_that_is_wrong_costs_one_sample(stamp):
+    told = Told(speed=0.2, heading=0.5).go_on(1.0)
+    told.localizer.on_imu(stamp, 0.0, 0.0, 0.0)
+    assert told.localizer.on_encoders(stamp, 9.0, 9.0) is told.located[-1]
+    told.go_on(0.5)
+    assert np.hypot(*(told.localizer.estimate.mean[:2] - told.position)) < 0.01
+    assert told.localizer.imu.is_there(told.stamp)
+
+
+def test_an_imu_whose_encoders_have_stopped_does_not_grow():
+    imu = Imu()
+    for number in range(3 * MOST):
+        imu.add(number * SECOND, 0.0, 0.0, 0.0)
+    assert len(imu._samples) <= MOST
+
+
+@pytest.mark.parametrize("lowest", [0.0, -math.pi])
+def test_angles_that_begin_anew_each_turn_are_travelled_on(lowest):
+    encoders, period = Encoders(LocalizationOptions()), 0.02
+    for speed in (0.3, -0.3):  # [m/s], of a wheel of 27 mm
+        angles = lowest + (np.arange(100) * period * speed / 0.027 - lowest) % (2 * math.pi)
+        rolled = [encoders.roll(angle, angle, period) for angle in angles.tolist()]
+        assert sum(one.distance for one in rolled[1:]) == pytest.approx(99 * period * speed)
 
 
 def test_a_counter_that_begins_anew_is_no_travel():

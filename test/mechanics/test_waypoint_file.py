@@ -20,6 +20,8 @@ GOOD = {
     "more columns": "t,x,theta,y\n0,0,9,1.5\n1,2,9,-3.25\n2,1e-3,,4\n",
     "names in other columns": "name x y\nstart 0 1.5\nmiddle 2 -3.25\nend 1e-3 4\n",
     "header in a comment": "# t x y\n0 0 1.5\n1 2 -3.25\n2 1e-3 4\n",
+    "header in a comment, separated otherwise": "# y, x\n1.5 0\n-3.25 2\n4 1e-3\n",
+    "units apart": "y [m] x [m]\n1.5 0\n-3.25 2\n4 1e-3\n",
     "trailing separators": "x,y,\n0,1.5,\n2,-3.25,\n1e-3,4,\n",
     "comments": "# a path\n0 1.5 # start\n\n// on\n2 -3.25\n   \n% end\n1e-3 4\n",
     "byte order mark": "\ufeff0 1.5\n2 -3.25\n1e-3 4\n",
@@ -62,6 +64,7 @@ BAD = {
     "other names": ("a,b\n1,2\n3,4\n", "line 1: want one column x and one y, found a, b"),
     "twice x": ("x,x,y\n1,2,3\n3,4,5\n", "line 1: want one column x and one y"),
     "millimetres": ("x [mm],y [mm]\n1,2\n3,4\n", "line 1: column 'x [mm]' must be in m"),
+    "millimetres apart": ("# x [mm] y [mm]\n1 2\n3 4\n", "column 'x[mm]' must be in m"),
     "decimal commas between blanks": ("1,0 2,0\n3,0 4,0\n", "line 1"),
     "decimal commas between commas": ("0,5,1,5\n0,7,1,9\n", "line 1: 4 columns"),
     "decimal commas and points": ("1,5;2\n3.5;4\n", "line 2: '3.5' has a decimal point"),
@@ -93,7 +96,8 @@ def test_a_bad_file_is_named_with_the_line_and_what_was_wanted(tmp_path, text, w
 
 
 def test_what_is_no_file_is_said_to_be_none(tmp_path):
-    for path, wrong in ((tmp_path / "none", "not found"), (tmp_path, "is not a file")):
+    files = (tmp_path / "none", "not found"), (tmp_path, "is not a file")
+    for path, wrong in (*files, ("~nobody-of-this-name/x", "there is no such user")):
         with pytest.raises(ValueError, match=wrong):
             read_waypoints(str(path))
     with pytest.raises(ValueError, match="is not a file"):

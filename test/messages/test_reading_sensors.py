@@ -98,6 +98,7 @@ REFUSED = [
     ("joints", "position", [1.0, 0.0, NAN], "not finite"),
     ("imu", "header.frame_id", "base_link", "frame_id='base_link' must be 'imu_link'"),
     ("imu", "header.stamp", {"sec": 0, "nanosec": 0}, "stamp 0 must be > 0"),
+    ("imu", "header.stamp", {"sec": 2**31 - 1, "nanosec": 2**32 - 1}, "stamp 2147483651 must be"),
     ("imu", "angular_velocity.z", 57.0, "angular_velocity.z=57.0 must be within"),
     ("imu", "angular_velocity.z", NAN, "angular_velocity.z=nan must be within"),
     ("imu", "linear_acceleration", {"x": 0.0, "y": 1.0, "z": 0.0}, "gravity is part of it"),

@@ -23,7 +23,7 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
         (
             "uk_torque_controller",
             ["mass:=9007199254740993"],
-            "mass=9007199254740993 must be of type",
+            "mass=9007199254740993 must be of a size",
         ),
         (
             "uk_torque_controller",

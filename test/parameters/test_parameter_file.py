@@ -60,6 +60,7 @@ def test_namespaces_may_be_nested_and_later_entries_win(file):
         *("a: [", "\x00", "5", "", "mass: 5.0", "[[[", "[" * 100_000, "{" * 100_000),
         "x:\n  ros__parameters: {mass: }",
         "x:\n  ros__parameters: {mass: &m 5.0, half_track: *m}",
+        "x:\n  ros__parameters: " + "{a: " * 101 + "1" + "}" * 101,
         "x:\n  ros__parameters: {mass: [[1.0]]}",
         "x:\n  ros__parameters: {? [mass] : 5.0}",
     ],
@@ -112,9 +113,10 @@ def test_values_fill_dataclasses_and_are_checked_by_name():
 
 
 def test_arguments_are_read_as_yaml():
-    said = ("mass:=6e0", "predict:=n", "constraints:=exact")
+    said = ("mass:=6e0", "predict:=n", "constraints:=exact", "mass:=!!int x", "mass:=" + "[" * 5000)
     read = [read_argument(argument) for argument in said]
-    assert read == [("mass", 6.0), ("predict", False), ("constraints", "exact")]
+    assert read[:3] == [("mass", 6.0), ("predict", False), ("constraints", "exact")]
+    assert read[3:] == [("mass", "!!int x"), ("mass", "[" * 5000)]
 
 
 @pytest.mark.parametrize(

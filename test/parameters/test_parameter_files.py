@@ -16,7 +16,7 @@ SCALARS = """\
 5 5. 5.0 .5 -.5 +5 5e0 8e3 33e-2 1E5 1e+5 -1e-5 5.e3 08 010 -010 0x1F 0x1p3 0o17 0b1 1_000 1:30 00
 0 -0 +0 9223372036854775807 9223372036854775808 1e999 y Y n N yes no on off Yes NO On OFF true True
 TRUE tRUE null ~ .inf -.inf +.inf .nan .NaN inf -inf nan NaN Infinity 1.2.3 1e 1e5e5 e5 . a 12h
-2026-01-02 '5e0' "n"
+2026-01-02 '5e0' "n" ٥ 5٥ 1e٥
 """
 
 

@@ -120,6 +120,15 @@ def test_the_configuration_of_lanes_is_feasible_and_drawn(monkeypatch, capsys, t
     assert (tmp_path / "out" / "check_path.png").stat().st_size > 10_000
 
 
+def test_what_looks_like_a_mistake_is_said(monkeypatch, capsys):
+    line = "-p", "shape:=line", "-p", "rest_to_rest.laps:=3"
+    words = ["check_path", "--params", CONFIG / "climber.yaml", *line]
+    monkeypatch.setattr("sys.argv", [*map(str, words)])
+    with pytest.raises(SystemExit):
+        check_path.main()
+    assert capsys.readouterr().err == "check_path: laps=3 has no effect: the path is open\n"
+
+
 def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatch, capsys):
     fast = "-p", "rest_to_rest.rate:=2.0", "-p", "rest_to_rest.ramp_time:=0.05"
     words = "--params", CONFIG / "climber.yaml", *fast
@@ -150,24 +159,31 @@ def refusal(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("shape:=line line.length:=1e300", "the path leads to (1.25e+299, 3) m, beyond 1e+06 m of"),
-        ("shape:=line line.length:=1e-300", "the path is 1e-300 m wide and high, want >= 0.0001 m"),
-        ("shape:=circle circle.radius:=1e18", "beyond 1e+06 m of the origin"),
+        ("shape:=line line.length:=1e12", "the path leads to (1.25e+11, 3) m, beyond 1e+06 m of"),
+        ("shape:=line line.length:=1e-12", "the path is 1e-12 m wide and high, want >= 0.0001 m"),
+        ("shape:=circle circle.radius:=1e12", "beyond 1e+06 m of the origin"),
         ("shape:=circle circle.radius:=1e-9", "want >= 0.0001 m"),
         ("shape:=ellipse ellipse.semi_axis_y:=1e-9", "the path turns on the spot"),
-        ("shape:=lemniscate lemniscate.half_height:=1e-300", "the path turns on the spot"),
-        ("shape:=sine_wave sine_wave.wavelength:=1e-300", "too large or too small"),
-        ("origin_x:=1e300", "beyond 1e+06 m of the origin"),
-        ("rest_to_rest.rate:=1e-300", "s, more than 1e+09 s"),
-        ("rest_to_rest.ramp_time:=1e300", "s, more than 1e+09 s"),
-        ("rest_to_rest.ramp_time:=1e-300", "rest_to_rest.ramp_time=1e-300 must be >= 0.001 [s]"),
+        ("shape:=lemniscate lemniscate.half_height:=1e-12", "the path turns on the spot"),
+        ("shape:=sine_wave sine_wave.wavelength:=1e-12", "the path turns on the spot"),
+        (
+            "shape:=line line.length:=1e300",
+            "line.length=1e+300 must be of a size from 1e-12 to 1e+12 [m]",
+        ),
+        (
+            "shape:=line line.length:=1e-300",
+            "line.length=1e-300 must be of a size from 1e-12 to 1e+12 [m]",
+        ),
+        ("origin_x:=1e12", "beyond 1e+06 m of the origin"),
+        ("rest_to_rest.rate:=1e-12", "s, more than 1e+09 s"),
+        ("rest_to_rest.ramp_time:=1e12", "s, more than 1e+09 s"),
+        ("rest_to_rest.ramp_time:=1e-12", "rest_to_rest.ramp_time=1e-12 must be >= 0.001 [s]"),
         ("rest_to_rest.laps:=1000000000000", "s, more than 1e+09 s"),
-        ("time_law:=constant_rate constant_rate.rate:=1e300", "changes its speed at once"),
-        ("shape:=waypoints rest_to_rest.rate:=1e300", "too large or too small"),
-        ("shape:=waypoints waypoints.tolerance:=1e-300", "tolerance=1e-300 must be >= 1e-05 [m]"),
-        ("shape:=waypoints waypoints.max_yaw_rate:=1e-300", "too large or too small"),
-        ("shape:=lanes lanes.clearance:=1e300", "m between the clearances"),
-        ("shape:=lanes lanes.dwell:=1e300", "s, more than 1e+09 s"),
+        ("shape:=waypoints rest_to_rest.rate:=1e300", "rate=1e+300 must be of a size from"),
+        ("shape:=waypoints waypoints.tolerance:=1e-12", "tolerance=1e-12 must be >= 1e-05 [m]"),
+        ("shape:=waypoints waypoints.max_yaw_rate:=1e-12", "too large or too small"),
+        ("shape:=lanes lanes.clearance:=1e12", "m between the clearances"),
+        ("shape:=lanes lanes.dwell:=1e12", "s, more than 1e+09 s"),
     ],
 )
 def test_absurd_numbers_are_refused_in_words(refusal, words, said):
@@ -219,6 +235,9 @@ def test_what_the_plant_runs_on_is_in_what_a_circle_asks_for(monkeypatch, capsys
     ("text", "words", "line"),
     [
         (None, ["-p", "shape:=nothing"], "shape='nothing' must be one of "),
+        (None, ["-p", "shape"], "'shape' must be name:=value"),
+        (None, ["-p", "shape:=[circle]"], "shape=['circle'] must be one of "),
+        ("shape: waypoints\n    waypoints: {file: [a]}", [], "waypoints.file=['a'] must be a str"),
         (None, ["-p", "rest_to_rest.ratee:=5.0"], "(did you mean rest_to_rest.rate?)"),
         (None, ["-p", "autostart:=false"], "autostart is no parameter of a path"),
         ("rest_to_rest.ramp_tim: 0.1", [], "(did you mean rest_to_rest.ramp_time?)"),

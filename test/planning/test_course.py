@@ -1,5 +1,6 @@
 """What an operator asks for, at any time: smoothly, on the path, and never faster than planned."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -195,6 +196,16 @@ def test_nothing_asked_for_nothing_changed():
         np.testing.assert_array_equal(reference.pose, LINE.at(time).pose)
 
 
-def test_a_preview_shorter_than_two_publish_periods_is_refused():
-    with pytest.raises(ValueError, match=r"preview=0.1 must be >= 2 publish_period=0.1 \[s\]"):
-        replace(OPTIONS, preview=0.1)
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"preview": 0.1}, "preview=0.1 must be >= 2 publish_period=0.1 [s]"),
+        ({"publish_period": 1e-9}, "publish_period=1e-09 must be >= 0.001 [s]"),
+        ({"point_period": 1e-9}, "point_period=1e-09 must be >= 0.00153 [s], a 1500th of preview"),
+        ({"preview": 1e9}, "point_period=0.05 must be >= "),
+        ({"reaction": 1e9}, "point_period=0.05 must be >= "),
+    ],
+)
+def test_previews_that_cannot_be_published_are_refused(changes, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        replace(OPTIONS, **changes)

@@ -18,6 +18,7 @@ from climber_uk.report import analyze_bag, compare_bags
 from climber_uk.report.cards import WIDTH, verdict
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import METRICS, Case
+from climber_uk.report.page import page
 from climber_uk.report.tables import Column, plain
 
 pytestmark = pytest.mark.slow  # figures are
@@ -271,3 +272,12 @@ def test_a_reader_that_leaves_takes_neither_files_nor_status_away(bags, tmp_path
     )
     assert (ran.returncode, ran.stderr) == (0, "")
     assert (tmp_path / "metrics.json").is_file()
+
+
+def test_what_a_node_has_logged_is_text_on_the_page_and_no_more(tmp_path):
+    made = a_run()
+    made.add_log(0.5, 40, "<b>\x1b[2J\u202e&amp;")
+    (found,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    text = page("a page", [Column("a run", "a bag", Case(found))], {})
+    assert r"<td>&lt;b&gt;\x1b[2J\u202e&amp;amp;</td>" in text
+    assert text.replace("\n", "").isprintable()

@@ -297,6 +297,14 @@ def test_a_truth_in_another_frame_is_not_used_and_said(tmp_path):
     assert said == ["/ground_truth: not used, frame_id='vicon' is not the odometry's, 'odom'"]
 
 
+def test_a_reference_in_another_frame_is_not_used_and_said(tmp_path):
+    made = a_run()
+    made.edit("reference", lambda sent: setattr(sent.header, "frame_id", "map"))
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert np.isnan(run.reference).all()
+    assert said == ["/reference: not used, frame_id='map' is not the odometry's, 'odom'"]
+
+
 def sagging(made, speed, stretch):
     """Poses that sag down the wall in a stretch of time, more than it goes forwards."""
     pose = made.pose.copy()

@@ -10,7 +10,8 @@ from test_restarts import at_once, two_runs
 from climber_uk.identification import identify
 from climber_uk.replay import replay_controller
 from climber_uk.report import analyze_bag, compare_bags, export_tum
-from climber_uk.report.outputs import output, printable
+from climber_uk.report.outputs import output
+from climber_uk.system.command_line import printable
 
 TOOLS = {
     analyze_bag: ("analysis", "metrics.csv"),
@@ -236,3 +237,8 @@ def test_a_bound_that_nothing_exceeds_is_refused(tmp_path, run, bound):
 )
 def test_nothing_that_is_printed_commands_a_terminal(text, printed):
     assert printable(text) == printed
+
+
+def test_a_stamp_before_1970_is_a_negative_number():
+    line = export_tum.lines((np.array([-SECOND // 2]), np.zeros((1, 3))))
+    assert line.split()[0] == "-0.500000000"

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from climber_uk.simulation.command_buffer import CommandBuffer
+from climber_uk.simulation.command_buffer import MOST, CommandBuffer
 
 
 def test_what_is_sent_acts_from_its_time_on_and_the_last_to_begin_acts():
@@ -41,6 +41,14 @@ def test_after_its_timeout_nothing_acts_and_that_is_told(time, acts, is_stale):
     schedule = CommandBuffer(timeout=100)
     schedule.add(10, "one")
     assert schedule.at(time) == (acts, is_stale)
+
+
+def test_what_comes_while_time_stands_still_does_not_grow():
+    schedule = CommandBuffer()
+    for number in range(3 * MOST):
+        schedule.add(10, number)
+    assert len(schedule._coming) == MOST
+    assert schedule.at(10) == (3 * MOST - 1, False)
 
 
 def test_an_empty_one_is_not_stale():
