@@ -1,7 +1,8 @@
 """The safe output: no torque, or brake while carrying the weight, as `Safety` says."""
 
 from climber_uk.control.control_law import Braking, ControlLaw, check_finite
-from climber_uk.control.estimator import Estimator, Observed
+from climber_uk.control.estimator import Estimator
+from climber_uk.control.observed import Observed
 from climber_uk.control.polarity import Polarities, PoseSpeeds
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.timing import LONGEST_STEP
