@@ -39,9 +39,8 @@ def _histograms(campaign: Campaign, store: Store, directory: Path) -> Path:
     found = histograms(store, [*METRICS], BARS)
     for axes, (metric, (unit, _)) in zip(panels, METRICS.items(), strict=True):
         counts, edges, infinite = found[metric]
-        axes.hist(
-            edges[:-1], edges.tolist(), weights=counts, color="tab:blue", log=bool(counts.any())
-        )
+        axes.stairs(counts, edges, fill=True, color="tab:blue")  # as bars it takes far longer
+        axes.set(yscale="log" if counts.any() else "linear")
         axes.set(xlabel=_label(metric, unit), ylabel="runs", ylim=(0.8, None))
         if infinite:
             axes.set_title(f"{infinite} runs have none", fontsize="small")

@@ -18,9 +18,10 @@ MAX_SWEEPS = 5000  # a few suffice, unless contacts only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
 FEW = 4  # contacts, for which sweeps alone are faster
 EPSILONS = 1e-3, 1e-6, 1e-9, 1e-12  # [m/s] of sliding, below which friction is taken for viscous
+FROM_START = 1e-4, 1e-8, 1e-12  # from a guess that is near
 STICKING = 100.0  # times the smallest of these
 MAX_STEPS = 40  # of Newton's method, with each of these
-FEW_STEPS = 10  # with the smallest at once, which take 3 as a rule
+FEW_STEPS = 5  # with the smallest at once, which take 3 as a rule
 SMALLEST = 1e-90  # [N s] of an impulse, below which it counts as 0: its cube still is a number
 
 
@@ -72,9 +73,10 @@ def _by_newton(
 ) -> tuple[Array, list[bool]] | None:
     """The same, with √(s² + ε²) in the place of |s|; None: not found.
 
-    With the smallest ε at once from `start`, where contacts mostly stick or slide as they did; else
-    with one after the other of `EPSILONS`. The directions w = s/√(s² + ε²) are unknowns of their
-    own beside ν (Chan, Golub & Mulet 1999): so it takes few steps where contacts stick, too.
+    With the smallest ε at once from `start`, where contacts stick or slide as they did; else with
+    one after the other of `FROM_START` from there, or of `EPSILONS` from rest. The directions
+    w = s/√(s² + ε²) are unknowns of their own beside ν (Chan, Golub & Mulet 1999): so it takes few
+    steps where contacts stick, too.
     """
     limits = np.array([cone.limit for cone in cones])
     rows = np.zeros((len(cones), max(len(cone.rows) for cone in cones), len(velocity)))
@@ -82,16 +84,23 @@ def _by_newton(
         rows[number, : len(cone.rows)] = cone.rows
     problem = velocity, np.diag(masses), limits, rows
     sliding = rows @ start
-    directions = sliding / np.sqrt((sliding**2).sum(axis=1) + EPSILONS[1] ** 2)[:, None]
-    found = _newton(*problem, EPSILONS[-1], (start, directions), FEW_STEPS)
-    if found is None:
-        found = velocity, np.zeros(rows.shape[:2])
-        for epsilon in EPSILONS:
-            found = _newton(*problem, epsilon, found, MAX_STEPS)
-            if found is None:
-                return None
-    sliding = rows @ found[0]
-    return found[0], (np.sqrt((sliding**2).sum(axis=1)) < STICKING * EPSILONS[-1]).tolist()
+    squares = (sliding**2).sum(axis=1)
+    rest = velocity, np.zeros(rows.shape[:2])
+    for epsilons, begin, steps in (
+        (EPSILONS[-1:], EPSILONS[1], FEW_STEPS),
+        (FROM_START, FROM_START[0], MAX_STEPS),
+        (EPSILONS, None, MAX_STEPS),
+    ):
+        found: tuple[Array, Array] | None = rest
+        if begin is not None:
+            found = start, sliding / np.sqrt(squares + begin**2)[:, None]
+        for epsilon in epsilons:
+            found = found and _newton(*problem, epsilon, found, steps)
+        if found is not None:
+            sliding = rows @ found[0]
+            sticks = np.sqrt((sliding**2).sum(axis=1)) < STICKING * EPSILONS[-1]
+            return found[0], sticks.tolist()
+    return None
 
 
 def _newton(
@@ -105,21 +114,26 @@ def _newton(
 ) -> tuple[Array, Array] | None:
     """ν⁺ (n,) and directions (contacts, k) for one ε, from such a pair to begin with."""
     found, directions = begin
-    flat = rows.reshape(-1, len(velocity))
+    contacts, k, n = rows.shape
+    flat = rows.reshape(-1, n)
+    summed = np.repeat(np.eye(contacts), k, axis=1)  # of all components of each contact
     for _ in range(max_steps):
-        s = rows @ found
-        size = np.sqrt((s * s).sum(axis=1) + epsilon * epsilon)
+        s = flat @ found
+        size = np.sqrt(summed @ (s * s) + epsilon * epsilon)
         pull = limits / size  # impulse per sliding
-        weighed = (pull[:, None, None] * rows).reshape(flat.shape)
-        turned = (s[:, None, :] @ rows)[:, 0]
-        held = ((pull / size)[:, None, None] * directions[:, None, :] @ rows)[:, 0]
-        curvature = masses + flat.T @ weighed - (turned.T @ held + held.T @ turned) / 2
-        step = np.linalg.solve(curvature, masses @ (velocity - found) - weighed.T @ s.ravel())
-        slid = rows @ step
-        along = (s * slid).sum(axis=1) / size
-        change = (s + slid - directions * along[:, None]) / size[:, None] - directions
-        found, directions = found + step, directions + change
-        directions /= np.maximum(1.0, np.sqrt((directions**2).sum(axis=1)))[:, None]
+        each = np.repeat(pull, k)[:, None] * flat
+        turned = summed @ (s[:, None] * flat)
+        held = summed @ (directions.reshape(-1, 1) * each) / size[:, None]
+        both = turned.T @ held
+        curvature = masses + flat.T @ each - (both + both.T) / 2
+        step = np.linalg.solve(curvature, masses @ (velocity - found) - s @ each)
+        slid = flat @ step
+        along = summed @ (s * slid) / size
+        found = found + step
+        directions = (s + slid).reshape(contacts, k) - directions * along[:, None]
+        directions /= size[:, None]
+        length = np.sqrt(summed @ directions.ravel() ** 2)
+        directions /= np.maximum(1.0, length)[:, None]
         if np.abs(step).max() <= UNCHANGED + epsilon / 1e6:
             return found, directions
     return None

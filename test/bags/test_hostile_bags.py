@@ -4,6 +4,7 @@
 as well.
 """
 
+import itertools
 import json
 import os
 import shutil
@@ -113,9 +114,11 @@ BRIEF = [name for name in KINDS if name not in HEAVY][::2] + [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", BRIEF)
-def test_no_bag_does_harm_nor_ends_in_a_traceback(watch, name):
-    watch.run(name, seed=1)
+@pytest.mark.parametrize(
+    ("name", "tool"), zip(BRIEF, itertools.cycle(("analyze_bag", *QUICK)), strict=False)
+)
+def test_no_bag_does_harm_nor_ends_in_a_traceback(watch, name, tool):
+    watch.run(name, seed=1, tool=tool)
 
 
 @pytest.mark.soak

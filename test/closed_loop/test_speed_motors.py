@@ -149,7 +149,7 @@ def test_what_it_carries_and_rubs_against_is_the_servos_business(change):
     "spoilt",
     [
         lambda rates: rates * [1.0, 0.0],
-        lambda rates: rates * [0.0, 1.0],
+        pytest.param(lambda rates: rates * [0.0, 1.0], marks=pytest.mark.soak),
         lambda rates: 0 * rates,
         lambda rates: rates * [1.0, 0.0] + [0.0, 11.0],
     ],

@@ -32,7 +32,9 @@ def wheels(random, motion):
     return PAPER.wheel_torques(drive, turn).T
 
 
-@pytest.mark.parametrize(("fastest", "rotors"), [(0.2, 0.0), (6.0, 0.0), (1.0, 2e-4)])
+@pytest.mark.parametrize(
+    ("fastest", "rotors"), [(0.2, 0.0), pytest.param(6.0, 0.0, marks=pytest.mark.soak), (1.0, 2e-4)]
+)
 def test_many_at_once_are_each_the_plant_and_the_same_alone(fastest, rotors):
     climber = replace(PAPER, rotor_inertia=rotors)
     random, body, step = np.random.default_rng(7), UnicycleModel.of(climber), 0.0025

@@ -30,7 +30,7 @@ WALLS = {
     "tilted plane": (Plane(30.0), 80.0),
 }
 ROUND = [name for name in WALLS if name != "tilted plane"]
-BRIEF = {"upright tank": 12.0}  # [s]
+BRIEF = {"upright tank": 6.0}  # [s]
 ASIDE = 2.0, 1.0  # [m] from the origin, where the wall is no longer as `inclination` says
 
 

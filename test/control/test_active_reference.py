@@ -1,3 +1,6 @@
+from copy import deepcopy
+from functools import cache
+
 import numpy as np
 import pytest
 from climbs import Climb
@@ -19,6 +22,16 @@ from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 
 slow = pytest.mark.slow
+
+
+@cache
+def _well(seconds):
+    return Climb().run(seconds)
+
+
+def under_way(seconds):
+    """Climb that has gone well for some time [s]."""
+    return deepcopy(_well(seconds))
 
 
 def is_at_rest(climb):
@@ -48,33 +61,33 @@ def test_a_reference_waits_at_its_begin_for_a_controller_that_is_enabled_late(la
 @slow
 @pytest.mark.parametrize(
     "gap",
-    [pytest.param(0.4, marks=pytest.mark.soak), 1.5, 20.0],
+    [*(pytest.param(gap, marks=pytest.mark.soak) for gap in (0.4, 1.5)), 20.0],
     ids=["blink", "stopped", "gone"],
 )
 def test_a_reference_waits_while_odometry_is_gone_and_goes_on_where_it_was(gap):
-    climb = Climb().run(12.0)
+    climb = under_way(12.0)
     position = climb.position
     climb.run(gap, odometry=lambda *_: None, motors=lambda _, torques: 0 * torques)
     assert climb.controller.mode is Mode.NO_ODOMETRY
     begin = climb.time
-    climb.run(15.0)
+    climb.run(11.0)
     assert climb.follows()
     assert climb.fastest(begin) <= 1.3 * climb.reference_speed
     assert climb.off_the_path() < 0.02
-    assert position < climb.position < position + 15.2
+    assert position < climb.position < position + 11.2
 
 
 @slow
 def test_enabled_again_in_mid_course_it_goes_on_where_it_is():
-    climb = Climb().run(12.0)
+    climb = under_way(12.0)
     climb.controller.enable(False)
     climb.run(3.0)
     assert is_at_rest(climb)
     stopped = climb.position
     assert stopped == pytest.approx(12.0, abs=0.1)
     climb.controller.enable(True)
-    climb.run(10.0)
-    assert climb.position == pytest.approx(stopped + 10.0, abs=0.5)
+    climb.run(6.0)
+    assert climb.position == pytest.approx(stopped + 6.0, abs=0.5)
     assert climb.fastest() <= 1.3 * climb.reference_speed
     assert climb.off_the_path() < 0.005
 
@@ -82,7 +95,7 @@ def test_enabled_again_in_mid_course_it_goes_on_where_it_is():
 @slow
 def test_a_reference_that_is_not_held_back_is_kept_over_a_long_wait():
     """By a planner that does not listen: it tells the next second, and never again what was."""
-    climb = Climb().run(12.0)
+    climb = under_way(12.0)
     whole = climb.controller.active.preview
     climb.controller.enable(False)
     climb.run(3.0)
@@ -100,9 +113,9 @@ def test_a_reference_that_is_not_held_back_is_kept_over_a_long_wait():
         climb.controller.active.preview.at(here).pose, whole.at(here).pose
     )
     climb.controller.enable(True)
-    climb.run(10.0)
+    climb.run(6.0)
     assert climb.follows()
-    assert climb.position == pytest.approx(stopped + 10.0, abs=0.5)
+    assert climb.position == pytest.approx(stopped + 6.0, abs=0.5)
     assert climb.fastest() <= 1.3 * climb.reference_speed
     assert climb.off_the_path() < 0.005
 
@@ -123,7 +136,11 @@ def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned
     climb = Climb(offset=(2.4, -1.8, turned), max_start_distance=5.0, approach_speed=0.4)
     climb.run(5.0)
     assert climb.controller.mode is Mode.APPROACHING
-    climb.run(28.0)
+    for _ in range(23):
+        climb.run(1.0)
+        if climb.follows():
+            break
+    climb.run(5.0)
     approaching = [mode is Mode.APPROACHING for mode in climb.modes]
     speeds = [
         abs(state.forward_speed)
@@ -140,7 +157,7 @@ def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned
 @pytest.mark.parametrize(
     ("offset", "since"),
     [
-        *((0.02, 0.0), (0.05, 6.0), (0.09, 6.0), (-0.09, 0.0)),
+        *((0.05, 6.0), (-0.09, 0.0)),
         *(
             pytest.param(offset, since, marks=pytest.mark.soak)
             for offset in (0.0, 0.01, 0.02, 0.03, -0.04, 0.05, 0.09, -0.09)
@@ -149,7 +166,7 @@ def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned
     ],
 )
 def test_an_offset_of_the_clocks_is_no_latency(offset, since):
-    climb = Climb().run(since).run(4.0, clock=offset)
+    climb = under_way(since).run(4.0, clock=offset)
     assert climb.follows()
     assert not any(mode.is_fault for mode in climb.modes)
     distance = [
@@ -183,7 +200,13 @@ def test_odometry_that_lies_is_found_out_before_it_does_harm(lie, mode):
 
 
 @slow
-@pytest.mark.parametrize("scale", [0.03, 0.1, 0.2, 0.3, 0.4, 0.7, 2.5, 100.0])
+@pytest.mark.parametrize(
+    "scale",
+    [
+        *(0.1, 0.7, 2.5),
+        *(pytest.param(s, marks=pytest.mark.soak) for s in (0.03, 0.2, 0.3, 0.4, 100.0)),
+    ],
+)
 def test_a_twist_in_another_unit_does_not_end_in_a_runaway(scale):
     def scaled(_, state):
         return State.rolling(state.pose, scale * state.forward_speed, scale * state.yaw_rate)
@@ -256,9 +279,9 @@ def test_a_reference_that_nobody_follows_is_kept_in_part_only(steps, with_odomet
 
 
 @slow
-@pytest.mark.parametrize("turned", [-1.9, 0.45, -0.29])
+@pytest.mark.parametrize("turned", [-1.9, 0.45, pytest.param(-0.29, marks=pytest.mark.soak)])
 def test_a_climber_that_has_turned_while_nobody_answered_goes_on_along_its_path(turned):
-    climb = Climb().run(5.0)
+    climb = under_way(5.0)
     begin, before = climb.time, climb.position
     climb.run(0.5, odometry=lambda *_: None)
     climb.state = State(climb.state.pose + np.array([0.0, 0.0, turned]), np.zeros(3))

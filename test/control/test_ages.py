@@ -48,7 +48,9 @@ def test_latency_grows_without_a_step_as_odometry_grows_older():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("age", [0.02, 0.03, 0.045, 0.06, 0.07])
+@pytest.mark.parametrize(
+    "age", [*(pytest.param(age, marks=pytest.mark.soak) for age in (0.02, 0.03, 0.06)), 0.045, 0.07]
+)
 def test_odometry_that_is_always_late_is_followed_without_a_swing(age):
     states = []
 

@@ -62,13 +62,13 @@ def controller(
     return Controller(Settings(law, observer, timing, pacing), safety, **parts)
 
 
-def lap(controlling, climber=CLIMBER, link=IDEAL, duration=10.0):
+def lap(controlling, climber=CLIMBER, link=IDEAL, duration=7.0):
     return simulate(PAPER, START, duration, controlling, climber, link)
 
 
 @pytest.mark.parametrize("constraints", [Guidance(), Exact()], ids=["guidance", "exact"])
 def test_the_papers_ellipse_is_tracked_to_hundredths_of_a_millimetre(constraints):
-    run = lap(controller(constraints=constraints), duration=20.0)
+    run = lap(controller(constraints=constraints))
     assert run.rms() <= 0.02e-3
     assert run.distance.max() <= 0.05e-3
 
@@ -157,7 +157,7 @@ def test_odometry_may_come_at_other_rates(period):
     eight = Trajectory(Lemniscate(1.5, 0.75), RestToRest(rate=0.12), origin=(0.0, 3.0))
     start = State(np.array([0.0, 3.0, np.pi / 4]), np.zeros(3))
     ours = controller(BUILT, BUILT_GAINS)
-    run = simulate(eight, start, 4.0, ours, BUILT, Link(step=0.001, period=period))
+    run = simulate(eight, start, 2.5, ours, BUILT, Link(step=0.001, period=period))
     assert run.rms() < 1e-3
     assert ours.estimator.period == pytest.approx(period, rel=1e-6)
 
@@ -167,7 +167,7 @@ def test_odometry_may_lack_the_twist(noise):
     link = Link(with_twist=False, sensors=Sensors(position_noise=noise, heading_noise=noise))
     ours = controller(observer=Observer(velocity_source="pose"))
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
-    run = simulate(RAMPED, start, 10.0, ours, CLIMBER, link)
+    run = simulate(RAMPED, start, 6.0, ours, CLIMBER, link)
     assert run.rms(after=2.0) < 1e-3
     assert ours.mode is Mode.FOLLOWING
 
@@ -181,7 +181,7 @@ def test_a_missing_twist_is_noticed():
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(3, 8))]
+    "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(2, 8))]
 )
 def test_guidance_comes_back_from_far_off_without_spinning(seed):
     random = np.random.default_rng(seed)
@@ -216,9 +216,9 @@ def test_a_reference_that_has_left_is_approached_and_followed():
     weak = replace(CLIMBER, max_wheel_torque=4.0)
     there = Approach(max_start_distance=10.0, approach_speed=2.0, approach_yaw_rate=2.0)
     ours = controller(weak, approach=there)
-    run = simulate(PAPER, start, 20.0, ours, weak)
+    run = simulate(PAPER, start, 14.0, ours, weak)
     assert ours.mode is Mode.FOLLOWING
-    assert off_the_ellipse(run)[run.time > 17.0].max() < 1e-3
+    assert off_the_ellipse(run)[run.time > 11.0].max() < 1e-3
     assert np.abs(run.torques).max() <= 4.0
     assert np.abs(run.velocity[:, 2]).max() < 10.0  # no spin
 
@@ -239,7 +239,7 @@ def test_it_stops_where_it_shall_and_reverses_there(share, most):
     assert np.abs(run.error[:, 2]).max() < 1e-2
 
 
-def too_weak(controlling, weak, until, duration=25.0):
+def too_weak(controlling, weak, until, duration=15.0):
     """The paper's ellipse with weaker motors from 5 s on, as the controller knows."""
 
     def climber(time):
@@ -274,8 +274,8 @@ def test_with_too_little_torque_it_stays_on_the_path_and_lags_along_it():
 
 def test_stalled_it_waits_on_the_path_without_chatter():
     ours = controller(guard=UNGUARDED)
-    run = too_weak(ours, replace(CLIMBER, max_wheel_torque=0.3), 99.0, 15.0)
-    last = run.time > 12.0
+    run = too_weak(ours, replace(CLIMBER, max_wheel_torque=0.3), 99.0, 11.0)
+    last = run.time > 8.0
     assert np.abs(np.diff(run.torques[last], axis=0)).max() < 1e-3
     assert off_the_ellipse(run).max() < 0.05
 

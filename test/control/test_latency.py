@@ -49,7 +49,12 @@ def drive(link, guidance=BUILT.guidance, climber=BUILT.believed, duration=8.0, *
     [
         Link(delay=0.02),
         Link(torque_lag=0.035),
-        *(replace(ENCODERS, period=period) for period in (0.005, 0.01, 0.02, 0.05)),
+        *(
+            pytest.param(
+                replace(ENCODERS, period=period), marks=pytest.mark.soak if period < 0.02 else ()
+            )
+            for period in (0.005, 0.01, 0.02, 0.05)
+        ),
         replace(ENCODERS, period=0.05, delay=0.0, torque_lag=0.0),
     ],
     ids=[
@@ -89,7 +94,7 @@ def test_a_delay_beyond_the_margin_is_learnt_in_time(delay):
     assert (
         delay - 0.021 < estimator.latency.delay < 1.3 * delay
     )  # what is beyond the margin, at least
-    lost, _ = drive(Link(delay=delay), learn_delay=False)
+    lost, _ = drive(Link(delay=delay), learn_delay=False, duration=6.0)
     assert lost.chatter(4.0) > 0.05
 
 
@@ -106,7 +111,7 @@ def test_a_delay_that_is_told_but_not_there_is_unlearnt():
 def test_friction_that_is_wrong_is_taken_for_no_delay(share):
     coefficient = share * BUILT.believed.seal_friction_coefficient
     true = replace(BUILT.believed, seal_friction_coefficient=coefficient)
-    _, estimator = drive(Link(), climber=true)
+    _, estimator = drive(Link(), climber=true, duration=5.0)
     assert estimator.latency.delay < 2e-3
 
 

@@ -63,7 +63,9 @@ def told(speed=1, yaw_rate=1):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("since", [pytest.param(0.0, marks=pytest.mark.soak), 5.0])
-@pytest.mark.parametrize("lie", [told(yaw_rate=-1), told(speed=-1), told(-1, -1)])
+@pytest.mark.parametrize(
+    "lie", [told(yaw_rate=-1), told(speed=-1), pytest.param(told(-1, -1), marks=pytest.mark.soak)]
+)
 def test_a_climber_whose_twist_has_a_wrong_sign_comes_to_rest_whichever_mode_says_so(lie, since):
     climb = Climb().run(since).run(8.0, odometry=lie)
     assert any(mode.is_fault for mode in climb.modes)

@@ -4,6 +4,7 @@ What friction the seal has beyond the model's acts the other way after a reversa
 and a push do not.
 """
 
+import itertools
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -64,6 +65,9 @@ class Odd(NamedTuple):
         return replace(heavier, seal_friction_coefficient=coefficient)
 
 
+PUSHED = Odd(mass=1.2, push=(10.0, -10.0))
+
+
 def climbed(path, odd, tmp_path_factory, seconds=6.0, is_slow=False, **parameters):
     """A climb on a path that turns back; at 50 Hz and with lazy motors if it is slow."""
     planner = PATHS[path]
@@ -91,9 +95,19 @@ def is_never_stopped(climb, most):
     assert climb.fastest() < climb.reference_speed + most
 
 
-@pytest.mark.parametrize("path", PATHS)
+def telling(*rows):
+    """Paths each with a value, of which all but these are for soak."""
+    values = [*dict.fromkeys(value for _, value in rows)]
+    for path, value in itertools.product(PATHS, values):
+        yield pytest.param(path, value, marks=() if (path, value) in rows else pytest.mark.soak)
+
+
 @pytest.mark.parametrize(
-    "friction", [0.4, *(pytest.param(it, marks=pytest.mark.soak) for it in (0.7, 1.3)), 1.5]
+    ("path", "friction"),
+    [
+        *telling(("uphill", 0.4), ("sine", 0.4), ("short", 1.5), ("cusps", 1.5)),
+        *(pytest.param(p, it, marks=pytest.mark.soak) for p in PATHS for it in (0.7, 1.3)),
+    ],
 )
 def test_friction_that_is_another_stops_no_slow_loop_that_turns_back(
     path, friction, tmp_path_factory
@@ -101,7 +115,7 @@ def test_friction_that_is_another_stops_no_slow_loop_that_turns_back(
     is_never_stopped(climbed(path, Odd(friction), tmp_path_factory, is_slow=True), 0.15)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(
     path=some.sampled_from(sorted(PATHS)),
     friction=some.floats(0.4, 1.6),
@@ -114,13 +128,8 @@ def test_nothing_unknown_stops_a_climber_that_turns_back(
     is_never_stopped(climbed(path, Odd(friction, mass, push=push), tmp_path_factory), 0.1)
 
 
-@pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize(
-    "odd",
-    [
-        pytest.param(Odd(mass=0.8, rolling=8.0), marks=pytest.mark.soak),
-        Odd(mass=1.2, push=(10.0, -10.0)),
-    ],
+    ("path", "odd"), telling(("sine", Odd(mass=0.8, rolling=8.0)), ("uphill", PUSHED))
 )
 def test_nor_one_without_a_seal(path, odd, tmp_path_factory):
     is_never_stopped(climbed(path, odd, tmp_path_factory, **MAGNETIC), 0.1)

@@ -40,7 +40,7 @@ def test_a_mean_twist_leads_from_one_pose_to_the_other():
     assert mean_twist(start.motion, end.motion, time) == pytest.approx((0.2, 0.5))
 
 
-@pytest.mark.parametrize("period", [0.005, 0.05])
+@pytest.mark.parametrize("period", [pytest.param(0.005, marks=pytest.mark.soak), 0.05])
 @pytest.mark.parametrize(
     ("sensors", "is_mean"),
     [

@@ -32,7 +32,10 @@ def test_expected_gains_are_those_of_the_papers_equations():
     assert expected_gain(CLIMBER) == pytest.approx(wanted, rel=1e-12)
 
 
-@pytest.mark.parametrize("wiring", list(WIRINGS))
+@pytest.mark.parametrize(
+    "wiring",
+    [pytest.param(w, marks=[pytest.mark.soak] if n % 3 else []) for n, w in enumerate(WIRINGS)],
+)
 def test_every_wiring_is_found_by_name(wiring):
     seen = tried(WIRINGS[wiring])
     found, likeness = response_of(seen).wiring
@@ -40,13 +43,17 @@ def test_every_wiring_is_found_by_name(wiring):
     assert likeness > 0.95
 
 
-@pytest.mark.parametrize("gain", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize(
+    "gain", [0.5, *(pytest.param(g, marks=pytest.mark.soak) for g in (1.0, 2.0))]
+)
 def test_gains_are_those_of_the_driver_whatever_friction_and_weight_do(gain):
     gains = response_of(tried(gain * RIGHT)).gains
     assert np.diag(gains) == pytest.approx([gain, gain], rel=0.02)
 
 
-@pytest.mark.parametrize("law", ["viscous", "stribeck", "lugre"])
+@pytest.mark.parametrize(
+    "law", [pytest.param("viscous", marks=pytest.mark.soak), "stribeck", "lugre"]
+)
 def test_gains_are_found_under_other_friction(law):
     climber = CLIMBER
     if law == "viscous":  # holds nothing on a wall
@@ -86,7 +93,13 @@ def test_a_trial_stays_within_its_torque_and_ends_at_rest_where_it_began():
     assert list(seen.trial.commands[-1].torques) == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("begin", range(60, 400, 68))
+@pytest.mark.parametrize(
+    "begin",
+    [
+        pytest.param(begin, marks=() if begin in (128, 332) else pytest.mark.soak)
+        for begin in range(60, 400, 68)
+    ],
+)
 def test_a_pulse_in_which_a_busy_machine_missed_something_is_tried_again(begin):
     seen = tried(RIGHT, stall=range(begin, begin + 20))
     assert seen.trial.trouble == ""
@@ -140,8 +153,14 @@ def test_every_wiring_of_a_board_that_takes_speeds_is_found_by_name(wiring):
     assert likeness > 0.95
 
 
-@pytest.mark.parametrize("board", ["torque", "velocity"])
-@pytest.mark.parametrize("told", ["torque", "velocity"])
+@pytest.mark.parametrize(
+    ("board", "told"),
+    [
+        ("torque", "velocity"),
+        ("velocity", "torque"),
+        *(pytest.param(both, both, marks=pytest.mark.soak) for both in ("torque", "velocity")),
+    ],
+)
 def test_the_board_is_told_and_whether_the_controller_knows(board, told):
     seen = tried(
         RIGHT,

@@ -126,7 +126,7 @@ def test_a_good_imu_and_good_fixes_pass(inclination):
     assert {name: found[name].verdict for name in ROWS} == dict.fromkeys(ROWS, PASS)
 
 
-@settings(max_examples=30)
+@settings(max_examples=8)
 @given(first=st.floats(-3, 3), inclination=st.floats(0, 180))
 def test_no_heading_and_no_wall_makes_a_good_one_fail(first, inclination):
     seen = circling(inclination, first)

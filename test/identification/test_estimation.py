@@ -1,5 +1,6 @@
 """Motions that are made by hand, and closed loops with noise, against parameters that are known."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -93,8 +94,14 @@ def test_every_parameter_is_found_from_a_motion_that_shows_it():
     assert [*found.reasons] == ["rotor_inertia"]  # there is none
 
 
-@pytest.mark.parametrize("inertia", [3e-4, 1e-3, 1e-2])  # 0.7 to 22 kg at the rims
-@pytest.mark.parametrize("assumed", [0.0, 1e-3])
+@pytest.mark.parametrize(
+    ("inertia", "assumed"),
+    [
+        # 0.7 to 22 kg at the rims
+        pytest.param(*it, marks=() if it in [(3e-4, 0.0), (1e-2, 1e-3)] else pytest.mark.soak)
+        for it in itertools.product((3e-4, 1e-3, 1e-2), (0.0, 1e-3))
+    ],
+)
 def test_rotors_are_told_from_mass_as_they_have_no_weight(inertia, assumed):
     true = replace(TRUE, rotor_inertia=inertia)
     found = identify(
@@ -262,7 +269,7 @@ def wrong(found, widths=1.6, **others):
     return [name for name in told if off[name] > widths * found.half_width(name)]
 
 
-@pytest.mark.parametrize("believed", [0.1, 0.33, 1.0])
+@pytest.mark.parametrize("believed", [0.1, pytest.param(0.33, marks=pytest.mark.soak), 1.0])
 def test_inertia_under_friction_that_resists_turning_is_not_what_was_believed(believed):
     true = replace(TRUE, yaw_inertia=0.38)
     motion = moved(true=true, scrub=40.0, noise=1.0, wheels=True)
@@ -273,7 +280,7 @@ def test_inertia_under_friction_that_resists_turning_is_not_what_was_believed(be
     assert "turning is resisted, by 40" in said_of(found)
 
 
-@pytest.mark.parametrize("believed", [0.1, 0.33, 1.0])
+@pytest.mark.parametrize("believed", [0.1, pytest.param(0.33, marks=pytest.mark.soak), 1.0])
 def test_what_is_not_excited_is_not_what_was_believed_but_has_no_number(believed):
     believed = replace(BELIEVED, yaw_inertia=believed)
     for heading in (STRAIGHT, (0.3 * TIME, 0.3 + 0 * TIME, 0 * TIME)):  # nor in a steady bend
@@ -352,11 +359,16 @@ def test_what_the_equations_lack_is_said_and_makes_no_number_wrong(name, scrub):
     ("name", "explanation"),
     [
         ("a tilted wall", "is the wall tilted"),
-        ("a round wall", "is the wall round"),
         ("wear", "does something wear"),
-        ("scrubbing wheels", "do wheels or a seal scrub"),
         ("a centre of mass beside", "the centre of mass beside"),
-        ("unlike motors", "are the wheels, or their motors, unlike"),
+        *(
+            pytest.param(*it, marks=pytest.mark.soak)
+            for it in [
+                ("a round wall", "is the wall round"),
+                ("scrubbing wheels", "do wheels or a seal scrub"),
+                ("unlike motors", "are the wheels, or their motors, unlike"),
+            ]
+        ),
     ],
 )
 def test_what_does_not_fit_is_told_with_where_it_does_not(name, explanation):
@@ -498,7 +510,9 @@ def test_torques_that_are_not_those_commanded_scale_nothing_silently():
     assert set(changes(found, BELIEVED)["plant_simulator"]) == {"wheel_radius", "half_track"}
 
 
-@pytest.mark.parametrize("step", [1, 4, 10, 20])
+@pytest.mark.parametrize(
+    "step", [4, 20, *(pytest.param(it, marks=pytest.mark.soak) for it in (1, 10))]
+)
 def test_odometry_may_be_slow(step):
     motion = moved(noise=1.0, wheels=True, scrub=5.0)
     arrays = {

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from climber_uk.localization import models
@@ -44,6 +44,7 @@ def test_a_correction_is_that_of_the_information_form(seed, parts):
     np.testing.assert_allclose(after.mean, expected, atol=1e-6)
 
 
+@settings(max_examples=10)
 @given(seed=SEEDS)
 def test_covariances_stay_symmetric_and_positive_whatever_comes(seed):
     random = np.random.default_rng(seed)

@@ -14,7 +14,7 @@ from climber_uk.localization.scrubbing import LONGEST, SOON, Push, Scrubbing, Tu
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import GRAVITY
 
-PERIOD, SPEED, YAW_RATE = 0.005, 0.2, 0.4
+PERIOD, SPEED, YAW_RATE = 0.01, 0.2, 0.4
 LAMBDA, LEVER = 0.08, 0.03  # λ, a [m]
 WIDER, BY_DRAG, BY_WEIGHT = 0.06, 0.6, 0.4  # [m] by which wheels show a wider track; ζ, ξ
 NOISE = 0.02  # [m] of a fix
@@ -55,7 +55,7 @@ class Circles:
             acceleration = (speed - self.speed) / PERIOD
             turning = (rate - self.yaw_rate) / PERIOD
             self._step(speed, rate, acceleration, turning, spin * (number * PERIOD < 0.3))
-            if fixes and number % 20 == 0:
+            if fixes and number % 10 == 0:
                 values = self.pose[:2] + self.random.normal(0, NOISE, 2)
                 stamp = SECOND + round(self.now * SECOND)
                 self.localizer.on_fix(Fix(stamp, (0, 1), values, NOISE**2 * np.eye(2)))

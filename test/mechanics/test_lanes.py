@@ -30,6 +30,8 @@ AREAS = {
     "a strip": "0 0\n3 0\n3 0.45\n0 0.45",
 }
 
+TELLING = "a facade with a window", "notched, with a hole", "clockwise", "round"
+
 
 def made(folder, text, **parameters):
     file = folder / "area.txt"
@@ -80,8 +82,11 @@ def covered(area, way, width):
 @pytest.mark.parametrize(
     ("text", "direction"),
     [
-        *((text, 0.5) for text in AREAS.values()),
-        (FACADE.read_text(), 0.0),
+        *(
+            pytest.param(text, 0.5, marks=() if name in TELLING else pytest.mark.soak)
+            for name, text in AREAS.items()
+        ),
+        pytest.param(FACADE.read_text(), 0.0, marks=pytest.mark.soak),
         (AREAS["an L"], np.pi / 2),
     ],
     ids=[*AREAS, "across the facade", "up the L"],
@@ -121,7 +126,7 @@ def some_area(random):
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(6, 100))]
+    "seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(3, 100))]
 )
 def test_of_any_area_the_lanes_cover_it_keep_clear_and_have_no_zigzag(seed, tmp_path):
     random = np.random.default_rng(seed)

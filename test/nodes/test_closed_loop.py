@@ -71,9 +71,9 @@ def runs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper_bags(runs):
-    """5 s of a lap, and its first 2 s again."""
+    """3 s of a lap, and its first 1.5 s again."""
     bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
-    for bag, duration in zip(bags, ["5", "2"], strict=True):
+    for bag, duration in zip(bags, ["3", "1.5"], strict=True):
         demo(runs, bag.parent, "paper.yaml", "--duration", duration)
         hold_up_the_recorder(runs)
         finished(runs)
@@ -86,6 +86,7 @@ SMALL = {  # a fifth of the size of climber.yaml's lap, in a fifth of its time
     "rate: 0.12": "rate: 0.6",
     "ramp_time: 3.0": "ramp_time: 1.0",
 }
+SLOW = {"control_period: 0.005": "control_period: 0.01"}
 DURATION = 14.0  # [s] of that lap, and of rest after it
 
 
@@ -105,7 +106,7 @@ def small_bag(runs, name, duration, changed=SMALL, called=""):
 
 @pytest.fixture(scope="module")
 def climber_bag(runs):
-    return small_bag(runs, "climber.yaml", DURATION)
+    return small_bag(runs, "climber.yaml", DURATION, SMALL | SLOW)
 
 
 def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay):
@@ -125,7 +126,7 @@ def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay)
 def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(paper_bags):
     bags = paper_bags
     run = read_run(bags[0])
-    assert run.time[-1] >= 5.0
+    assert run.time[-1] >= 3.0
     assert len(run.time) == round(run.time[-1] * 200) + 1  # not one is missing
     assert np.sqrt(np.mean(run.distance**2)) <= 0.05e-3
     assert run.distance.max() <= 0.15e-3
@@ -141,7 +142,7 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
     }.items():
         first, second = (by_stamp(bag, topic, content) for bag in bags)
         common = sorted(first.keys() & second.keys())
-        assert len(common) >= 400
+        assert len(common) >= 300
         assert all(first[stamp] == second[stamp] for stamp in common)
 
 
@@ -150,7 +151,7 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     assert run.margins.values[:, :2].min() > 2.8
     assert np.abs(run.error[:, 1]).max() < 2e-3
     assert run.time[-1] >= DURATION
-    assert np.abs(run.pose[-200:] - run.pose[-1]).max() < 1e-9  # the last second
+    assert np.abs(run.pose[-100:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
 
 
@@ -163,7 +164,7 @@ def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_it
         "max_heading: 0.3": f"max_heading: 0.3{asked}{pump}",
         "integration_step: 0.0025": f"integration_step: 0.0025\n    setpoint_timeout: 0.5{pump}",
     }
-    run = read_run(small_bag(runs, "climber.yaml", 6.0, SMALL | changed, "least_suction_"))
+    run = read_run(small_bag(runs, "climber.yaml", 6.0, SMALL | SLOW | changed, "least_suction_"))
     assert run.time[-1] >= 6.0
     pressure = run.recorded[PRESSURE].values[:, 0]
     assert pressure[0] == 8000.0  # at rest
@@ -177,12 +178,13 @@ def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_it
 
 
 def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):
-    for bag, answers in ((paper_bags[0], 990), (climber_bag, 2790)):
+    for bag, answers in ((paper_bags[0], 590), (climber_bag, 1390)):
         numbers = replay(bag, "--fail-above", "1e-9")
         odometry, torques = (set(by_stamp(bag, of, str)) for of in ("/odom", "/wheel_torques"))
-        # the recorder may end between the last odometries and their answers
-        assert all(stamp > max(odometry) for stamp in torques - odometry)
-        recorded = len(torques & odometry) - 1  # one may be from before there was a clock
+        # the recorder may end between the last odometries and their answers; before there is a
+        # clock, a safe output may have the stamp 0
+        assert not [stamp for stamp in torques - odometry if 0 < stamp < max(odometry)]
+        recorded = len(torques & odometry)
         assert numbers["answers"]["in both"] >= recorded >= answers
         assert not numbers["changed"]
         for modes in numbers["modes"].values():
@@ -204,8 +206,8 @@ def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_le
     wheels = replay(paper_bags[0], "-p", more)["wheels"]
     assert wheels["difference, largest [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
     assert wheels["largest at [s]"] == [0.0, 0.0]
-    # no more in all of the 5 s than if it were wrong for 25 ms, and then right
-    assert max(wheels["difference, RMS [N m]"]) < by_hand * (0.025 / 5) ** 0.5
+    # no more in all of the 3 s than if it were wrong for 25 ms, and then right
+    assert max(wheels["difference, RMS [N m]"]) < by_hand * (0.025 / 3) ** 0.5
 
 
 def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
@@ -220,7 +222,7 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
     )
     # these sensors have no errors; the recorder may have ended between the two
     number = min(odometry.num_poses, truth.num_poses)
-    assert number >= 1000
+    assert number >= 600
     for one in ("timestamps", "positions_xyz", "orientations_quat_wxyz"):
         np.testing.assert_array_equal(getattr(odometry, one)[:number], getattr(truth, one)[:number])
     run = read_run(paper_bags[0])
@@ -246,7 +248,8 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
     """At 2 s the pump's pressure is lost, with 1 s to the volume: P = 8 kPa exp(2 - t)."""
     config = tmp_path / "lost.yaml"
     lost = "initial_y: 3.0\n    pressure_loss_time: 2.0\n    suction:\n      pump_time: 1.0"
-    config.write_text((CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", lost))
+    text = (CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", lost)
+    config.write_text(text.replace("control_period: 0.005", "control_period: 0.01"))
     demo(world, tmp_path / "run", config, "--duration", "8")
     assert "fell off: tip margin" in finished(world)
     states, stopped, errors = {}, [], []
@@ -273,7 +276,7 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
 
 def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
     """Two of the four in the file."""
-    demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "2", "--duration", "2")
+    demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "2", "--duration", "1")
     finished(world)
     bag, names = tmp_path / "run" / "bag", [f"climber_{number}" for number in (1, 2)]
     stamps, frames, tellers = {name: set() for name in names}, set(), set()
@@ -287,7 +290,7 @@ def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
     nodes = "plant_simulator", "uk_torque_controller"
     assert {f"/{name}/{node}" for name in names for node in nodes} <= tellers
     assert all(teller.split("/")[1] in names for teller in tellers)
-    assert len({tuple(sorted(stamps[name])[:400]) for name in names}) == 1  # one time, 2 s of it
+    assert len({tuple(sorted(stamps[name])[:200]) for name in names}) == 1  # one time, 1 s of it
     ways = []
     for name in names:
         run = read_run(bag, name)
@@ -299,26 +302,13 @@ def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     # The machine may be busy, and not keep to it all the time: what an idle one does is shown by
     # `make demo CLOCK=wall`
-    demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "6")
+    demo(world, tmp_path / "run", "climber.yaml", "--clock", "wall", "--duration", "4")
     finished(world)
     run = read_run(tmp_path / "run" / "bag")
-    assert 5 < run.time[-1] < 20  # that of the configuration
-    assert np.median(run.distance[run.time > 4.0]) < 0.05
+    assert 3 < run.time[-1] < 20  # that of the configuration
+    assert np.median(run.distance[run.time > 2.5]) < 0.05
     assert np.median(np.abs(run.error[:, 1])) < 0.05
     assert run.distance.max() < 0.3  # where the guard is late, too: it does not run away
-
-
-def test_an_interrupted_demo_leaves_no_process_and_a_readable_bag(world, tmp_path):
-    process = demo(world, tmp_path / "run", "paper.yaml", start_new_session=True)
-    is_under_way(world)
-    assert len([*inhabitants(world.domain)]) == 5
-    os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C in a terminal does
-    assert process.wait(TIMEOUT) != 0
-    said = world.log("run_demo")
-    assert "interrupted" in said
-    assert "Traceback" not in said
-    assert not [*inhabitants(world.domain)]
-    assert len(read_run(tmp_path / "run" / "bag").time) > 10
 
 
 def test_what_a_demo_cannot_start_with_is_said_in_one_line(world, tmp_path):

@@ -16,11 +16,13 @@ pytestmark = pytest.mark.nodes
 
 OWN = "ros__parameters"
 PATH = {"origin_y": 3.0, "parabola.length": 0.6, "one_go.rate": 0.3}
-START = {"initial_x": 0.0, "initial_y": 3.0, "initial_heading": 0.0}
+PERIOD = {"control_period": 0.01}
+START = {"initial_x": 0.0, "initial_y": 3.0, "initial_heading": 0.0, **PERIOD}
 ELECTRIC = {"adhesion": "electroadhesion", "electroadhesion.film_pressure": 6000.0}
 SECTIONS = {  # the first climber is that of the document
     "/**/trajectory_publisher": PATH,
     "/**/plant_simulator": START,
+    "/**/uk_torque_controller": PERIOD,
     "/climber_2/uk_torque_controller": {
         "constraints": "springs",
         "springs.across": 20.0,

@@ -35,12 +35,12 @@ WALL_CLOCK = {  # patient, and not often: what is slow here is the machine
     ],
     PLANNER: ["rest_to_rest.ramp_time:=1.0"],
 }
-LOCK_STEP = {  # at half the rate, for half the time; from the moment on that the test listens
+LOCK_STEP = {  # at a quarter of the rate, from the moment on that the test listens
     PLANT: [
-        *("simulated_time:=true", "lockstep_timeout:=2.0", "control_period:=0.01"),
+        *("simulated_time:=true", "lockstep_timeout:=2.0", "control_period:=0.02"),
         "wait_for:=test",
     ],
-    CONTROLLER: ["use_sim_time:=true", "control_period:=0.01", *QUICK_APPROACH],
+    CONTROLLER: ["use_sim_time:=true", "control_period:=0.02", *QUICK_APPROACH],
     PLANNER: ["use_sim_time:=true", "rest_to_rest.ramp_time:=1.0"],
 }
 

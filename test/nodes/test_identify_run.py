@@ -31,7 +31,7 @@ def run(world, name, *arguments):
 
 def test_a_planned_run_tells_what_is_30_percent_off_and_the_nodes_load_it(world, tmp_path):
     plan, true, found = (tmp_path / f"{name}.yaml" for name in ("plan", "true", "found"))
-    limits = "--duration", 12, "--size", 1, "--speed", 0.3
+    limits = "--duration", 8, "--size", 1, "--speed", 0.3
     run(world, "identify", "--plan", plan, "--params", BELIEVED, *limits)
     write_changed(plan, {"plant_simulator": {**TRUTH, **NOISE}}, true)
     run(world, "run_demo", "--config", true, "--output", tmp_path / "run")

@@ -44,10 +44,10 @@ class Goals:
 
     def __init__(self, world, action, *parameters, lock_step=True):
         self.world, self.action = world, action
-        time = f"use_sim_time:={str(lock_step).lower()}"
+        time, period = f"use_sim_time:={str(lock_step).lower()}", "control_period:=0.02"
         for node, more in {
-            "plant_simulator": [f"simulated_time:={str(lock_step).lower()}"],
-            CONTROLLER: [time],
+            "plant_simulator": [f"simulated_time:={str(lock_step).lower()}", period],
+            CONTROLLER: [time, period],
             PLANNER: [time, "autostart:=false", *FASTER, *parameters],
         }.items():
             world.start_node(node, *more, config="climber.yaml")

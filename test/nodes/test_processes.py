@@ -106,7 +106,8 @@ def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(
     family = descendants(process.pid)
     assert len(family) == 4 + by_another
     end(process)
-    process.stdout.read()  # or it would wait for somebody to read how far it is
+    said = process.stdout.read()  # or it would wait for somebody to read how far it is
+    assert by_another or "Traceback" not in said  # the other one is told, too
     gone(world, {*family, process.pid})
     assert (tmp_path / "run" / "bag" / "metadata.yaml").is_file()
     assert len(read_run(tmp_path / "run" / "bag").time) > 10
@@ -226,7 +227,10 @@ def test_a_terminal_that_is_closed_does_not_end_what_nohup_started(world):
 @pytest.mark.parametrize("end", [interrupt_twice, kill])
 @pytest.mark.parametrize(
     "command",
-    [["reproduce_paper", "-o"], ["campaign", CONFIG / "campaign.yaml", "--jobs", "2", "-o"]],
+    [
+        pytest.param(["reproduce_paper", "-o"], marks=pytest.mark.soak),
+        ["campaign", CONFIG / "campaign.yaml", "--jobs", "2", "-o"],
+    ],
     ids=lambda command: command[0],
 )
 def test_what_computes_in_many_processes_ends_with_all_of_them(

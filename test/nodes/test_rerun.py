@@ -15,7 +15,7 @@ from climber_uk.messages import reading
 
 pytestmark = [pytest.mark.nodes, pytest.mark.slow]
 
-DURATION = 2.0  # [s]
+DURATION = 1.0  # [s]
 MARGINS = "/plant_simulator/margins"
 
 

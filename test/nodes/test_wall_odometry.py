@@ -1,8 +1,6 @@
 """The node `wall_odometry`: told by hand, and in the loop with plant and controller."""
 
-import json
 import math
-import subprocess
 
 import numpy as np
 import pytest
@@ -12,8 +10,10 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 from world import CONFIG, command
 
+from climber_uk.bags.recorded_run import read_run
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading, writing, writing_sensors
+from climber_uk.report.metrics import Case, evaluate
 
 pytestmark = pytest.mark.nodes
 NODE = "wall_odometry"
@@ -164,10 +164,8 @@ def test_the_climber_of_field_yaml_follows_its_path_by_what_its_sensors_tell(wor
     world.run("run_demo", *command("run_demo"), *arguments)
     demo = world.processes["run_demo"]
     world.wait(lambda: demo.poll() is not None, "end of the run")
-    analyze = [*command("analyze_bag"), run / "bag", "--output", tmp_path / "report"]
-    subprocess.run(analyze, check=True, capture_output=True, env=world.environment)
-    (report,) = (tmp_path / "report").glob("*.json")
-    (found,) = [run["metrics"] for run in json.loads(report.read_text())["runs"]]
+    assert demo.returncode == 0, world.log("run_demo")
+    found = evaluate(Case(read_run(run / "bag")))
     assert found["truth_max_distance"] < 0.03
     assert found["safety_stops"] == found["odometry_unanswered"] == 0
     assert "refused" not in (run / f"{NODE}.log").read_text()

@@ -13,8 +13,8 @@ START = np.array([0.0, 6.0, 0.0, 10.0, 0.0, -0.6])
 TRY = np.random.default_rng(5).normal(size=(200, 6)) * [5, 5, 4, 8, 8, 1]
 
 
-def integrate(derivative, relative, absolute, start=START):
-    solution = solve_ivp(derivative, (0, 20), start, rtol=relative, atol=absolute)
+def integrate(derivative, relative, absolute, start=START, until=20.0):
+    solution = solve_ivp(derivative, (0, until), start, rtol=relative, atol=absolute)
     x_error = solution.y[0] - 10 * np.sin(solution.t)
     y_error = solution.y[1] - 6 * np.cos(solution.t)
     return solution.y.T, x_error, y_error
@@ -121,11 +121,11 @@ def test_an_unknown_reading_is_refused():
     "derivative", [PRINTED.uncorrected, pytest.param(PRINTED.corrected, marks=pytest.mark.soak)]
 )
 def test_at_1e_8_the_path_is_met_to_1e_8_while_the_wheels_slip_sideways(derivative):
-    y, x_error, y_error = integrate(derivative, 1e-8, 1e-11)
+    y, x_error, y_error = integrate(derivative, 1e-8, 1e-11, until=7.0)
     assert np.abs(x_error).max() < 1e-8
     assert np.abs(y_error).max() < 1e-8
     assert np.abs(side_slip(y)).max() > 9
-    third = PRINTED.constraint_force(20.0, y[-1, :3], y[-1, 3:])[2]
+    third = PRINTED.constraint_force(7.0, y[-1, :3], y[-1, 3:])[2]
     assert abs(third) > 1  # although no motor acts in the row of no-slip
 
 

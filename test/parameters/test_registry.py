@@ -34,7 +34,13 @@ def python(directory, code):
     return said
 
 
-@pytest.mark.parametrize("first", TABLES)
+@pytest.mark.parametrize(
+    "first",
+    [
+        pytest.param(first, marks=() if first in ("friction", "controllers") else pytest.mark.soak)
+        for first in TABLES
+    ],
+)
 def test_every_table_has_the_entries_of_other_packages_whichever_is_imported_first(first, tmp_path):
     groups = install(tmp_path, OTHERS)
     order = [first, *(group for group in TABLES if group != first)]

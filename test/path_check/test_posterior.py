@@ -3,10 +3,10 @@
 import json
 import math
 from dataclasses import replace
+from statistics import NormalDist
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 from test_check_path import CLIMBER, CONFIG, FRICTION, HELD, run
 
 from climber_uk.closed_loop.batch import Loops
@@ -47,7 +47,7 @@ def test_a_safe_climber_never_slips_and_one_beyond_the_limit_always_does():
 def test_between_it_is_the_share_of_the_interval_that_is_beyond_the_limit(deviations):
     width = 1.0
     found = slips(LIMIT + deviations * width / 1.96, width, climbers=4000)
-    assert found == pytest.approx(norm.cdf(deviations), abs=0.03)  # 4 of its own deviations
+    assert found == pytest.approx(NormalDist().cdf(deviations), abs=0.03)  # 4 of its own deviations
 
 
 def test_the_wider_the_interval_of_a_climber_that_holds_the_more_probably_it_slips():

@@ -74,7 +74,7 @@ def asked_at_random(under_way, random, number):
 def test_whatever_is_asked_at_any_time_the_climber_stays_on_its_path_and_no_torque_jumps(
     trajectory,
 ):
-    asked_at_random(UnderWay(trajectory()), np.random.default_rng(21), 12)
+    asked_at_random(UnderWay(trajectory()), np.random.default_rng(21), 6)
 
 
 @pytest.mark.soak

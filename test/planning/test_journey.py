@@ -49,7 +49,7 @@ def travel(random, number):
 
 
 def test_whatever_takes_over_no_torque_jumps():
-    assert travel(np.random.default_rng(11), 6) <= JUMP
+    assert travel(np.random.default_rng(11), 4) <= JUMP
 
 
 @pytest.mark.soak

@@ -188,7 +188,7 @@ def test_the_grip_that_is_asked_of_each_wheel_is_that_by_hand(tmp_path, tilt, pu
         across, forces = -49.05 * pulls_left(heading), (0.4 / 0.027, -0.2 / 0.027)
         margin = held.slip_margin(Climber(), 0.0, forces, 20.0, across)
         assert 1 / max(np.hypot(*right), np.hypot(*left)) == pytest.approx(margin, rel=1e-3)
-    assert "grip" in draw([("", run)])
+    assert tilt == 0.0 or "grip" in draw([("", run)])
 
 
 def test_latency_and_its_jitter_are_those_by_hand(tmp_path):

@@ -166,17 +166,26 @@ def out_of_step(messages):
     return [*messages, *second.messages]
 
 
-@each_reader
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (a_step_back, "/odom: time starts again, there are 2 runs"),
-        (out_of_step, "no run on /odom: it leaps to and fro"),
-        (lambda made: [*made, *at_once(100, 100, by=9 * SECOND)], "its stamps leap to and fro"),
-        (lambda made: [*made, *at_once(100, 100)], "from another with the same stamp"),
-    ],
-    ids=["step back", "out of step", "two clocks", "in step"],
-)
+SEVERAL = {
+    "step back": (a_step_back, "/odom: time starts again, there are 2 runs"),
+    "out of step": (out_of_step, "no run on /odom: it leaps to and fro"),
+    "two clocks": (
+        lambda made: [*made, *at_once(100, 100, by=9 * SECOND)],
+        "its stamps leap to and fro",
+    ),
+    "in step": (lambda made: [*made, *at_once(100, 100)], "from another with the same stamp"),
+}
+
+
+def each_with_one():
+    """Each tool with a way in which runs are several; for soak with all of them."""
+    for number, tool in enumerate([*TOOLS, identify]):
+        for turn, (name, (change, said)) in enumerate(SEVERAL.items()):
+            marks = () if turn == number % len(SEVERAL) else pytest.mark.soak
+            yield pytest.param(tool, change, said, id=f"{name}-{by_name(tool)}", marks=marks)
+
+
+@pytest.mark.parametrize(("tool", "change", "said"), each_with_one())
 def test_no_tool_takes_several_runs_for_one(tmp_path, run, tool, change, said):
     made = a_run(100)
     made.add_parameters(left_wheel_joint="left", right_wheel_joint="right")
