@@ -224,6 +224,8 @@ class Controller:
     def _see(self, stamp: int, motion: Motion) -> Trouble | None:
         """Take in an odometry; return what is wrong with it."""
         is_first = self.estimator.motion is None
+        takes_torques = self.board.motors == "torque"
+        self.estimator.checks_delay = self.guard.budget.is_gentle = takes_torques
         observed = self.estimator.see(stamp, motion)
         self._safe_output.watch(self._law.climber, observed, motion)
         self.stops.move(self.estimator.motion if observed or is_first else None)

@@ -74,6 +74,7 @@ class Estimator:
         self._period_is_measured = False
         self._sent = TorqueHistory()
         self.latency, self.twist, self.delays = Latency(), TwistKind(), DelayCheck()
+        self.checks_delay = True  # at once: what is sent is what is to act
         self._delay = 0.0  # [s] of the last answer
         self._kept = 0  # [ns] for which torques are kept that have acted, as far as is known
         self.reset()
@@ -270,7 +271,8 @@ class Estimator:
                 self._kept = LATEST
                 if self.timing.learn_delay:
                     self._learn_delay(acted[-1][0], expected, motion, time, shares)
-                observed = self._check_delay(observed, stamp)
+                if self.checks_delay:
+                    observed = self._check_delay(observed, stamp)
         self.motion, learnt = self.observer.corrected(
             self.climber, self.learnt, expected, motion, time, shares, self._direction, self._turn
         )

@@ -38,6 +38,7 @@ class ForceBudget:
     """What a climber may do by its torques, while odometry tells that it rests."""
 
     def __init__(self) -> None:
+        self.is_gentle = True  # with the first push of a climber that has not slid for a while
         self.restart()
 
     def restart(self) -> None:
@@ -71,7 +72,8 @@ class ForceBudget:
     @property
     def most(self) -> float:
         """Speed [m/s] that may be given now."""
-        first = self.first if self._slid > KNOWN or self.pushes else FIRST
+        is_first = self.is_gentle and self.pushes == 0 and self._slid <= KNOWN
+        first = FIRST if is_first else self.first
         return min(first * GROWS**self.pushes, MOST * self._allowed)
 
     def see(

@@ -14,7 +14,8 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
 WINDOW = SECOND // 2  # [ns] in which one odometry at least is not late
-LONGEST_DELAY = 0.22  # [s] that is learnt
+LONGEST_DELAY = 0.22  # [s] that is learnt at once
+SLOWLY = 0.05  # [s] that is learnt in small steps
 FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
 FASTEST_CHANGE = 0.05  # [s/s] by which it changes
 MEMORY_TIME = 1.0  # T_f [s]
@@ -246,4 +247,5 @@ class Latency:
         self._slopes = tuple(slopes)
         most = FASTEST_CHANGE * time
         change = min(max(-product / (self._energy + LEAST_ENERGY), -most), most)
-        self.delay = min(max(self.delay + change, least), LONGEST_DELAY)
+        most = max(SLOWLY, self.delay)
+        self.delay = min(max(self.delay + change, least), most)
