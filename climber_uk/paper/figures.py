@@ -67,6 +67,7 @@ def _error(
     axes.plot(plain.time, plain.error[:, index], label=f"{name}-error")
     if compared:
         axes.plot(corrected.time, corrected.error[:, index], label=f"{name}-error-M")
+    axes.ticklabel_format(axis="y", scilimits=(-2, 2))  # longer ones leave the label no place
     _label(axes, "t [s]", f"{name} error [m]")
 
 

@@ -49,7 +49,7 @@ FULL = StudyExtent(
     nodes=True,
 )
 QUICK = StudyExtent(
-    tolerance=(1e-4, 1e-7),
+    tolerance=(1e-6, 1e-9),
     step=0.01,
     drift_time=20.0,
     drift_steps=(0.005, 0.01),

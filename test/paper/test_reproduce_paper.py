@@ -296,7 +296,7 @@ def test_quick_writes_every_figure_and_table(tmp_path):
         assert all(len(line) == len(header) for line in lines)
     with Path(tmp_path, "comparison.csv").open(encoding="utf-8") as file:
         by_name = {line[0]: line for line in csv.reader(file)}
-    assert float(by_name["as printed, tolerance 0.0001, (26)"][7]) > 9  # side slip
+    assert float(by_name["as printed, tolerance 1e-06, (26)"][7]) > 9  # side slip
     assert by_name["torques of (25) fed to the climber"][1]
     assert "closed loop through the nodes: left out by --quick" in by_name
     assert "as printed, default tolerance 1e-3, (26): left out by --quick" in by_name
