@@ -7,7 +7,7 @@ that is stuck shows as a wheel that stands while the other one goes.
 
 import math
 
-from climber_uk.control.estimator import Observed
+from climber_uk.control.observed import Observed
 from climber_uk.mechanics.climber import Climber
 
 SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs

@@ -18,10 +18,11 @@ from climber_uk.control.approach import Approach
 from climber_uk.control.constraint_set import ConstraintSet, blended
 from climber_uk.control.control_law import CUT, Command, ControlLaw, check_finite
 from climber_uk.control.encoder_check import EncoderCheck
-from climber_uk.control.estimator import Estimator, Observed
+from climber_uk.control.estimator import Estimator
 from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import DisturbanceEstimate, Observer
+from climber_uk.control.observed import Observed
 from climber_uk.control.safe_output import SafeOutput
 from climber_uk.control.safety import Calm, Mode, Safety, Trouble
 from climber_uk.control.speed_command import STANDING, MotorBoard
@@ -139,6 +140,7 @@ class Controller:
         self._without_twist = ""
         if enabled:
             self.guard.fault = None
+            self.guard.restart()
             self.stops.enable()
             self._forget_when()
 
@@ -222,6 +224,8 @@ class Controller:
     def _see(self, stamp: int, motion: Motion) -> Trouble | None:
         """Take in an odometry; return what is wrong with it."""
         is_first = self.estimator.motion is None
+        takes_torques = self.board.motors == "torque"
+        self.estimator.checks_delay = self.guard.budget.is_gentle = takes_torques
         observed = self.estimator.see(stamp, motion)
         self._safe_output.watch(self._law.climber, observed, motion)
         self.stops.move(self.estimator.motion if observed or is_first else None)
@@ -291,6 +295,8 @@ class Controller:
             return None
         expected = self.active.expected(self._stamp, target, self._law.constraints)
         fault = self.guard.watch(self._law.climber, observed, expected)
+        if fault and fault[0] is Mode.LATE and self.estimator.acts_later(self.guard.late):
+            fault = None
         if fault is None and (strayed := self.active.strayed(observed.before, target)):
             fault = self.guard.budget.unanswered or strayed
         if fault is not None and fault[0] is Mode.TOO_FAST:

@@ -10,20 +10,20 @@ from bisect import bisect_right
 from collections.abc import Sequence
 
 from climber_uk.control.actuator_check import Variance
-from climber_uk.control.estimator import Observed
+from climber_uk.control.observed import Observed
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Motion
 
-BORNE = 0.0, 0.02, 0.04  # [s] that the loop bears, beside what it has learnt
-LATE = 0.06, 0.08, 0.1, 0.14, 0.2  # [s] that it does not
+DELAYS = tuple(0.02 * number for number in range(11))  # [s] that are compared
+BORNE = 0.025  # [s] that the loop bears, beside what it knows
 MOVES = 0.03  # [m/s] from which on noise does not make it that
-MEMORY = 0.15  # [s] in which a difference is forgotten
-EXCITED = 0.03  # of the largest force: standard deviation of what no delay leaves unexplained
-UNEXPLAINED = 4.0  # times as much is unexplained with any delay that is borne as with a longer one
+MEMORY = 0.2  # [s] in which a difference is forgotten
+EXCITED = 0.002  # of the largest force: standard deviation of what no delay leaves unexplained
+MUCH = math.log(4.0)  # times as much is unexplained near the delay that is known as with another
+SURE = 20.0  # of the evidence of drive and yaw together, for another delay
+MOST = 20  # windows that count: older ones are forgotten
 TICK = 1e-6  # [s] by which times that are added may be off
 WINDOW = 0.015  # [s] at least, over which a force is told: noise of the twist is shared out
-IN_A_ROW = 2  # windows; one in which it rests leaves what was found
-ENOUGH = 5  # windows, of fewer a variance is chance
 KEPT = 100  # odometry messages that are too old, before they are forgotten
 
 
@@ -35,8 +35,7 @@ class Axis:
         self._restart()
 
     def _restart(self) -> None:
-        self._acted, self._unexplained = Variance(), [Variance() for _ in BORNE + LATE]
-        self._late = 0  # windows in a row
+        self._acted, self._unexplained = Variance(), [Variance() for _ in DELAYS]
 
     def rest(self, time: float) -> None:
         """For some time [s] more it stands: what rubs holds it, by as much as is asked."""
@@ -51,17 +50,20 @@ class Axis:
         for variance, force in zip(self._unexplained, asked, strict=True):
             variance.add(acted - force, weight)
 
-    def is_late(self, largest: float) -> bool:
-        """Whether, once a window, it acts later than is borne, by `largest` [N] at most."""
-        variances = [it.variance for it in self._unexplained]
-        least = min(variances[len(BORNE) :])
-        is_excited = variances[0] > (EXCITED * largest) ** 2
+    def evidence(self, near: Sequence[bool], largest: float) -> tuple[list[float], float]:
+        """For each delay, how much better it explains what acts than those `near` do; enough of it.
+
+        That is (n - 2) times the logarithm of what is unexplained, of n windows: chance correlates
+        so well once in exp(x / 2). Forces are `largest` [N] at most.
+        """
+        count, least = min(self._acted.number, MOST) - 2, (EXCITED * largest) ** 2
+        if count <= 0:
+            return [0.0] * len(DELAYS), 0.0
+        unexplained = [max(it.variance, least) for it in self._unexplained]
+        known = min(it for it, is_near in zip(unexplained, near, strict=True) if is_near)
         # where nothing answers, what was to act before may be as steady
-        without = min(self._acted.variance, *variances[: len(BORNE)])
-        is_known = self._acted.number >= ENOUGH
-        is_later = is_known and is_excited and without > UNEXPLAINED * least
-        self._late = self._late + 1 if is_later else 0
-        return self._late >= IN_A_ROW
+        known = min(known, max(self._acted.variance, least))
+        return [count * math.log(known / it) for it in unexplained], count * MUCH
 
 
 class DelayCheck:
@@ -78,8 +80,11 @@ class DelayCheck:
         self._until, self._impulse = [0.0], [(0.0, 0.0)]
         self._drive, self._yaw = Axis(), Axis()
 
-    def add(self, climber: Climber, observed: Observed) -> bool:
-        """Take what an odometry tells of the time since the last: does that show a delay?"""
+    def add(self, climber: Climber, observed: Observed, known: float) -> float | None:
+        """Take what an odometry tells, and the torques that arrived, not acted, since the last.
+
+        Returns the delay [s] with which they act, if that is quite another than the one `known`.
+        """
         d, (force, moment) = climber.half_track, climber.wrench(*observed.torques)
         drive, yaw = self._impulse[-1]
         self._time += observed.time
@@ -89,9 +94,12 @@ class DelayCheck:
         time = self._time - self._begin
         if time < WINDOW - TICK:
             self._first = before
-            return False
+            return None
+        is_known = self._begin - DELAYS[-1] >= self._until[0]  # what was asked for by then
         drives, yaws = self._asked(time)
         self._first, self._begin, new = None, self._time, 1 - math.exp(-time / MEMORY)
+        if not is_known:
+            return None
         mass, inertia, friction, weight = climber.inertial
         if d * _slowest(before.yaw_rate, after.yaw_rate) < MOVES:
             self._yaw.rest(time)
@@ -105,17 +113,24 @@ class DelayCheck:
             acted += math.copysign(friction, after.speed) - observed.pull
             self._drive.add(acted, drives, new)
         largest = 2 * climber.max_wheel_torque / climber.wheel_radius
-        return any([self._drive.is_late(largest), self._yaw.is_late(largest)])
+        near = [abs(delay - known) <= BORNE for delay in DELAYS]
+        if not any(near):
+            return None
+        drive_shows, much = self._drive.evidence(near, largest)
+        yaw_shows, as_much = self._yaw.evidence(near, largest)
+        shows = [drive + yaw for drive, yaw in zip(drive_shows, yaw_shows, strict=True)]
+        most = max(shows)
+        return DELAYS[shows.index(most)] if most > max(SURE, much, as_much) else None
 
     def _asked(self, time: float) -> tuple[list[float], list[float]]:
         """Drives, and yaws at the rims [N], of the last `time` [s], had they come by each delay."""
-        ends = [self._at(self._time - delay) for delay in BORNE + LATE]
-        begins = [self._at(self._time - time - delay) for delay in BORNE + LATE]
+        ends = [self._at(self._time - delay) for delay in DELAYS]
+        begins = [self._at(self._time - time - delay) for delay in DELAYS]
         drives, yaws = (
             [(end[axis] - begin[axis]) / time for end, begin in zip(ends, begins, strict=True)]
             for axis in (0, 1)
         )
-        if (forgotten := bisect_right(self._until, self._begin - LATE[-1]) - 1) > KEPT:
+        if (forgotten := bisect_right(self._until, self._begin - DELAYS[-1]) - 1) > KEPT:
             del self._until[:forgotten], self._impulse[:forgotten]
         return drives, yaws
 

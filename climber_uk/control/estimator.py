@@ -7,6 +7,7 @@ nanoseconds, on the clock of the odometry.
 from typing import Any, NamedTuple
 
 from climber_uk.control.control_law import ControlInput
+from climber_uk.control.delay_check import DelayCheck
 from climber_uk.control.model import (
     SETTLES,
     SLOW,
@@ -16,9 +17,17 @@ from climber_uk.control.model import (
     Shares,
     predict,
 )
+from climber_uk.control.observed import Acting, Observed
 from climber_uk.control.safety import Safety
 from climber_uk.control.side_slip import NO_SLIP
-from climber_uk.control.timing import LONGEST_STEP, Latency, Sample, Timing, TorqueHistory
+from climber_uk.control.timing import (
+    LONGEST_DELAY,
+    LONGEST_STEP,
+    Latency,
+    Sample,
+    Timing,
+    TorqueHistory,
+)
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
@@ -28,32 +37,8 @@ from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.mechanics.wall import Wall, weight_beyond
 
 LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
+LATEST = round(LONGEST_DELAY * SECOND)  # [ns]
 PERIOD_SMOOTHING = 0.1  # share of a new period in the mean
-Acting = list[tuple[Torques, float]]  # torques, and how long each acts [s]
-
-
-class Observed(NamedTuple):
-    """Two odometry messages in a row, and what acted between them."""
-
-    before: Motion  # as estimated
-    after: Motion  # as measured
-    time: float  # [s] between them
-    acted: Acting  # torques, and how long each [s]
-    disturbance: Wrench  # as it was known before
-    reaction: float  # [s] in which a torque can answer
-    pull: float = 0.0  # [N] forwards, of the weight beyond that on a plane: see `weight_beyond`
-    turning: float = 0.0  # [rad/s] that was wanted last
-
-    @property
-    def torques(self) -> Torques:
-        """Mean of the torques that acted."""
-        whole = right = left = 0.0
-        for torques, time in self.acted:
-            whole += time
-            right += torques.right * time
-            left += torques.left * time
-        whole = whole or 1.0
-        return Torques(right / whole, left / whole)
 
 
 class Memory(NamedTuple):
@@ -88,8 +73,10 @@ class Estimator:
         self.period = timing.control_period  # [s] from one odometry to the next
         self._period_is_measured = False
         self._sent = TorqueHistory()
-        self.latency, self.twist = Latency(), TwistKind()
+        self.latency, self.twist, self.delays = Latency(), TwistKind(), DelayCheck()
+        self.checks_delay = True  # at once: what is sent is what is to act
         self._delay = 0.0  # [s] of the last answer
+        self._kept = 0  # [ns] for which torques are kept that have acted, as far as is known
         self.reset()
 
     def reset(self) -> None:
@@ -101,6 +88,7 @@ class Estimator:
         """Go on at an unknown time, from an unknown state: the clock was set back."""
         self.stamp = 0  # [ns]
         self._sent.restart()
+        self.delays.restart()
         self.motion: Motion | None = None
         self._last_odometry: Motion | None = None  # as it came
         self._last_pose: Motion | None = None  # the same of any source
@@ -152,7 +140,7 @@ class Estimator:
         """
         before, has_twist = self.motion, self.observer.velocity_source == "odometry"
         if before is not None:
-            acted = self._sent.between(self.stamp, stamp)
+            acted = self._acting(self.stamp, stamp)
             expected = self._rolled(before, acted)
             if not has_twist:
                 motion = motion._replace(speed=expected.speed, yaw_rate=expected.yaw_rate)
@@ -174,15 +162,30 @@ class Estimator:
 
     def pending(self, begins: int) -> Acting:
         """Torques that act from the last odometry until `begins` [ns]."""
-        return self._sent.between(self.stamp, begins)
+        return self._acting(self.stamp, begins)
+
+    @property
+    def _known(self) -> float:
+        """How much later than they arrive torques act, as far as is known [s]."""
+        timing = self.timing
+        return timing.transport_delay + (self.latency.delay if timing.learn_delay else 0.0)
+
+    def acts_later(self, by: float) -> bool:
+        """Learn that torques act later than is known `by` some time [s]; False if it may not be."""
+        delay = self._known + by - self.timing.transport_delay
+        return self.timing.learn_delay and self.latency.takes(delay)
+
+    def _acting(self, start: int, end: int) -> Acting:
+        """Torques that act from `start` to `end` [ns]."""
+        later = round(self._known * SECOND)
+        return self._sent.between(start - later, end - later)
 
     def begin(self, age: float) -> int:
         """When an answer to the last odometry, given at its `age` [s], begins to act [ns]."""
-        timing = self.timing
-        delay = timing.transport_delay + (age if timing.measure_delay else 0.0)
-        delay += self.latency.delay if timing.learn_delay else 0.0
-        self._delay = delay
-        return self._sent.begin(self.stamp + round(delay * SECOND))
+        age = age if self.timing.measure_delay else 0.0
+        self._delay = self._known + age
+        begins = self._sent.begin(self.stamp + round(age * SECOND))
+        return begins + round(self._known * SECOND)
 
     def sent(
         self,
@@ -204,9 +207,10 @@ class Estimator:
             self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
             self._turning = yaw_rate
             self._turn = sign(select(abs(yaw_rate) > SLOW_TURN, yaw_rate, 0.0))
-        self._sent.add(begins, torques)
+        later = round(self._known * SECOND)
+        self._sent.add(begins - later, torques)
         # without odometry, too, that of long ago is not needed
-        self._sent.forget_before(max(self.stamp, begins - LONG_AGO))
+        self._sent.forget_before(max(self.stamp, begins - LONG_AGO) - later - self._kept)
 
     def correct(self, torques: Torques) -> None:
         """Have `torques` in the place of those that were sent last."""
@@ -217,7 +221,7 @@ class Estimator:
         assert self.motion is not None
         if stamp == self.stamp:
             return self.motion
-        return self._rolled(self.motion, self._sent.between(self.stamp, stamp))
+        return self._rolled(self.motion, self._acting(self.stamp, stamp))
 
     def _aside(self, motion: Motion) -> float:
         """Speed [m/s] at which wheels give way to the left."""
@@ -256,15 +260,19 @@ class Estimator:
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)
         self._period_is_measured = True
-        is_known = self._sent.are_known_since(self.stamp)
+        is_known = self._sent.are_known_since(self.stamp - round(self._known * SECOND))
         shares = self.observer.shares(time, self._delay)
         left = clipped(self.learnt.settling - time, 0.0, SETTLES)
         settling = select(abs(motion.speed) > SLOW, left, SETTLES)
         self.learnt = self.learnt._replace(settling=settling)
         if has_twist:
             motion = self._at_its_stamp(before, expected, motion, time)
-            if self.timing.learn_delay and is_known:
-                self._learn_delay(acted[-1][0], expected, motion, time, shares)
+            if is_known:
+                self._kept = LATEST
+                if self.timing.learn_delay:
+                    self._learn_delay(acted[-1][0], expected, motion, time, shares)
+                if self.checks_delay:
+                    observed = self._check_delay(observed, stamp)
         self.motion, learnt = self.observer.corrected(
             self.climber, self.learnt, expected, motion, time, shares, self._direction, self._turn
         )
@@ -300,3 +308,11 @@ class Estimator:
         errors = measured.speed - expected.speed, lever * (measured.yaw_rate - expected.yaw_rate)
         sample = Sample(accelerations, errors, time, abs(measured.speed) > SLOW)
         self.latency.learn(sample, shares, self.timing.transport_delay)
+
+    def _check_delay(self, observed: Observed, stamp: int) -> Observed:
+        """Learn the delay at once where it is quite another; what is observed, if it may not be."""
+        arrived = observed._replace(acted=self._sent.between(self.stamp, stamp))
+        delay = self.delays.add(self.climber, arrived, self._known)
+        if delay is None or self.acts_later(delay - self._known):
+            return observed
+        return observed._replace(late=delay - self._known)

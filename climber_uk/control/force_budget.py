@@ -10,8 +10,8 @@ told too late shows while nothing drives.
 import math
 
 from climber_uk.control.control_law import CUT, Command, ControlLaw
-from climber_uk.control.estimator import Acting, Observed
 from climber_uk.control.model import SLOW
+from climber_uk.control.observed import Acting, Observed
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Torques, Wrench
@@ -23,10 +23,10 @@ MOST, PUSHES = 1.1, 6  # times what is allowed, and pushes, after which it is st
 STOPPED, STOPPED_PUSHES = 0.05, 1
 TRIED = 2  # pushes, from which on a climber off its path is stalled
 SPENT = 0.8  # of it, from which it is used up
-FIRST_PAUSE, PAUSE = 0.12, 0.05  # [s] from one to the next, for which nothing drives
+FIRST_PAUSE, PAUSE = 0.18, 0.05  # [s] from one to the next, for which nothing drives
 HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
 MOVES_NOTHING = 0.85  # of it, up to which a push surely has ended
-LATE = 0.035  # [s] after a push has ended, from which on a motion that begins comes too late
+LATE = 0.02  # [s] after a push has ended, from which on a motion that begins comes too late
 MEMORY = 0.1  # [s] in which friction is learnt
 CREEPS = 1e-3  # [m/s] of a motion that pose and twist tell alike, from which on it is one
 KNOWN = 0.2  # [s] of sliding, after which it is known
@@ -38,11 +38,14 @@ class ForceBudget:
     """What a climber may do by its torques, while odometry tells that it rests."""
 
     def __init__(self) -> None:
+        self.is_gentle = True  # with the first push of a climber that has not slid for a while
         self.restart()
 
     def restart(self) -> None:
         """Know nothing of a climber."""
         self.pause()
+        self.late = 0.0  # [s] by which a motion came later than its push
+        self.is_doubted = False  # odometry that changes, until the climber has slid for a while
         self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
         # [N m] that is turned against, of late, and what a turn is known to meet
         self._resisted = self._scrubs = 0.0
@@ -56,6 +59,7 @@ class ForceBudget:
         self.pushes = 0  # without an answer
         self.paused: float | None = None  # [s] for which nothing drives
         self._still = 0.0  # [s] for which it rests after a push, as far as its torques tell
+        self._pushed = 0.0  # [s] since it should move by the last push
         self._wanted, self._allowed = 0.0, math.inf  # [m/s]
         self._lives = False  # odometry, that has changed at all since the first push
         self._most_pushes = PUSHES
@@ -68,7 +72,9 @@ class ForceBudget:
     @property
     def most(self) -> float:
         """Speed [m/s] that may be given now."""
-        return min(self.first * GROWS**self.pushes, MOST * self._allowed)
+        is_first = self.is_gentle and self.pushes == 0 and self._slid <= KNOWN
+        first = FIRST if is_first else self.first
+        return min(first * GROWS**self.pushes, MOST * self._allowed)
 
     def see(
         self, climber: Climber, observed: Observed, wanted: float, allowed: float
@@ -108,6 +114,7 @@ class ForceBudget:
         new = max(1 - math.exp(-time / MEMORY), time / self._slid)
         self._friction += new * (math.copysign(1.0, after.speed) * resists - self._friction)
         if is_late and self._still > LATE + observed.reaction:
+            self.late = max(self._pushed, self._still)
             return Mode.LATE, f"it moves {self._still:.2f} s after a push has ended"
         return None
 
@@ -116,7 +123,7 @@ class ForceBudget:
         if not self._rests:
             self._friction *= self._slid > KNOWN
             self._rests, self.speed, self.turn, self._astray = True, before.speed, 0.0, 0.0
-            self._lives, self._still = False, 0.0
+            self._lives, self._still, self._pushed = False, 0.0, 0.0
             stops = self._wanted > STOPPED and self._slid > KNOWN
             self._most_pushes = STOPPED_PUSHES if stops else PUSHES
         elif self.pushes and after[:3] != before[:3]:
@@ -126,8 +133,11 @@ class ForceBudget:
         self.speed = _rolled(self.speed, push, holds, time / climber.driven_mass)
         ends = self.speed == 0 and _ends(climber, push, holds)
         self._still = self._still + time if ends else 0.0
+        if self._pushed or abs(self.speed) > SLOW:
+            self._pushed += time
         if self._is_told:
             self.speed, self.turn = before.speed, climber.half_track * after.yaw_rate
+            self._pushed = 0.0
             return None
         _, moment = climber.wrench(*observed.torques)
         holds = BREAKS_LOOSE * self._scrubs
@@ -144,8 +154,11 @@ class ForceBudget:
 
     @property
     def _is_told(self) -> bool:
-        """Whether odometry lives, so that nothing is given on trust."""
-        return self.paused is None and (self._lives or self._turns or self._creeps)
+        """Whether odometry tells what moves, so that nothing is given on trust."""
+        lives = self._lives or self._turns
+        if self.is_doubted and self._slid <= KNOWN:
+            lives = False
+        return self.paused is None and (lives or self._creeps)
 
     @property
     def unanswered(self) -> Trouble | None:

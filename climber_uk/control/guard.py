@@ -9,10 +9,9 @@ from collections import deque
 from typing import NamedTuple
 
 from climber_uk.control.actuator_check import ActuatorCheck
-from climber_uk.control.delay_check import LATE, DelayCheck
-from climber_uk.control.estimator import Observed
 from climber_uk.control.force_budget import ForceBudget
 from climber_uk.control.model import DisturbanceEstimate
+from climber_uk.control.observed import Observed
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Adhesion
@@ -30,6 +29,7 @@ SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: 
 MEMORY = 0.4  # [s] of them, and of strong torques that move nothing
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
 LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
+REACTION = 0.06  # [s] in which a torque can answer, at most
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
 PROOF_IF_TOO_FAST = 0.4  # of that of a dead wheel is enough where it is too fast as well
 RIM_REST = 0.02  # [m/s] of a wheel's rim, below which a climber rests, by its twist and its pose
@@ -121,7 +121,6 @@ class Guard:
         self._followed = math.inf  # [s] since the last fault
         self.faults: deque[int] = deque()  # [ns] stamps
         self._actuators, self.budget = ActuatorCheck(), ForceBudget()
-        self._delays = DelayCheck()
         self.restart()
 
     def forgive(self) -> None:
@@ -132,11 +131,11 @@ class Guard:
     def restart(self) -> None:
         """Watch from now on."""
         self._too_fast = 0
+        self.late = 0.0  # [s] by which what is observed is, where it is LATE
         self._stalled = 0.0  # [s]
         self._swings = Swings(), Swings()
         self._since_rest = math.inf  # [s]
         self._actuators.restart()
-        self._delays.restart()
         self.budget.restart()
 
     def watch(self, climber: Climber, observed: Observed, expected: Expected) -> Trouble | None:
@@ -149,11 +148,11 @@ class Guard:
         own = expected.wanted.speed + turning, expected.wanted.speed - turning
         right, left = (min(slower, rim) for rim in own)
         self._actuators.add(climber, observed, self.options.response_time, (right, left))
-        late = self._watch_delay(climber, observed)
         given = self._watch_budget(climber, observed, expected)
         too_fast = self._watch_rates(climber, observed, expected)
+        self.late = observed.late or self.budget.late
         return (
-            late
+            self._watch_delay(observed)
             or self._watch_actuators(climber, torques, PROOF_IF_TOO_FAST if too_fast else 1.0)
             or too_fast
             or self._watch_limit(climber, observed, expected, torques)
@@ -162,12 +161,10 @@ class Guard:
             or given
         )
 
-    def _watch_delay(self, climber: Climber, observed: Observed) -> Trouble | None:
-        if self.options.response_time == 0:
+    def _watch_delay(self, observed: Observed) -> Trouble | None:
+        if self.options.response_time == 0 or observed.late <= 0:
             return None
-        if not self._delays.add(climber, observed):
-            return None
-        return Mode.LATE, f"by {LATE[0]} s or more, or torques act so late"
+        return Mode.LATE, f"by {observed.late:.2f} s, or torques act so late"
 
     def _watch_budget(
         self, climber: Climber, observed: Observed, expected: Expected
@@ -207,7 +204,7 @@ class Guard:
         before, after = observed.before.speed, observed.after.speed
         rests = abs(after) < MOVES or before * after < 0
         self._since_rest = 0.0 if rests else self._since_rest + observed.time
-        answered = observed.reaction + UNKNOWN_DELAY
+        answered = min(observed.reaction, REACTION) + UNKNOWN_DELAY
         if self._since_rest > LETS_GO + answered or self._followed < self.options.memory:
             return 0.0
         return climber.seal_friction / climber.driven_mass * answered
@@ -294,6 +291,7 @@ class Guard:
         if self._rested > needed and not self.is_for_good:
             self.fault = None
             self.restart()
+            self.budget.is_doubted = True  # what was wrong may be so still
 
     @property
     def is_for_good(self) -> bool:

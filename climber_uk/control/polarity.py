@@ -7,7 +7,7 @@ them. Where neither is known, nothing brakes.
 
 import math
 
-from climber_uk.control.estimator import Observed
+from climber_uk.control.observed import Observed
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
 

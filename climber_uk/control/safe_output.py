@@ -1,7 +1,8 @@
 """The safe output: no torque, or brake while carrying the weight, as `Safety` says."""
 
 from climber_uk.control.control_law import Braking, ControlLaw, check_finite
-from climber_uk.control.estimator import Estimator, Observed
+from climber_uk.control.estimator import Estimator
+from climber_uk.control.observed import Observed
 from climber_uk.control.polarity import Polarities, PoseSpeeds
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.timing import LONGEST_STEP
@@ -59,12 +60,12 @@ class SafeOutput:
         if motion is None or safety.safe_output != "hold":
             return _let_go(estimator, age)
         if stamp < self._coasts_until:
-            return _coast(estimator, law, age)
+            return _coast(mode, estimator, law, age)
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
         begin, before = self._braked = self._braked or (stamp, rim)
         if stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
-            return _coast(estimator, law, age)
+            return _coast(mode, estimator, law, age)
         try:
             if not mode.doubts_odometry:
                 self._doubted = None
@@ -134,9 +135,12 @@ def _let_go(estimator: Estimator, age: float) -> Torques:
     return NO_TORQUES
 
 
-def _coast(estimator: Estimator, law: ControlLaw, age: float) -> Torques:
-    """Torques that brake nothing, and carry the weight where no seal holds it."""
-    if not law.falls:
+def _coast(mode: Mode, estimator: Estimator, law: ControlLaw, age: float) -> Torques:
+    """Torques that brake nothing, and carry the weight: where no seal holds it, or less of it.
+
+    Where odometry is in doubt, its heading may be wrong, and a seal that holds is trusted.
+    """
+    if mode.doubts_odometry and not law.falls:
         return _let_go(estimator, age)
     return _brake(estimator, law, age, Braking(0.0, 0.0), None)
 

@@ -14,7 +14,8 @@ from climber_uk.parameters.declaration import parameter, parameters
 
 LONGEST_STEP = 0.3  # [s] for which the model is trusted without an odometry
 WINDOW = SECOND // 2  # [ns] in which one odometry at least is not late
-LONGEST_DELAY = 0.05  # [s] that is taken for a delay
+LONGEST_DELAY = 0.22  # [s] that is learnt at once
+SLOWLY = 0.05  # [s] that is learnt in small steps
 FAR_OFF = 0.02  # [s] that the loop bears without learning it: docs/control.md
 FASTEST_CHANGE = 0.05  # [s/s] by which it changes
 MEMORY_TIME = 1.0  # T_f [s]
@@ -138,17 +139,17 @@ class TorqueHistory:
 
     def between(self, start: int, end: int) -> list[tuple[Torques, float]]:
         """Torques that act from `start` to `end` [ns], each with how long it does [s]."""
-        torques, spans = NO_TORQUES, []
-        for begins, following in self._begun:
-            if begins >= end:
+        spans = []
+        for begins, torques in reversed(self._begun):
+            if start >= end:
                 break
-            if begins > start:
-                spans.append((torques, (begins - start) / SECOND))
-                start = begins
-            torques = following
+            since = max(begins, start)
+            if since < end:
+                spans.append((torques, (end - since) / SECOND))
+                end = since
         if end > start:
-            spans.append((torques, (end - start) / SECOND))
-        return spans
+            spans.append((NO_TORQUES, (end - start) / SECOND))
+        return spans[::-1]
 
 
 class Oscillation:
@@ -209,6 +210,13 @@ class Latency:
         self._far_off = abs(self.delay) > FAR_OFF / (2 if self._far_off else 1)
         return self._far_off
 
+    def takes(self, delay: float) -> bool:
+        """Take over a delay [s] that was found at once; whether it may be as long."""
+        if delay > LONGEST_DELAY:
+            return False
+        self.delay = delay
+        return True
+
     def learn(self, sample: Sample, shares: Shares, configured_delay: float = 0.0) -> None:
         """Take in a period; `shares` are those of the observer.
 
@@ -239,4 +247,5 @@ class Latency:
         self._slopes = tuple(slopes)
         most = FASTEST_CHANGE * time
         change = min(max(-product / (self._energy + LEAST_ENERGY), -most), most)
-        self.delay = min(max(self.delay + change, least), LONGEST_DELAY)
+        most = max(SLOWLY, self.delay)
+        self.delay = min(max(self.delay + change, least), most)

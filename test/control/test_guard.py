@@ -6,6 +6,7 @@ from functools import cache, partial
 import numpy as np
 import pytest
 from climbs import LIMIT, PERIOD, Climb
+from test_reversals import PATHS, Odd
 
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.guard import Guard, GuardOptions
@@ -279,3 +280,18 @@ def test_an_encoder_that_is_stuck_is_found_where_odometry_is_made_of_it(stuck, s
     assert climb.controller.detail.startswith(("the right one", "the left one")[stuck])
     assert climb.fastest(since) < 1.5 * climb.reference_speed + 0.1
     assert climb.fastest(since + 2.5) < 0.01
+
+
+def test_a_seal_that_holds_less_than_the_weight_lets_nothing_fall_in_the_safe_output():
+    climb = Climb(planner=PATHS["uphill"], truth=Odd(friction=0.5).true)
+    sent, acting = [np.zeros(2)] * 3, np.zeros(2)
+
+    def late(_, torques):  # by 15 ms, and lazy
+        nonlocal acting
+        sent.append(torques)
+        acting = acting + (1 - np.exp(-PERIOD / 0.02)) * (sent[-4] - acting)
+        return acting
+
+    climb.run(4.0, motors=late)
+    assert Mode.TOO_FAST in climb.modes
+    assert climb.fastest() < 0.6

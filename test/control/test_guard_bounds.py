@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from climber_uk.control.actuator_check import RimStop
-from climber_uk.control.estimator import Observed
 from climber_uk.control.guard import Expected, Guard, GuardOptions, Rates
+from climber_uk.control.observed import Observed
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import NoAdhesion, Suction

@@ -15,7 +15,7 @@ from climber_uk.control.guidance import Guidance
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.timing import (
     FASTEST_CHANGE,
-    LONGEST_DELAY,
+    SLOWLY,
     Latency,
     Oscillation,
     Sample,
@@ -143,5 +143,5 @@ def test_a_delay_stays_within_its_bounds():
             swing = (-1.0) ** step
             sample = Sample((swing, swing), (-sign * swing, -sign * swing), 0.005)
             latency.learn(sample, (0.0, 0.0), configured_delay=0.01)
-        assert latency.delay == (LONGEST_DELAY if sign > 0 else -0.01)
+        assert latency.delay == (SLOWLY if sign > 0 else -0.01)
         assert latency.is_far_off is (sign > 0)
