@@ -136,7 +136,7 @@ class RunReader:
             first, last = known[0], known[-1]
             odometry = odometry.within(whole.stamps[first], whole.stamps[last])
             reference = reference[first : last + 1]
-        elif any(len(part.arrivals) for part in collected.reference):
+        elif len(whole) > 1 and any(len(part.arrivals) for part in collected.reference):
             topic = self.topic(topics.REFERENCE)
             self.bag.lose(f"{topic}: no message has a time of the odometry's")
         if len(odometry) < 2:

@@ -411,9 +411,8 @@ def test_whatever_it_is_given_its_numbers_stay_finite_or_it_says_why_not(
 
 
 def test_numbers_that_end_are_told():
-    tiny = replace(PAPER, mass=1e-307)
     with pytest.raises(NotFinite):
-        Plant(tiny, 0.0025).advance(UPRIGHT, np.array([20.0, -3.0]), steps=50)
+        Plant(PAPER, 0.0025).advance(UPRIGHT, np.array([1e308, -3.0]), steps=50)
 
 
 def test_a_wheel_heavier_than_the_climber_is_refused():
