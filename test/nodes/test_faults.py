@@ -26,11 +26,12 @@ ON_PATH = 0.02  # [m]
 QUICK_APPROACH = ["approach_speed:=0.3", "approach_yaw_rate:=1.5"]
 WALL_CLOCK = {  # patient, and not often: what is slow here is the machine
     PLANT: ["command_timeout:=1.0", "control_period:=0.02"],
-    # a torque that is held up acts for too long: the guard is right, and has to forgive it, not to
-    # take a wheel for dead, and the climber to come back from wherever it is then
+    # a torque that is held up acts for too long, or not at all: the guard is right, and has to
+    # forgive it, not to take a wheel for dead, or the climber for stalled, and that to come back
+    # from wherever it is then
     CONTROLLER: [
         *("odometry_timeout:=1.0", "reference_timeout:=1.0", "control_period:=0.02"),
-        *("guard.attempts:=1000", "guard.response_time:=0.0"),
+        *("guard.attempts:=1000", "guard.response_time:=0.0", "guard.stall_time:=0.0"),
         *("max_start_distance:=1000.0", *QUICK_APPROACH),
     ],
     PLANNER: ["rest_to_rest.ramp_time:=1.0"],
