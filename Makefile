@@ -69,13 +69,13 @@ lint: $(TOOLS)
 	$(BIN)/mypy
 	$(BIN)/codespell *.md docs climber_uk config examples launch bench test
 
-# Five processes for two cores, as tests of nodes often wait; each has a ROS domain for each test.
-# They begin with a fifth of the tests each, in their order; one that is ready helps another.
-TESTS := -m pytest --numprocesses 5 --dist worksteal
+# Four processes for two cores, as tests of nodes often wait; each has a ROS domain for each test.
+# They begin with a quarter of the tests each, in their order; one that is ready helps another.
+TESTS := -m pytest --numprocesses 4 --dist worksteal
 # Of many hundred processes each would compile the package again
 KEEPING_BYTECODE := env -u PYTHONDONTWRITEBYTECODE
 
-## the tests, in five processes
+## the tests, in four processes
 unit: $(TOOLS)
 	$(KEEPING_BYTECODE) $(BIN)/python $(TESTS)
 

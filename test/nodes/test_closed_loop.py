@@ -274,6 +274,7 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
     assert states[max(time for time in states if time < falls - 1.0)] == 0.0  # it stood by then
 
 
+@pytest.mark.soak  # of two: test_extending.py
 def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
     """Two of the four in the file."""
     demo(world, tmp_path / "run", "four_climbers.yaml", "--climbers", "2", "--duration", "1")

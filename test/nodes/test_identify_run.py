@@ -33,7 +33,9 @@ def test_a_planned_run_tells_what_is_30_percent_off_and_the_nodes_load_it(world,
     plan, true, found = (tmp_path / f"{name}.yaml" for name in ("plan", "true", "found"))
     limits = "--duration", 8, "--size", 1, "--speed", 0.3
     run(world, "identify", "--plan", plan, "--params", BELIEVED, *limits)
-    write_changed(plan, {"plant_simulator": {**TRUTH, **NOISE}}, true)
+    slow = {"control_period": 0.01}
+    changed = {"plant_simulator": {**TRUTH, **NOISE, **slow}, "uk_torque_controller": slow}
+    write_changed(plan, changed, true)
     run(world, "run_demo", "--config", true, "--output", tmp_path / "run")
 
     wanted = "--output", found, "--json", tmp_path / "found.json"

@@ -90,7 +90,8 @@ def test_torques_at_the_start_are_those_by_hand():
     np.testing.assert_allclose(CONSISTENT.reference_torques(0.0), [0.7614, 0.7614], atol=1e-12)
 
 
-@pytest.mark.parametrize("corrected", [pytest.param(False, marks=pytest.mark.soak), True])
+@pytest.mark.soak
+@pytest.mark.parametrize("corrected", [False, True])
 def test_at_1e_12_neither_position_nor_no_slip_err_by_1e_9(corrected):
     result = study.consistent(corrected, (1e-12, 1e-12))
     assert np.abs(result.error).max() < 1e-9
