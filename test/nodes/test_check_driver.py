@@ -141,8 +141,9 @@ def test_with_a_controller_in_lock_step_it_listens_and_refuses_to_move(world):
     assert status == 1
     assert those(rows, "fail") == ["trial"], told(rows)
     assert "/uk_torque_controller publishes wheel_torques" in rows["trial"]["said"]
-    assert not those(rows, "warn"), told(rows)
-    assert {"heading", "twist", "slip", "clock"} <= set(those(rows, "pass"))
+    # where its heading is near 0 just then, the twist's frame cannot be told
+    assert set(those(rows, "warn")) <= {"twist"}, told(rows)
+    assert {"heading", "slip", "clock"} <= set(those(rows, "pass"))
 
 
 def test_odometry_that_waited_for_it_is_no_older(world):
