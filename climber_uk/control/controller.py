@@ -86,11 +86,12 @@ class Controller:
     ) -> None:
         """`adhesion` is for the guard; `gentle` are the constraints of what begins at rest."""
         self.safety = safety or Safety()
-        self._law, observer, timing, pacing, self.board = settings
+        self._law, observer, timing, pacing, board = settings
         law = self._law
         self.estimator = Estimator(law.climber, observer, timing, self.safety, law.wall)
         self.active = ActiveReference(pacing, approach or Approach(), gentle or Guidance())
         self.guard = Guard(guard or GuardOptions(), adhesion or Suction())
+        self.board = board
         self.stops = stops or Stops()
         self.mode, self.detail = Mode.WAITING, ""
         self.answer: Answer | None = None  # the last one
@@ -117,6 +118,17 @@ class Controller:
     def law(self, law: ControlLaw) -> None:
         self._law = law
         self.estimator.go_over_to(law.climber)
+
+    @property
+    def board(self) -> MotorBoard:
+        """What the motors take; what is sent is what acts only where that are torques."""
+        return self._board
+
+    @board.setter
+    def board(self, board: MotorBoard) -> None:
+        self._board = board
+        takes_torques = board.motors == "torque"
+        self.estimator.checks_delay = self.guard.budget.is_gentle = takes_torques
 
     @property
     def motion(self) -> Motion | None:
@@ -224,8 +236,6 @@ class Controller:
     def _see(self, stamp: int, motion: Motion) -> Trouble | None:
         """Take in an odometry; return what is wrong with it."""
         is_first = self.estimator.motion is None
-        takes_torques = self.board.motors == "torque"
-        self.estimator.checks_delay = self.guard.budget.is_gentle = takes_torques
         observed = self.estimator.see(stamp, motion)
         self._safe_output.watch(self._law.climber, observed, motion)
         self.stops.move(self.estimator.motion if observed or is_first else None)

@@ -137,7 +137,7 @@ class Localizer:
 
     def _leaps(self, stamp: int) -> bool:
         """Whether a stamp [ns] is far off the one before, and the last that was is elsewhere."""
-        ahead = (stamp - (stamp if self.stamp is None else self.stamp)) / SECOND
+        ahead = 0.0 if self.stamp is None else (stamp - self.stamp) / SECOND
         before, self._leapt = self._leapt, stamp if abs(ahead) >= LEAP else None
         if self._leapt is None or (before is not None and abs(stamp - before) < LEAP * SECOND):
             return False

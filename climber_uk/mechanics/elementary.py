@@ -18,6 +18,7 @@ from climber_uk.mechanics import Array, namespace
 
 FULL_TURN = 2 * math.pi  # [rad]
 AT_ONCE = 0.05  # [s] from one angle of a wheel to the next
+ROUNDING = 1e-3  # [rad]
 Derivatives = tuple[Any, Any, Any, Any]  # (...) of order 0, 1, 2, 3
 
 
@@ -191,11 +192,13 @@ def compose(f: Derivatives, inner: tuple[Any, Any, Any]) -> Derivatives:
 
 
 def turned(now: float, before: float, time: float) -> float:
-    """Turn of a wheel [rad] between two angles [rad], which may begin anew each turn.
+    """Turn of a wheel [rad] within a time [s] between two angles [rad], each turn perhaps anew.
 
-    By 3/4 to 5/4 of a turn within `AT_ONCE` [s] no wheel of a climber goes.
+    Those that begin anew are within a turn of 0: there, 3/4 of a turn and more within `AT_ONCE`
+    [s] are taken for a new beginning. Angles that go on are beyond, and as they are.
     """
-    turn = now - before
-    if time < AT_ONCE and 0.75 < abs(turn) / FULL_TURN < 1.25:
+    turn, farthest = now - before, max(abs(now), abs(before))
+    begins = farthest <= FULL_TURN + ROUNDING and abs(turn) > 0.75 * FULL_TURN
+    if begins and time < AT_ONCE:
         turn -= math.copysign(FULL_TURN, turn)
     return turn

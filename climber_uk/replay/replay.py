@@ -5,11 +5,12 @@ these that moved the climber: every answer is one to the run as it was, whatever
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any
 
-from climber_uk.bags.bag import UNFIT, Bag
+from climber_uk.bags.bag import Bag
 from climber_uk.bags.publishing_order import read_published
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.control.build import KINDS, build_controller, settings
@@ -31,6 +32,19 @@ DEFAULTS = {
     for field in fields(kind)
 }
 Choose = Callable[[Mapping[str, Any]], Mapping[str, Any]]
+
+
+class MisfitError(Exception):
+    """A message has the name of a type, but not its fields."""
+
+
+@contextmanager
+def of_its_type() -> Iterator[None]:
+    """Raise `MisfitError` where a message that is read in here has not the fields of its type."""
+    try:
+        yield
+    except (AttributeError, TypeError) as error:
+        raise MisfitError(str(error)) from None
 
 
 class Replay:
@@ -85,7 +99,7 @@ class Replay:
             self.pass_time(at)
             try:
                 callbacks[names[topic]](at, message)
-            except UNFIT as error:
+            except MisfitError as error:
                 raise ValueError(f"{bag.path}: {topic} is not what it should be: {error}") from None
         if missing:
             said = " and ".join(bag.lacks(topic, types[topic]) for topic in sorted(missing))
@@ -106,17 +120,20 @@ class Replay:
 
     def on_clock(self, _: int, message: Any) -> None:
         """Set the clock to the simulated time."""
-        self.clock = reading.nanoseconds(message.clock)
+        with of_its_type():
+            self.clock = reading.nanoseconds(message.clock)
 
     def on_odometry(self, _: int, message: Any) -> None:
         """Answer an odometry."""
-        stamp = reading.nanoseconds(message.header.stamp)
+        with of_its_type():
+            stamp = reading.nanoseconds(message.header.stamp)
         answered = self.recorded.published.get(stamp)
         if answered is not None:
             self.apply_settings(answered)
             self.pass_time(answered)  # the node reads its clock right before it publishes
         try:
-            motion = reading.motion(message, self.names.odom_frame, self.names.base_frame)
+            with of_its_type():
+                motion = reading.motion(message, self.names.odom_frame, self.names.base_frame)
         except ValueError as error:
             self.record(self.controller.on_bad_odometry(self.clock, str(error)))
             return
@@ -125,7 +142,8 @@ class Replay:
     def on_reference(self, _: int, message: Any) -> None:
         """Pass on a reference, unless the node refuses such a one."""
         try:
-            preview = references.preview(message, self.names.odom_frame)
+            with of_its_type():
+                preview = references.preview(message, self.names.odom_frame)
             preview.check_heading()
         except ValueError:
             return
@@ -134,7 +152,8 @@ class Replay:
     def on_pressure(self, _: int, message: Any) -> None:
         """Put the measured pressure into the model, unless the node refuses such a one."""
         try:
-            pressure = reading.pressure(message)
+            with of_its_type():
+                pressure = reading.pressure(message)
         except ValueError:
             return
         if pressure != self.pressure:
@@ -143,7 +162,9 @@ class Replay:
 
     def on_torques(self, at: int, message: Any) -> None:
         """Check inputs when the node's timer did: torques that answer an odometry once more."""
-        if at != self.recorded.published.get(reading.nanoseconds(message.header.stamp)):
+        with of_its_type():
+            stamp = reading.nanoseconds(message.header.stamp)
+        if at != self.recorded.published.get(stamp):
             self.apply_settings(at)
             self.record(self.controller.look(self.clock))
 

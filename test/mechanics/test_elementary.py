@@ -85,3 +85,18 @@ def test_one_of_two_pairs_is_chosen_for_each():
     assert elementary.either(False, these, those) == those
     chosen = elementary.either(np.array([True, False]), these, those)
     np.testing.assert_array_equal(chosen, [[1.0, 3.0], [2.0, 4.0]])
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "time", "turn"),
+    [
+        (3.1, -3.1, 0.02, 0.0832),  # from -π to π
+        (0.1, 6.2, 0.02, -0.1832),  # from 0 to 2π, backwards
+        (0.1, 1.9, 0.02, 1.8),
+        (20.0, 26.2, 0.02, 6.2),  # at 8 m/s, counted on
+        (6.2, 12.4, 0.02, 6.2),
+        (3.1, -3.1, 0.1, -6.2),  # long enough for a real one
+    ],
+)
+def test_a_wheels_turn_is_that_of_angles_that_go_on_or_begin_anew(before, now, time, turn):
+    assert elementary.turned(now, before, time) == pytest.approx(turn, abs=1e-4)
