@@ -86,10 +86,7 @@ class RecordedMotion:
         """The same, if torques act `delay` [s] later, and with a lag of first order [s]."""
         delayed = [np.interp(self.time - delay, self.time, wheel) for wheel in self.impulse.T]
         acting = np.stack([lagging(self.time, wheel, lag) for wheel in delayed], axis=1)
-        late = replace(self, impulse=acting)
-        kept = {name: getattr(self, name) for name in ("way", "smooth_rates", "side_slip")}
-        late.__dict__.update(kept)  # they are of the poses, and take long
-        return late
+        return replace(self, impulse=acting)
 
 
 def impulse(time: Array, begins: Array, torques: Array) -> Array:
