@@ -16,6 +16,7 @@ from climber_uk.mechanics.quantities import Motion
 
 DELAYS = tuple(0.02 * number for number in range(11))  # [s] that are compared
 BORNE = 0.025  # [s] that the loop bears, beside what it knows
+EXACT = 0.011  # [s] that is borne where a longer delay is known: one of `DELAYS` is that near
 MOVES = 0.03  # [m/s] from which on noise does not make it that
 MEMORY = 0.2  # [s] in which a difference is forgotten
 EXCITED = 0.002  # of the largest force: standard deviation of what no delay leaves unexplained
@@ -113,7 +114,8 @@ class DelayCheck:
             acted += math.copysign(friction, after.speed) - observed.pull
             self._drive.add(acted, drives, new)
         largest = 2 * climber.max_wheel_torque / climber.wheel_radius
-        near = [abs(delay - known) <= BORNE for delay in DELAYS]
+        borne = BORNE if known <= BORNE else EXACT
+        near = [abs(delay - known) <= borne for delay in DELAYS]
         if not any(near):
             return None
         drive_shows, much = self._drive.evidence(near, largest)
