@@ -20,6 +20,7 @@ WENT, GOES, STANDS = 0.05, 0.01, 1e-3  # [m/s] of a rim: before, of the other on
 ASKED = 0.01  # [m/s] of a rim that is not to stand
 # odometry messages for which a rim stands that went before; that never went, or slowly
 STANDS_AT_ONCE, STANDS_ON = 3, 10
+NEITHER, SILENT = "neither", 0.05  # [s] for which both do not answer
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 
 
@@ -75,6 +76,11 @@ class Wheel:
         explained = max(self.acted.variance, other.unexplained.variance)
         return not (excited and self.unexplained.variance > proof * UNANSWERED * explained)
 
+    @property
+    def acts(self) -> bool:
+        """Whether what is asked explains what acts, more than it leaves unexplained."""
+        return self.unexplained.variance < self.acted.variance
+
 
 class RimStop:
     """A rim that stands while the other one goes on, as no motor makes it.
@@ -116,6 +122,7 @@ class ActuatorCheck:
     def _begin(self) -> None:
         """Compare torques from now on."""
         self._wheels, self._moved = (Wheel(), Wheel()), 0.0  # [s]
+        self._drive, self._silent = Wheel(), 0.0  # both together; [s] for which nothing answers
         self._had_time = False  # to answer
 
     def add(
@@ -157,6 +164,12 @@ class ActuatorCheck:
         rows = zip(self._wheels, observed.torques, acted, known, strict=True)
         for wheel, torque, force, push in rows:
             wheel.add(torque / climber.wheel_radius, force, push, new)
+        force, _ = climber.wrench(*observed.torques)
+        self._drive.add(force, drive, 0.0, new)
+        largest = climber.max_wheel_torque / climber.wheel_radius
+        silent = not self._drive.answers(Wheel(), 2 * largest, 1.0)
+        acts = any(wheel.acts for wheel in self._wheels)
+        self._silent = self._silent + time if silent and not acts else 0.0
 
     @property
     def stuck(self) -> str:
@@ -165,7 +178,10 @@ class ActuatorCheck:
         return "right" if right.is_stuck else "left" if left.is_stuck else ""
 
     def dead(self, climber: Climber, proof: float) -> str:
-        """Name of the wheel that does not answer, else ''; `proof` is the share that is enough."""
+        """Name of the wheel that does not answer, else ''; `proof` is the share that is enough.
+
+        It is `NEITHER` where both are silent: their torques act late, or odometry does.
+        """
         if not self._moved:
             return ""
         largest, (right, left) = climber.max_wheel_torque / climber.wheel_radius, self._wheels
@@ -176,4 +192,6 @@ class ActuatorCheck:
         if not self._had_time:
             return ""
         silent = (name for name, it, other in wheels if not it.answers(other, largest, proof))
-        return next(silent, "")
+        if name := next(silent, ""):
+            return name
+        return NEITHER if self._silent > SILENT else ""

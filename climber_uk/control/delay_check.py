@@ -11,10 +11,11 @@ from collections.abc import Sequence
 
 from climber_uk.control.actuator_check import Variance
 from climber_uk.control.observed import Observed
+from climber_uk.control.timing import LONGEST_DELAY
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Motion
 
-DELAYS = tuple(0.02 * number for number in range(11))  # [s] that are compared
+DELAYS = tuple(0.02 * number for number in range(16))  # [s] that are compared
 BORNE = 0.025  # [s] that the loop bears, beside what it knows
 EXACT = 0.011  # [s] that is borne where a longer delay is known: one of `DELAYS` is that near
 MOVES = 0.03  # [m/s] from which on noise does not make it that
@@ -96,7 +97,7 @@ class DelayCheck:
         if time < WINDOW - TICK:
             self._first = before
             return None
-        is_known = self._begin - DELAYS[-1] >= self._until[0]  # what was asked for by then
+        is_known = self._begin - LONGEST_DELAY >= self._until[0]  # what was asked for by then
         drives, yaws = self._asked(time)
         self._first, self._begin, new = None, self._time, 1 - math.exp(-time / MEMORY)
         if not is_known:
@@ -122,7 +123,10 @@ class DelayCheck:
         yaw_shows, as_much = self._yaw.evidence(near, largest)
         shows = [drive + yaw for drive, yaw in zip(drive_shows, yaw_shows, strict=True)]
         most = max(shows)
-        return DELAYS[shows.index(most)] if most > max(SURE, much, as_much) else None
+        delay = DELAYS[shows.index(most)]
+        # a longer one is not learnt: it stops the climber until somebody has looked
+        enough = max(SURE, much, as_much) * (1 if delay <= LONGEST_DELAY else 2)
+        return delay if most > enough else None
 
     def _asked(self, time: float) -> tuple[list[float], list[float]]:
         """Drives, and yaws at the rims [N], of the last `time` [s], had they come by each delay."""

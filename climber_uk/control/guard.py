@@ -8,7 +8,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-from climber_uk.control.actuator_check import ActuatorCheck
+from climber_uk.control.actuator_check import NEITHER, ActuatorCheck
 from climber_uk.control.force_budget import ForceBudget
 from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.observed import Observed
@@ -215,6 +215,8 @@ class Guard:
         name = self._actuators.dead(climber, proof)
         if not name:
             return None
+        if name == NEITHER:
+            return Mode.DEAD_WHEEL, f"neither one, at {torques[0]:.2f} and {torques[1]:.2f} N m"
         torque = torques.right if name == "right" else torques.left
         return Mode.DEAD_WHEEL, f"the {name} one, at {torque:.2f} N m"
 

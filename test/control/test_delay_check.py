@@ -7,13 +7,14 @@ from itertools import count
 
 import numpy as np
 import pytest
-from climbs import PERIOD, Climb
+from climbs import PERIOD, Climb, as_it_is
 from test_force_budget import CIRCLE
 from test_reversals import PATHS, Odd
 
 from climber_uk.control.delay_check import BORNE, DELAYS, EXCITED, DelayCheck
 from climber_uk.control.observed import Observed
 from climber_uk.control.safety import Mode
+from climber_uk.control.timing import LONGEST_DELAY
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench
 
@@ -33,7 +34,7 @@ def found(delay, force, moment=0.0, noise=0.0, seconds=1.0, resists=0.0, known=0
     before, (speed, rate) = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0), (1.0, 0.0)
     mass, inertia, friction, _ = CLIMBER.inertial
     for number in range(round(seconds / PERIOD)):
-        swing = np.cos(2 * np.pi * number * PERIOD / 0.3)
+        swing = np.cos(2 * np.pi * number * PERIOD / 0.4)
         asked.append((swing * force, swing * moment))
         acts, turns = asked.popleft() if delay else asked[-1]
         speed += PERIOD * acts / mass
@@ -51,7 +52,7 @@ def found(delay, force, moment=0.0, noise=0.0, seconds=1.0, resists=0.0, known=0
 
 @pytest.mark.parametrize(("noise", "resists"), [(0.0, 0.0), (1e-3, 30.0)])
 @pytest.mark.parametrize(("force", "moment"), [(60.0, 0.0), (0.0, 15.0)], ids=["drive", "turn"])
-@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize("delay", [it for it in DELAYS if it <= LONGEST_DELAY])
 def test_the_delay_of_what_swings_is_found_if_it_is_not_borne(delay, force, moment, noise, resists):
     wanted = pytest.approx(delay, abs=0.021) if delay > BORNE else None
     assert found(delay, force, moment, noise, resists=resists) == wanted
@@ -85,7 +86,7 @@ class Late:
     """What was to be now comes some time [s] later: a number, or a function of the time."""
 
     def __init__(self, delay, before):
-        self.delay, self.past = delay, [before] * 60
+        self.delay, self.past = delay, [before] * 200
 
     def __call__(self, time, now):
         self.past.append(now)
@@ -104,7 +105,7 @@ def every(number, odometry):
 @cache
 def healthy(planner, number):
     """A climb that goes well for 4 s, with one odometry in a few."""
-    return Climb(planner=PLANNERS[planner]).run(4.0, odometry=every(number, lambda _, it: it))
+    return Climb(planner=PLANNERS[planner]).run(4.0, odometry=every(number, as_it_is))
 
 
 PLANNERS = {"eight": {}, "circle": CIRCLE}
@@ -146,7 +147,7 @@ def test_odometry_that_is_late_from_the_start_is_learnt(planner, number, delay):
 def test_what_comes_to_be_late_in_mid_course_is_learnt(what, delay, number, planner):
     climb = deepcopy(healthy(planner, number))
     late = Late(delay, climb.state if what == "odometry" else climb.torques)
-    seldom = every(number, late if what == "odometry" else lambda _, state: state)
+    seldom = every(number, late if what == "odometry" else as_it_is)
     climb.run(2.5, odometry=seldom, **({"motors": late} if what == "motors" else {}))
     assert_goes_on(climb, 4.0, delay)
 
@@ -159,7 +160,7 @@ def test_a_delay_that_grows_is_learnt_on_the_way(what, rate, number, planner):
     late = Late(
         lambda time: rate * (time - 4.0), climb.state if what == "odometry" else climb.torques
     )
-    seldom = every(number, late if what == "odometry" else lambda _, state: state)
+    seldom = every(number, late if what == "odometry" else as_it_is)
     climb.run(0.15 / rate, odometry=seldom, **({"motors": late} if what == "motors" else {}))
     assert_never_runs_away(climb, 4.0)
     assert climb.controller.estimator.latency.delay > 0.05
@@ -172,11 +173,31 @@ def test_a_delay_that_grows_is_learnt_on_the_way(what, rate, number, planner):
 def test_odometry_that_is_late_where_it_stands_in_mid_course_is_learnt(delay, number, planner):
     climb = deepcopy(healthy(planner, number))
     climb.controller.enable(False)
-    climb.run(0.5, odometry=every(number, lambda _, state: state))
+    climb.run(0.5, odometry=every(number, as_it_is))
     climb.controller.enable(True)
     since = climb.time
     climb.run(2.5, odometry=every(number, Late(delay, climb.state)))
     assert_goes_on(climb, since, delay)
+
+
+def growing(rate):
+    return lambda time: rate * (time - 4.0)
+
+
+@pytest.mark.parametrize(("planner", "number"), WAYS)
+@pytest.mark.parametrize(
+    "delay",
+    [
+        *(pytest.param(it, id=f"{it}", marks=soak) for it in (0.25, 0.4, 0.6)),
+        pytest.param(0.3, id="0.3"),
+        pytest.param(growing(0.2), id="growing"),
+    ],
+)
+def test_torques_that_act_later_than_can_be_learnt_stop_it_before_they_do(delay, number, planner):
+    climb = deepcopy(healthy(planner, number))
+    climb.run(2.0, odometry=every(number, as_it_is), motors=Late(delay, climb.torques))
+    assert climb.fastest(4.0) < 1.0  # m/s; what was sent before a fault is found acts as well
+    assert climb.off_the_path(4.0) < 0.05
 
 
 def test_a_delay_that_is_borne_is_followed():

@@ -344,8 +344,12 @@ def test_what_a_wheel_did_before_a_rest_is_forgotten():
     assert found_of_wheels(STRONG, DEAD, guard=guard) is not None
 
 
-def test_what_holds_the_whole_climber_is_no_dead_wheel():
-    assert found_of_wheels([(60.0, 60.0), (-60.0, -60.0)], DEAD) is None
+def test_where_both_torques_swing_and_nothing_acts_neither_wheel_answers():
+    found = found_of_wheels([(60.0, 60.0), (-60.0, -60.0)], DEAD)
+    assert found[0] is Mode.DEAD_WHEEL
+    assert found[1].startswith("neither one")
+    weak = 0.1 * LARGEST
+    assert found_of_wheels([(weak, weak), (-weak, -weak)], DEAD) is None
 
 
 @pytest.mark.parametrize("fast_from", [20, 60])
