@@ -92,10 +92,6 @@ class ForceBudget:
         self._resisted += (1 - math.exp(-time / MEMORY)) * (resists - self._resisted)
         self._scrubs = max(self._resisted, 0.0 if self._turns else self._scrubs)
 
-    def against(self, climber: Climber) -> float:
-        """Torque [N m] of a wheel that turns are known to meet."""
-        return float(climber.torques(0.0, self._scrubs).right)
-
     def see(
         self, climber: Climber, observed: Observed, wanted: float, allowed: float
     ) -> Trouble | None:

@@ -225,18 +225,15 @@ class Guard:
         motion, wanted = observed.after, expected.wanted
         largest = max(abs(torques.right), abs(torques.left))
         load = largest / climber.max_wheel_torque
-        pushes, strong, rim = load, STRONG, climber.half_track * wanted.yaw_rate
+        strong, rim = STRONG, climber.half_track * wanted.yaw_rate
         if wanted.speed > max(MOVES, rim):
             is_against = motion.speed * expected.speed < 0
             stands = is_against or abs(motion.speed) < STANDS * wanted.speed
-            # what turns are known to meet moves nothing along
-            turns = min(abs(torques.right - torques.left) / 2, self.budget.against(climber))
-            pushes -= turns / climber.max_wheel_torque
         else:  # it turns, in place or in a corner, or rests
             stands = rim > MOVES and abs(motion.yaw_rate) < STANDS * wanted.yaw_rate
             strong = AT_LIMIT  # what scrubs may resist a turn by more than the seal does a way
         effort = 0.0
-        if stands and pushes >= strong:
+        if stands and load >= strong:
             effort = load / STRONG  # it shows the sooner, the stronger it is
         elif expected.waits and load >= AT_LIMIT:
             effort = 1.0

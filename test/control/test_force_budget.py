@@ -152,21 +152,6 @@ def test_turns_on_the_spot_teach_what_turns_meet():
     assert moments[1] - moments[0] == pytest.approx(BREAKS_LOOSE * 30.0, rel=1e-3)
 
 
-@pytest.mark.parametrize(("met", "stalls"), [(0.0, True), (30.0, False)])
-def test_what_turns_are_known_to_meet_is_no_effort_of_one_that_stands(met, stalls):
-    climber, guard = Climb().controller._law.climber, Guard(GuardOptions(), Suction())
-    for before, after in pairwise(turning(0.8, 200)):
-        guard.budget.see(climber, acted_on(climber, before, after, met), 0.1, 0.2)
-    goes, troubles = Expected(Rates(0.1, 0.0), Rates(0.2, 2.0), waits=False, speed=0.1), []
-    creeps = RESTS._replace(speed=2e-3)
-    acted = [(climber.torques(80.0, 35.0), PERIOD)]
-    for place in range(60):
-        before, after = (creeps._replace(x=i * 2e-3 * PERIOD) for i in (place, place + 1))
-        observed = Observed(before, after, PERIOD, acted, Wrench(0.0, 0.0), 0.01)
-        troubles.append(guard.watch(climber, observed, goes))
-    assert any(trouble and trouble[0] is Mode.STALLED for trouble in troubles) is stalls
-
-
 def test_a_moment_that_is_not_given_leaves_the_drive_what_may_change_of_torques():
     law, budget = Climb(max_torque_rate=80.0).controller._law, ForceBudget()
     budget.see(law.climber, acted_on(law.climber, RESTS, RESTS, 0.0), 0.1, 0.2)
