@@ -298,8 +298,11 @@ class ControlLaw:
         shaken, shaken_yaw = braking.shaking
         force = weight + climber.driven_mass * (shaken - braking.drive * motion.speed)
         turning = shaken_yaw / climber.half_track - braking.yaw * motion.yaw_rate
-        moment = climber.driven_inertia * turning
-        return Torques(*climber.saturate(force, moment, *self._bounds(situation))[2:4])
+        return self.torques(force, climber.driven_inertia * turning, situation)
+
+    def torques(self, force: Any, moment: Any, situation: ControlInput) -> Torques:
+        """Those that give a force [N] and a moment [N m], or as much as limits leave of them."""
+        return Torques(*self.climber.saturate(force, moment, *self._bounds(situation))[2:4])
 
     def weight(self, motion: Motion) -> Any:
         """Drive [N] that carries the weight."""

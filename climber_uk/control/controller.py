@@ -408,7 +408,7 @@ class Controller:
                 )
                 command = law.command(ahead, target.point or point)
             pending = estimator.pending(ahead.begins)
-            command = self.guard.budget.within(command, law, ahead.period, pending)
+            command = self.guard.budget.within(command, law, ahead, pending)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None

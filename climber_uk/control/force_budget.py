@@ -9,7 +9,7 @@ told too late shows while nothing drives.
 
 import math
 
-from climber_uk.control.control_law import CUT, Command, ControlLaw
+from climber_uk.control.control_law import CUT, Command, ControlInput, ControlLaw
 from climber_uk.control.model import SLOW
 from climber_uk.control.observed import Acting, Observed
 from climber_uk.control.safety import Mode, Trouble
@@ -76,31 +76,34 @@ class ForceBudget:
         first = FIRST if is_first else self.first
         return min(first * GROWS**self.pushes, MOST * self._allowed)
 
+    def learn(self, climber: Climber, observed: Observed) -> None:
+        """Learn what resists turning: what scrubs, all of it while it turns, either way alike.
+
+        `see` does so, too.
+        """
+        before, after, time = observed.before, observed.after, observed.time
+        is_told = after[:3] != before[:3]
+        self._turns = is_told and abs(climber.half_track * after.yaw_rate) >= SLOW
+        if not (self._turns or (is_told and _is_fast(observed))):
+            return
+        _, moment = climber.wrench(*observed.torques)
+        moment -= climber.driven_inertia * (after.yaw_rate - before.yaw_rate) / time
+        resists = math.copysign(1.0, after.yaw_rate) * moment if self._turns else abs(moment)
+        self._resisted += (1 - math.exp(-time / MEMORY)) * (resists - self._resisted)
+        self._scrubs = max(self._resisted, 0.0 if self._turns else self._scrubs)
+
     def see(
         self, climber: Climber, observed: Observed, wanted: float, allowed: float
     ) -> Trouble | None:
         """Take what an odometry tells; [m/s] that the reference asks for, and may ask for."""
+        self.learn(climber, observed)
         self._wanted, self._allowed = wanted, allowed
-        before, after, time = observed.before, observed.after, observed.time
-        gone = math.hypot(after.x - before.x, after.y - before.y)
-        is_fast = max(abs(after.speed), gone / time) >= SLOW
-        is_told = after[:3] != before[:3]
-        self._turns = is_told and abs(climber.half_track * after.yaw_rate) >= SLOW
-        way = abs(after.speed) * time
-        self._creeps = abs(after.speed) >= CREEPS and abs(gone - way) < way / 2
-        if self._turns or (is_told and is_fast):
-            self._scrub(climber, observed)
-        if is_fast or climber.falls:
+        speed, gone = abs(observed.after.speed), _gone(observed)
+        way = speed * observed.time
+        self._creeps = speed >= CREEPS and abs(gone - way) < way / 2
+        if _is_fast(observed) or climber.falls:
             return self._slide(climber, observed)
         return self._rest(climber, observed)
-
-    def _scrub(self, climber: Climber, observed: Observed) -> None:
-        """Learn what resists turning: what scrubs, all of it while it turns."""
-        before, after, time = observed.before, observed.after, observed.time
-        _, moment = climber.wrench(*observed.torques)
-        moment -= climber.driven_inertia * (after.yaw_rate - before.yaw_rate) / time
-        self._resisted += (1 - math.exp(-time / MEMORY)) * (moment - self._resisted)
-        self._scrubs = max(abs(self._resisted), 0.0 if self._turns else self._scrubs)
 
     def _slide(self, climber: Climber, observed: Observed) -> Trouble | None:
         before, after, time = observed.before, observed.after, observed.time
@@ -173,12 +176,21 @@ class ForceBudget:
         friction = min(max(model, self._friction), MOST_FRICTION * model)
         return max(friction - climber.weight_along_wall * min(self._astray, 1.0), 0.0)
 
-    def within(self, command: Command, law: ControlLaw, period: float, pending: Acting) -> Command:
-        """A command, or what of it is in the budget; `pending` torques act before it."""
+    def within(
+        self, command: Command, law: ControlLaw, ahead: ControlInput, pending: Acting
+    ) -> Command:
+        """A command, or what of it is in the budget; `pending` torques act before it.
+
+        What may change of it within a period is found anew: a moment that is not given would leave
+        nothing of that for the drive.
+        """
         if law.falls or not self._rests or self._is_told:
             return command
-        climber, weight = law.climber, law.weight(command.motion)
-        push, (_, moment) = _push(climber, command.wheels, weight), climber.wrench(*command.wheels)
+        climber, weight, period = law.climber, law.weight(command.motion), ahead.period
+        force, moment = (
+            asked - lost for asked, lost in zip(command.demanded, command.lost, strict=True)
+        )
+        push = force - weight
         if self.paused is not None:
             held = HELD * min(climber.seal_friction, self._holds(climber))
             most = 0.0 if self.speed else held
@@ -195,12 +207,9 @@ class ForceBudget:
         turned = moment - self._turning(climber, moment, period)
         if abs(cut) + abs(turned) <= CUT:
             return command
-        limit, less = climber.max_wheel_torque, climber.torques(cut, turned)
-        right, left = (
-            min(max(it - off, -limit), limit) for it, off in zip(command.wheels, less, strict=True)
-        )
         lost = Wrench(command.lost.force + cut, command.lost.moment + turned)
-        return command._replace(wheels=Torques(right, left), lost=lost)
+        wheels = law.torques(force - cut, moment - turned, ahead)
+        return command._replace(wheels=wheels, lost=lost)
 
     def _turning(self, climber: Climber, moment: float, period: float) -> float:
         """A moment [N m], or what of it is given while no turn is told: none in a pause."""
@@ -209,6 +218,17 @@ class ForceBudget:
         holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
         lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
         return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))
+
+
+def _gone(observed: Observed) -> float:
+    """Way [m] between two odometry messages, by their poses."""
+    before, after = observed.before, observed.after
+    return math.hypot(after.x - before.x, after.y - before.y)
+
+
+def _is_fast(observed: Observed) -> bool:
+    """Whether it slides, by its twist or its poses."""
+    return max(abs(observed.after.speed), _gone(observed) / observed.time) >= SLOW
 
 
 def _ends(climber: Climber, push: float, holds: float) -> bool:

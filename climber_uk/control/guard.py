@@ -171,6 +171,7 @@ class Guard:
     ) -> Trouble | None:
         is_to_rest = expected.wanted.speed < RESTS and not expected.waits
         if self.options.stall_time == 0 or is_to_rest:
+            self.budget.learn(climber, observed)  # what turns on the spot meet
             self.budget.pause()
             return None
         return self.budget.see(climber, observed, expected.wanted.speed, expected.allowed.speed)

@@ -210,7 +210,8 @@ class Observer:
         new, newer = shares
         acceleration = (measured.speed - expected.speed) / time
         yaw_acceleration = (measured.yaw_rate - expected.yaw_rate) / time
-        unexpected = mass * acceleration
+        creeps = (abs(expected.speed) < EXPECTED_REST) & (abs(measured.speed) < EXPECTED_REST)
+        unexpected = select(creeps, 0.0, mass * acceleration)
         unlearnt = learnt.lets_go(unexpected, measured.speed, time)
         rests, slides = settling == SETTLES, settling == 0.0
         force_rate = select(rests | slides, force_rate, 0.0)  # what lets go is a step, no ramp

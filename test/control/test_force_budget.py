@@ -8,11 +8,13 @@ import pytest
 from climbs import PERIOD, Climb
 from test_lies import frozen
 
-from climber_uk.control.control_law import Command
-from climber_uk.control.force_budget import BREAKS_LOOSE, ForceBudget
+from climber_uk.control.control_law import Command, ControlInput
+from climber_uk.control.force_budget import BREAKS_LOOSE, FIRST, ForceBudget
+from climber_uk.control.guard import Expected, Guard, GuardOptions, Rates
 from climber_uk.control.observed import Observed
 from climber_uk.control.safety import Mode
-from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench
+from climber_uk.mechanics.adhesion import Suction
+from climber_uk.mechanics.quantities import NO_TORQUES, Motion, State, Wrench
 
 CIRCLE = {
     **{"shape": "ellipse", "ellipse.semi_axis_x": 0.8, "ellipse.semi_axis_y": 0.8},
@@ -103,31 +105,65 @@ def test_a_seal_that_holds_more_than_believed_is_followed():
     assert climb.fastest() > 0.1
 
 
+RESTS = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
+def acted_on(climber, before, after, moment):
+    """What is observed while a moment [N m] acts, in a period."""
+    acted = [(climber.torques(0.0, moment), PERIOD)]
+    return Observed(before, after, PERIOD, acted, Wrench(0.0, 0.0), 0.01)
+
+
+def turning(rate, times):
+    """Motions that turn at a rate [rad/s]."""
+    return [RESTS._replace(heading=rate * PERIOD * i, yaw_rate=rate) for i in range(times)]
+
+
+def given(budget, law, force, moment):
+    """What of a force and a moment is given while no motion is told."""
+    wanted, ahead = Wrench(force, moment), ControlInput(RESTS, NO_TORQUES, Wrench(0, 0), PERIOD)
+    wheels = law.torques(*wanted, ahead)
+    asked = Command(wheels, wanted, 0.0, Wrench(0.0, 0.0), RESTS, 0.0)
+    return law.climber.wrench(*budget.within(asked, law, ahead, []).wheels)
+
+
 @pytest.mark.parametrize("met", [0.0, 30.0])
-def test_a_turn_is_given_on_trust_what_turns_have_met_and_a_fifth_more(met):
-    """It turns at a steady rate against a moment [N m]; then no motion is told any more."""
-    law, budget, nothing = Climb().controller._law, ForceBudget(), Wrench(0.0, 0.0)
-    climber, rests = law.climber, Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+@pytest.mark.parametrize("back", [0, 20])
+def test_a_turn_is_given_on_trust_what_turns_have_met_and_a_fifth_more(met, back):
+    """It turns against a moment [N m], and for some periods back; then no motion is told."""
+    law, budget = Climb().controller._law, ForceBudget()
+    for rate, moment, times in ((0.8, met, 200), (-0.8, -met, back)):
+        for before, after in pairwise(turning(rate, times)):
+            budget.see(law.climber, acted_on(law.climber, before, after, moment), 0.1, 0.2)
+    budget.see(law.climber, acted_on(law.climber, RESTS, RESTS, 0.0), 0.1, 0.2)
+    _, moment = given(budget, law, 0.0, -80.0 if back else 80.0)
+    assert abs(moment) == pytest.approx(BREAKS_LOOSE * met, rel=1e-3)
 
-    def see(before, after, moment):
-        acted = [(climber.torques(0.0, moment), PERIOD)]
-        budget.see(climber, Observed(before, after, PERIOD, acted, nothing, 0.01), 0.1, 0.2)
 
-    turning = [rests._replace(heading=0.8 * PERIOD * i, yaw_rate=0.8) for i in range(200)]
-    for before, after in pairwise(turning):
-        see(before, after, met)
-    see(rests, rests, 0.0)
-    asked = Command(climber.torques(0.0, 80.0), nothing, 0.0, nothing, rests, 0.0)
-    _, given = climber.wrench(*budget.within(asked, law, PERIOD, []).wheels)
-    assert given == pytest.approx(BREAKS_LOOSE * met, rel=1e-3)
+def test_turns_on_the_spot_teach_what_turns_meet():
+    law, guard = Climb().controller._law, Guard(GuardOptions(), Suction())
+    on_the_spot = Expected(Rates(0.0, 0.8), Rates(0.1, 2.0), waits=False)
+    for before, after in pairwise(turning(0.8, 200)):
+        guard.watch(law.climber, acted_on(law.climber, before, after, 30.0), on_the_spot)
+    moments = []
+    for budget in (ForceBudget(), guard.budget):
+        budget.see(law.climber, acted_on(law.climber, RESTS, RESTS, 0.0), 0.1, 0.2)
+        moments.append(given(budget, law, 0.0, 80.0)[1])
+    assert moments[1] - moments[0] == pytest.approx(BREAKS_LOOSE * 30.0, rel=1e-3)
+
+
+def test_a_moment_that_is_not_given_leaves_the_drive_what_may_change_of_torques():
+    law, budget = Climb(max_torque_rate=80.0).controller._law, ForceBudget()
+    budget.see(law.climber, acted_on(law.climber, RESTS, RESTS, 0.0), 0.1, 0.2)
+    budget.turn = FIRST  # it may turn as fast as is given on trust
+    force, moment = given(budget, law, 60.0, 80.0)
+    assert moment == pytest.approx(0.0)
+    assert force == pytest.approx(law.climber.wrench(0.4, 0.4)[0])
 
 
 def test_what_creeps_as_pose_and_twist_tell_alike_is_not_held():
-    law, budget, nothing = Climb().controller._law, ForceBudget(), Wrench(0.0, 0.0)
-    climber, speed = law.climber, 2e-3
-    places = [Motion(i * speed * PERIOD, 0.0, 0.0, 1.0, 0.0, speed, 0.0) for i in range(400)]
-    asked = Command(Torques(2.0, 0.0), nothing, 0.0, nothing, places[0], 0.0)
+    law, budget, speed = Climb().controller._law, ForceBudget(), 2e-3
+    places = [RESTS._replace(x=i * speed * PERIOD, speed=speed) for i in range(400)]
     for before, after in pairwise(places):
-        acted = [(asked.wheels, PERIOD)]
-        budget.see(climber, Observed(before, after, PERIOD, acted, nothing, 0.01), 0.1, 0.2)
-        assert budget.within(asked, law, PERIOD, []) is asked
+        budget.see(law.climber, acted_on(law.climber, before, after, 40.0), 0.1, 0.2)
+        assert given(budget, law, 74.0, 22.0) == pytest.approx((74.0, 22.0))

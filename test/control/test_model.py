@@ -158,6 +158,16 @@ def test_a_force_that_grew_is_not_expected_to_at_rest(speed, rate):
     assert (found.force_rate, found.moment_rate) == (rate, 2.0)
 
 
+@pytest.mark.parametrize(
+    ("to_be", "speed", "force"), [(0.0, 0.9e-3, 0.0), (0.0, 1.1e-3, 0.11), (1.1e-3, 0.9e-3, -0.02)]
+)
+def test_what_creeps_where_it_is_to_rest_is_no_force(to_be, speed, force):
+    expected = State.rolling(np.zeros(3), to_be, 0.0).motion
+    found = expected._replace(speed=speed)
+    _, learnt = Observer().corrected(CLIMBER, NOTHING, expected, found, 0.005, (0.1, 0.01))
+    assert learnt.force == pytest.approx(force)
+
+
 @pytest.mark.parametrize("way", [1.0, -1.0])
 @pytest.mark.parametrize(
     ("speed", "settling", "unexpected", "share_of"),
