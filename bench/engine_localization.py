@@ -13,7 +13,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from localization import FILTER, MILLIMETRE, PERIOD, Case, Loop, Record, rms
+from localization import FILTER, MILLIMETRE, PERIOD, Case, Loop, Record, print_faults, rms
 from physics import PATHS, ROBOTS, ROOT, trajectory
 
 from climber_uk.control.build import build_controller
@@ -143,9 +143,8 @@ def fits(shown: Array, *models: list[Array]) -> str:
     return f"{', '.join(f'{part:.3f}' for part in found)} | {told}"
 
 
-def row(name: str, path: str, seeds: int) -> str:
-    """Row of the table."""
-    loops = [EngineLoop(name, path, seed).run() for seed in range(seeds)]
+def row(name: str, path: str, loops: list[Loop]) -> str:
+    """Row of the table, of one run for each seed."""
     rows = np.array([loop.record.rows for loop in loops])
     now, pose, off = rows[0, :, 0], rows[..., 1:4], rows[..., 4:7]
     covariance = rows[..., 7:].reshape(*rows.shape[:2], 3, 3)
@@ -177,7 +176,9 @@ def main() -> None:
         return
     for name, path in product(TOLD, PATHS):
         if options.only in f"{name}, {path}":
-            print(row(name, path, options.seeds), flush=True)
+            loops = [EngineLoop(name, path, seed).run() for seed in range(options.seeds)]
+            print(row(name, path, loops), flush=True)
+            print_faults(loops)
 
 
 if __name__ == "__main__":
