@@ -54,7 +54,7 @@ FILTER = LocalizationOptions(
     initial_y=3.0,
     initial_heading=math.pi / 4,
     way_noise=5e-4,
-    output_frequency=50.0,
+    output_frequency=65.0,
 )
 
 
