@@ -13,7 +13,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from localization import FILTER, MILLIMETRE, PERIOD, Case, Loop, Record, rms
+from localization import FILTER, MILLIMETRE, PERIOD, Case, Loop, Record, print_faults, rms
 from physics import PATHS, ROBOTS, ROOT, trajectory
 
 from climber_uk.control.build import build_controller
@@ -55,7 +55,8 @@ TOLD: dict[str, tuple[str, dict[str, float], dict[str, Any]]] = {
 class EngineLoop(Loop):
     """The closed loop of a robot in the engine."""
 
-    def __init__(self, name: str, path: str, seed: int) -> None:
+    def __init__(self, name: str, path: str, seed: int, is_told: bool = False) -> None:
+        """Of a robot on a path; whether its controller is told the truth."""
         from mujoco_climber import MujocoClimber
 
         robot, unseen, told = TOLD[name]
@@ -71,7 +72,7 @@ class EngineLoop(Loop):
         x, y, heading = start.pose.tolist()
         known |= {"initial_x": x, "initial_y": y, "initial_heading": heading}
         options = replace(FILTER, **told, **known)
-        self.case = Case(options=options, duration=PATHS[path][1])
+        self.case = Case(options=options, duration=PATHS[path][1], believes_truth=is_told)
         self.torques: Array = np.zeros(2)
         self.record, self.sent = Record(), []
         self.sense(start, seed)
@@ -95,8 +96,7 @@ class Watched(EngineLoop):
     """One whose controller is told the truth, and whose slip is watched."""
 
     def __init__(self, name: str, path: str) -> None:
-        super().__init__(name, path, 0)
-        self.case = replace(self.case, believes_truth=True)
+        super().__init__(name, path, 0, is_told=True)
         self.states: list[State] = []
         self.angles: list[Array] = []
 
@@ -143,9 +143,8 @@ def fits(shown: Array, *models: list[Array]) -> str:
     return f"{', '.join(f'{part:.3f}' for part in found)} | {told}"
 
 
-def row(name: str, path: str, seeds: int) -> str:
-    """Row of the table."""
-    loops = [EngineLoop(name, path, seed).run() for seed in range(seeds)]
+def row(name: str, path: str, loops: list[Loop]) -> str:
+    """Row of the table, of one run for each seed."""
     rows = np.array([loop.record.rows for loop in loops])
     now, pose, off = rows[0, :, 0], rows[..., 1:4], rows[..., 4:7]
     covariance = rows[..., 7:].reshape(*rows.shape[:2], 3, 3)
@@ -166,6 +165,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="runs of each row (default: 3)")
     parser.add_argument("--only", default="", help="rows whose name and path contain this")
+    parser.add_argument("--truth", action="store_true", help="tell it the controller")
     parser.add_argument("--slip", action="store_true", help="how four wheels slip")
     options = parser.parse_args()
     if options.slip:
@@ -177,7 +177,10 @@ def main() -> None:
         return
     for name, path in product(TOLD, PATHS):
         if options.only in f"{name}, {path}":
-            print(row(name, path, options.seeds), flush=True)
+            runs = [EngineLoop(name, path, seed, options.truth) for seed in range(options.seeds)]
+            loops = [loop.run() for loop in runs]
+            print(row(name, path, loops), flush=True)
+            print_faults(loops)
 
 
 if __name__ == "__main__":

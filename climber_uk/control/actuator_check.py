@@ -13,12 +13,15 @@ from climber_uk.mechanics.climber import Climber
 SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
 LACKS = 0.3, 1.3  # of a wheel's torque that is missing all at once, if nothing of the other one's
-LACKS_ELSE = 0.25  # of the same, is missing or too much there
+LACKS_ELSE = 0.25  # of the same, is missing or too much there,
+LACKS_MOMENT = (
+    0.5  # and of what is missing: what scrubs takes as much from one as it gives the other
+)
 LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
 LACKS_IN_A_ROW = 3  # odometry messages
 WENT, GOES, STANDS = 0.05, 0.01, 1e-3  # [m/s] of a rim: before, of the other one, of this one
-ASKED = 0.01  # [m/s] of a rim that is not to stand
-# odometry messages for which a rim stands that went before; that never went, or slowly
+ASKED = 0.02  # [m/s] of a rim that is not to stand: of one that turns back all tell a little else
+# odometry messages for which a rim stands that went before; that is asked to go, and never did
 STANDS_AT_ONCE, STANDS_ON = 3, 10
 NEITHER, SILENT = "neither", 0.05  # [s] for which both do not answer
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
@@ -66,7 +69,7 @@ class Wheel:
         missing = math.copysign(1.0, self.force) * self.missing
         least, most = LACKS
         is_missing = force > LACKS_FROM * largest and least * force < missing < most * force
-        alone = abs(other.missing) < LACKS_ELSE * force
+        alone = abs(other.missing) < min(LACKS_ELSE * force, LACKS_MOMENT * missing)
         self.lacking = self.lacking + 1 if is_missing and alone else 0
         return self.lacking >= LACKS_IN_A_ROW
 
@@ -91,6 +94,7 @@ class RimStop:
     def __init__(self) -> None:
         self._seen = 0.0, 0.0  # [m/s] in the last two messages
         self._stands, self._at_once = 0, False  # messages; whether it went before them
+        self._unheeded = 0  # messages in a row of those, in which it is asked to go
         self._other_stands = 0  # messages in a row
         self.is_stuck = False
 
@@ -98,13 +102,14 @@ class RimStop:
         """Add speeds [m/s] of this rim, of the other, and what is asked of this one at least."""
         self._other_stands = self._other_stands + 1 if abs(other) <= GOES else 0
         if abs(rim) >= STANDS or self._other_stands >= (STANDS_AT_ONCE if self._at_once else 1):
-            self._stands, self._at_once = 0, False
+            self._stands, self._unheeded, self._at_once = 0, 0, False
         elif not self._other_stands:  # else a seal may have stuck again
             if self._stands == 0:
                 self._at_once = max(map(abs, self._seen)) > WENT
             self._stands += 1
+            self._unheeded = self._unheeded + 1 if asked > ASKED else 0
         self._seen = self._seen[1], rim
-        long_since = self._stands >= STANDS_ON and asked > ASKED
+        long_since = self._unheeded >= STANDS_ON
         self.is_stuck = long_since or (self._at_once and self._stands >= STANDS_AT_ONCE)
 
 

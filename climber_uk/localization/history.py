@@ -18,7 +18,7 @@ from climber_uk.localization.kalman import (
     with_gravity,
     with_yaw_rate_at_rest,
 )
-from climber_uk.localization.models import Late, Travel, turn
+from climber_uk.localization.models import HEADING, Late, Travel, turn
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import SECOND, Array
 
@@ -63,13 +63,14 @@ class Entry:
     def pose(self, stamp: int) -> Array:
         """Pose (3,) a little later, at `stamp` [ns]."""
         travel, later = self.sample.travel, (stamp - self.stamp) / SECOND
-        x, y, heading, bias, *_ = self.estimate.mean.tolist()
+        mean = self.estimate.mean
+        x, y, heading = mean[: HEADING + 1].tolist()
         speed = travel.distance / travel.duration
         return np.array(
             [
                 x + speed * later * math.cos(heading),
                 y + speed * later * math.sin(heading),
-                heading + turn(bias, travel) * later / travel.duration,
+                heading + turn(mean, travel) * later / travel.duration,
             ]
         )
 

@@ -166,7 +166,7 @@ class Localizer:
         It is the wheels' where there is no specific force `forwards` [m/s²].
         """
         options, mean, duration = self.options, self.estimate.mean, rolled.duration
-        angle = turn(float(mean[BIAS]), travel)
+        angle = turn(mean, travel)
         if forwards is None:
             return travel._replace(scrubbed=abs(angle)), rolled, 0.0
         turned = self._scrubbing.turned(rolled, angle / duration, options)
@@ -278,7 +278,7 @@ class Localizer:
         assert self.stamp is not None
         mean, offset, duration = self.estimate.mean, self.smoothing.offset, travel.duration
         x, y, heading = (mean[:3] + offset).tolist()
-        gyro = turn(float(mean[BIAS]), travel) / duration
+        gyro = turn(mean, travel) / duration
         uphill = models.share_along_wall(self.options) * math.sin(float(mean[HEADING]))
         distance = models.forwards(mean, travel, uphill)
         speed, yaw_rate = self._output.go_on(distance, rolled.yaw_rate, gyro, duration)

@@ -4,7 +4,8 @@
                                                    accelerometer's biases, forwards, to the left;
                                                    scrub; pivot; slip by drag; slip by weight
 
-    α = (ω_gyro - b) Δt   ψ = θ + α/2   p = sin(inclination)   over a way S, of length |S|
+    α = (ω_gyro - b) Δt, or ω_wheels (1 - σ) Δt   ψ = θ + α/2   p = sin(inclination)
+    over a way S, of length |S|
     s = S (1 - σ) - (ζ D + ξ p T sinψ)    u = p (a α sinψ - λ |α| cosψ)   to the left
     x⁺ = x + s cosψ - u sinψ   y⁺ = y + s sinψ + u cosψ - κ p |S|   θ⁺ = θ + α
 
@@ -55,8 +56,8 @@ class Late(NamedTuple):
 
 def advanced(state: Array, travel: Travel, pull: float) -> Array:
     """State (12,) after a `travel`; `pull` is p, the share of gravity along the wall."""
-    x, y, heading, bias, scale, creep, _, _, scrub, pivot, *slips = state.tolist()
-    angle = turn(bias, travel)
+    x, y, heading, _, scale, creep, _, _, scrub, pivot, *slips = state.tolist()
+    angle = turn(state, travel)
     cosine, sine = math.cos(heading + angle / 2), math.sin(heading + angle / 2)
     way = travel.distance * (1 - scale) - slip_along(
         slips, travel.slipped, travel.dragged, pull * sine
@@ -86,15 +87,17 @@ def forwards(state: Array, travel: Travel, uphill: float) -> float:
     return travel.distance * (1 - float(state[SCALE])) - slip
 
 
-def turn(bias: float, travel: Travel) -> float:
-    """α [rad]."""
-    return (travel.yaw_rate - (bias if travel.is_gyro else 0.0)) * travel.duration
+def turn(state: Array, travel: Travel) -> float:
+    """α [rad]: the gyro's, or the wheels', which slip as they do on the way."""
+    if travel.is_gyro:
+        return (travel.yaw_rate - float(state[BIAS])) * travel.duration
+    return travel.yaw_rate * (1 - float(state[SCALE])) * travel.duration
 
 
 def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
     """Derivative (12, 12) of `advanced` by the state."""
-    _, _, heading, bias, scale, _, _, _, scrub, pivot, *slips = state.tolist()
-    angle = turn(bias, travel)
+    _, _, heading, _, scale, _, _, _, scrub, pivot, *slips = state.tolist()
+    angle = turn(state, travel)
     middle = heading + angle / 2
     cosine, sine = math.cos(middle), math.sin(middle)
     way = travel.distance * (1 - scale) - slip_along(
@@ -102,7 +105,6 @@ def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
     )
     downhill = pull * travel.slipped  # ξ's, of a climber that looks up
     by_heading = -slips[1] * downhill * cosine
-    angle_by_bias = -travel.duration if travel.is_gyro else 0.0
     sag, swing = pull * travel.scrubbed, pull * angle
     jacobian = np.eye(SIZE)
     jacobian[X, SCRUB], jacobian[Y, SCRUB] = sag * cosine * sine, -sag * cosine * cosine
@@ -111,11 +113,15 @@ def advanced_jacobian(state: Array, travel: Travel, pull: float) -> Array:
     along, across = by_heading * cosine - way * sine, by_heading * sine + way * cosine
     jacobian[X, HEADING] = along + scrub * sag * double - pivot * swing * doubled
     jacobian[Y, HEADING] = across + scrub * sag * doubled + pivot * swing * double
-    jacobian[: HEADING + 1, BIAS] = jacobian[: HEADING + 1, HEADING] * angle_by_bias / 2
-    jacobian[X, BIAS] -= pull * pivot * sine * sine * angle_by_bias
-    jacobian[Y, BIAS] += pull * pivot * sine * cosine * angle_by_bias
-    jacobian[HEADING, BIAS] = angle_by_bias
-    jacobian[X, SCALE], jacobian[Y, SCALE] = -travel.distance * cosine, -travel.distance * sine
+    by_angle = jacobian[: HEADING + 1, HEADING] / 2
+    by_angle[X] -= pull * pivot * sine * sine
+    by_angle[Y] += pull * pivot * sine * cosine
+    by_angle[HEADING] = 1.0
+    angle_by_scale = 0.0 if travel.is_gyro else -travel.yaw_rate * travel.duration
+    jacobian[: HEADING + 1, BIAS] = by_angle * (-travel.duration if travel.is_gyro else 0.0)
+    jacobian[: HEADING + 1, SCALE] = by_angle * angle_by_scale
+    jacobian[X, SCALE] -= travel.distance * cosine
+    jacobian[Y, SCALE] -= travel.distance * sine
     jacobian[Y, CREEP] = -pull * travel.path
     jacobian[X, DRAG_SLIP] = -travel.dragged * cosine
     jacobian[Y, DRAG_SLIP] = -travel.dragged * sine

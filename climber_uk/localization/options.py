@@ -64,7 +64,10 @@ class LocalizationOptions:
         0.001, "m/√m", "deviation of the position after a metre, else unexplained", at_least=0
     )
     turn_noise: float = parameter(
-        0.05, "rad/√rad", "deviation of a turn by encoders, used without an IMU", at_least=0
+        0.01,
+        "rad/√rad",
+        "of a turn by encoders, beside their scale, used without an IMU; 0.05 if wheels scrub",
+        at_least=0,
     )
     initial_x: float = parameter(0.0, "m", "x at the start")
     initial_y: float = parameter(0.0, "m", "y at the start")

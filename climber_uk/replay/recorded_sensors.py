@@ -2,14 +2,16 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from operator import itemgetter
+from typing import Any, TypeVar
 
 import numpy as np
 
 from climber_uk.bags.bag import UNFIT, Bag
-from climber_uk.bags.restarts import restarts
+from climber_uk.bags.restarts import are_many, are_strays, restarts
 from climber_uk.bags.topics import Topics
 from climber_uk.localization.gate import Fix
 from climber_uk.localization.localizer import Localizer
@@ -20,29 +22,45 @@ from climber_uk.messages.names import Names
 from climber_uk.messages.topics import IMU, JOINTS, POSE, TRUTH
 
 Tell = Callable[[Localizer], Any]
+Stamped = TypeVar("Stamped", bound=Sequence[Any])  # first of it, a stamp [ns]
 TYPES = {
     IMU: "sensor_msgs/msg/Imu",
     JOINTS: "sensor_msgs/msg/JointState",
     POSE: "geometry_msgs/msg/PoseWithCovarianceStamped",
     TRUTH: "nav_msgs/msg/Odometry",
 }
-ORDER = {IMU: 0, JOINTS: 1, POSE: 2}  # of one stamp
 
 
 @dataclass
 class RecordedSensors:
     """What a bag has of one climber."""
 
-    events: list[tuple[int, int, Tell]] = field(default_factory=list)  # stamp [ns], order, what
-    counts: Counter[str] = field(default_factory=Counter)  # by topic
-    refused: Counter[str] = field(default_factory=Counter)  # by topic and why
+    imu: list[tuple[int, Tell]] = field(default_factory=list)  # stamp [ns], what
+    encoders: list[tuple[int, Tell]] = field(default_factory=list)
     fixes: list[Fix] = field(default_factory=list)
     true: list[tuple[float, ...]] = field(default_factory=list)  # stamp [ns], x, y, heading
+    counts: Counter[str] = field(default_factory=Counter)  # by topic
+    refused: Counter[str] = field(default_factory=Counter)  # by topic and why
+
+    def leave_out_strays(self) -> None:
+        """Leave out messages, in the order of arrival, whose stamps are far off those around."""
+        self.imu = self._sound(IMU, self.imu)
+        self.encoders = self._sound(JOINTS, self.encoders)
+        self.fixes = self._sound(POSE, self.fixes)
+        self.true = self._sound(TRUTH, self.true)
+
+    def _sound(self, name: str, messages: list[Stamped]) -> list[Stamped]:
+        strays = are_strays(np.array([message[0] for message in messages], dtype=np.int64))
+        if not strays.any() or are_many(strays):
+            return messages
+        self.refused[f"{name}: a stamp far off those around it"] += int(strays.sum())
+        return [message for message, stray in zip(messages, strays, strict=True) if not stray]
 
     def tell(self, localizer: Localizer) -> None:
-        """Tell a localizer all of it, in the order of the stamps."""
-        self.events.sort(key=lambda event: event[:2])
-        for _, _, tell in self.events:
+        """Tell a localizer all of it, in the order of the stamps; of one stamp, in that of here."""
+        events = [*self.imu, *self.encoders]
+        events += [(fix.stamp, partial(Localizer.on_fix, fix=fix)) for fix in self.fixes]
+        for _, tell in sorted(events, key=itemgetter(0)):
             try:
                 tell(localizer)
             except ValueError as error:
@@ -82,7 +100,8 @@ def read_sensors(bag: Bag, namespace: str, names: Names, frames: SensorFrames) -
         topic = Topics().full(JOINTS, namespace)
         lacking = bag.lacks(topic, TYPES[JOINTS])
         raise ValueError("; ".join([f"{bag.path} has {lacking}", *bag.losses]))
-    stamps = np.array([stamp for stamp, order, _ in found.events if order == ORDER[JOINTS]])
+    found.leave_out_strays()
+    stamps = np.array([stamp for stamp, _ in found.encoders])
     if not len(stamps):
         raise ValueError(f"{bag.path}: {found.refused.most_common(1)[0][0]}")
     if again := len(restarts(stamps)):
@@ -103,16 +122,14 @@ def _take(
         joints = names.left_wheel_joint, names.right_wheel_joint
         angles = reading_sensors.wheel_angles(message, *joints)
         stamp = reading_sensors.stamp_of(message)
-        found.events.append((stamp, ORDER[name], lambda it: it.on_encoders(stamp, *angles)))
+        found.encoders.append((stamp, lambda it: it.on_encoders(stamp, *angles)))
     elif name == IMU:
         sample = reading_sensors.imu(message, frames.imu_frame or names.base_frame)
         told = sample.stamp, sample.yaw_rate, *frames.force(*sample.force)
-        found.events.append((sample.stamp, ORDER[name], lambda it: it.on_imu(*told)))
+        found.imu.append((sample.stamp, lambda it: it.on_imu(*told)))
     else:
         pose = reading_sensors.pose(message, frames.pose_frame or names.odom_frame)
-        fix = frames.fix(Fix(*pose))
-        found.fixes.append(fix)
-        found.events.append((fix.stamp, ORDER[name], lambda it: it.on_fix(fix)))
+        found.fixes.append(frames.fix(Fix(*pose)))
 
 
 def seconds(stamps: Stamps) -> Array:

@@ -243,7 +243,9 @@ def test_a_counter_that_begins_anew_is_no_travel():
 def test_without_an_imu_the_wheels_tell_the_turn():
     told = Told(speed=0.2, initial_heading_deviation=0.02).go_on(5.0, has_imu=False)
     assert told.off == pytest.approx(0, abs=1e-6)
-    assert told.localizer.estimate.deviation(HEADING) > 0.05
+    scrubbed = told.options.turn_noise * math.sqrt(1.0 / told.options.half_track)  # over 1 m
+    deviation = told.localizer.estimate.deviation(HEADING)
+    assert deviation == pytest.approx(math.hypot(0.02, scrubbed), rel=0.01)
 
 
 @settings(max_examples=6)

@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 from made_bag import ODOMETRY, SECOND, message, turn, write
 
+from climber_uk.bags.bag import open_bag
+from climber_uk.localization.sensor_frames import SensorFrames
 from climber_uk.mechanics.climber import GRAVITY
+from climber_uk.messages.names import Names
 from climber_uk.replay import localize
+from climber_uk.replay.recorded_sensors import read_sensors
 
 IMU, JOINTS = "sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
@@ -16,8 +20,11 @@ PERIOD, SPEED, HEADING, CREEP = 0.02, 0.2, 0.5, 0.05
 RADIUS = 0.027
 
 
-def a_bag(path, seconds=20.0, late=0.3, has_imu=True, runs=1):
-    """A climber that goes straight and sags; fixes of 2 cm, five a second, that come late."""
+def a_bag(path, seconds=20.0, late=0.3, has_imu=True, runs=1, stray=("", 0, 0.0)):
+    """A climber that goes straight and sags; fixes of 2 cm, five a second, that come late.
+
+    One message of a topic, by its number, has a stamp that is off [s].
+    """
     random, messages = np.random.default_rng(0), []
     for number in range(round(seconds / PERIOD)):
         time = number * PERIOD
@@ -50,6 +57,10 @@ def a_bag(path, seconds=20.0, late=0.3, has_imu=True, runs=1):
             fix.pose.pose.orientation = turn(0.0)
             fix.pose.covariance = np.diag([4e-4, 4e-4, 1.0, 1.0, 1.0, 100.0]).ravel()
             messages.append(("/pose", POSE, stamp + round(late * SECOND), fix))
+    topic, place, off = stray
+    of_topic = [one for name, _, _, one in messages if name == topic]
+    if of_topic:
+        of_topic[place].header.stamp.sec += round(off)
     later = range(0, 100 * runs * SECOND, 100 * SECOND)
     return write(path, [(*what, when + at, one) for at in later for *what, when, one in messages])
 
@@ -114,3 +125,16 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, run, arguments, said):
 def test_two_runs_are_not_taken_for_one(tmp_path, run):
     _, message = run(a_bag(tmp_path / "bag", seconds=0.5, runs=2))
     assert "/joint_states: time starts again, there are 2 runs: want one" in message
+
+
+@pytest.mark.parametrize("topic", ["/joint_states", "/imu", "/pose", "/ground_truth"])
+@pytest.mark.parametrize(("place", "off"), [(0, 9.0), (1, 2.0), (-1, 5e8), (-3, -9.0)])
+def test_a_message_with_a_stray_stamp_is_left_out_and_said(tmp_path, topic, place, off):
+    # in the beginning a stamp ahead makes all that comes after it look like a second run
+    names, frames = Names(), SensorFrames()
+    with open_bag(a_bag(tmp_path / "bag", 1.4, stray=(topic, place, off))) as bag:
+        sensors = read_sensors(bag, "", names, frames)
+    assert sensors.refused == {f"{topic[1:]}: a stamp far off those around it": 1}
+    first, last = 10 * SECOND, round(11.4 * SECOND)
+    for left in (sensors.encoders, sensors.imu, sensors.fixes, sensors.true):
+        assert all(first <= message[0] <= last for message in left)
