@@ -86,7 +86,7 @@ SMALL = {  # a fifth of the size of climber.yaml's lap, in a fifth of its time
     "rate: 0.12": "rate: 0.6",
     "ramp_time: 3.0": "ramp_time: 1.0",
 }
-SLOW = {"control_period: 0.005": "control_period: 0.01"}
+SLOW = {"control_period: 0.005": "control_period: 0.02"}
 DURATION = 14.0  # [s] of that lap, and of rest after it
 
 
@@ -110,16 +110,18 @@ def climber_bag(runs):
 
 
 def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay):
-    """In steps of 1 mm/s, with a dead band of 20 mm/s: below it a wheel stands."""
+    """In steps of 1 mm/s, with a dead band of 20 mm/s: below it a wheel stands.
+
+    A whole lap, and rest after it: test/closed_loop/test_speed_motors.py.
+    """
     dead_band = {"velocity_dead_band: 0.0": "velocity_dead_band: 0.02"}
-    bag = small_bag(runs, "velocity.yaml", 12.5, SMALL | dead_band)
+    bag = small_bag(runs, "velocity.yaml", 5.0, SMALL | dead_band)
     run = read_run(bag)
-    assert run.time[-1] >= 12.0
+    assert run.time[-1] >= 4.5
     assert np.sqrt(np.mean(run.distance**2)) < 3e-3
     told = np.array(list(by_stamp(bag, "/wheel_torques", lambda m: list(m.velocity)).values()))
     changes = 0.027 * np.diff(told, axis=0)
     assert np.sqrt(np.mean(changes**2)) < 3e-3
-    assert np.abs(changes[-100:]).max() < 1e-6
     assert not replay(bag, "--fail-above", "1e-9")["changed"]
 
 
@@ -151,7 +153,7 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     assert run.margins.values[:, :2].min() > 2.8
     assert np.abs(run.error[:, 1]).max() < 2e-3
     assert run.time[-1] >= DURATION
-    assert np.abs(run.pose[-100:] - run.pose[-1]).max() < 1e-9  # the last second
+    assert np.abs(run.pose[-50:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
 
 
@@ -178,7 +180,7 @@ def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_it
 
 
 def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):
-    for bag, answers in ((paper_bags[0], 590), (climber_bag, 1390)):
+    for bag, answers in ((paper_bags[0], 590), (climber_bag, 690)):
         numbers = replay(bag, "--fail-above", "1e-9")
         odometry, torques = (set(by_stamp(bag, of, str)) for of in ("/odom", "/wheel_torques"))
         # the recorder may end between the last odometries and their answers; before there is a
@@ -300,6 +302,7 @@ def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
     assert len(set(ways)) == 2
 
 
+@pytest.mark.soak  # as nodes without a demo: test_faults.py; as a demo: test_processes.py
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     # The machine may be busy, and not keep to it all the time: what an idle one does is shown by
     # `make demo CLOCK=wall`

@@ -101,7 +101,8 @@ def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(
     world, start, tmp_path, end, by_another
 ):
     command = [executable("run_demo"), *DEMO, tmp_path / "run"]
-    process = start(*PARENT, *command, "--with-parent") if by_another else start(*command)
+    of_another, alone = [*PARENT, *command, "--with-parent"], [*command, "--clock", "wall"]
+    process = start(*(of_another if by_another else alone))
     is_under_way(process)
     family = descendants(process.pid)
     assert len(family) == 4 + by_another
