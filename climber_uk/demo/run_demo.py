@@ -41,11 +41,12 @@ from climber_uk.messages.topics import (
 )
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import given, read_file, read_sections
+from climber_uk.ros.leaving import leave
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import free_domain, use_udp
 from climber_uk.system.command_line import Parser, between, in_words, whole
 from climber_uk.system.processes import die_with, dies_with_me, end
-from climber_uk.system.signals import Interrupted, ignore_end, on_end
+from climber_uk.system.signals import Interrupted, on_end
 
 # One topic of each node that is published before the trajectory starts; not the second by a
 # controller of somebody else. The first two are latched: the recorder subscribes them last, so what
@@ -332,16 +333,22 @@ def main() -> None:
         sys.exit(f"run_demo: {error}")
     except OSError as error:
         sys.exit(f"run_demo: {error.strerror}: {error.filename}")
-    try:
-        record(options, climbers, signals)
-    finally:
-        ignore_end()
-        rclpy.try_shutdown()
-    print(f"recorded: {options.output / 'bag'}")
+    demo, trouble = record(options, climbers, signals)
+    if trouble:
+        print(trouble, file=sys.stderr)
+    else:
+        print(f"recorded: {options.output / 'bag'}")
+    leave(int(bool(trouble)), demo)
+    sys.exit(int(bool(trouble)))
 
 
-def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequence[int]) -> None:
-    """Run nodes and recorder into a new directory; remove it if no trajectory was started."""
+def record(
+    options: argparse.Namespace, climbers: Sequence[str], signals: Sequence[int]
+) -> tuple[Demo | None, str]:
+    """Run nodes and recorder into a new directory; remove it if no trajectory was started.
+
+    Returns its own node, and what went wrong in words.
+    """
     bag, simulated = options.output / "bag", options.clock == "sim"
     commands = {
         "record_bag": executable("record_bag", "--output", str(bag)),
@@ -354,7 +361,7 @@ def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequen
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         demo = Demo(climbers, signals, arguments, not options.controller)
         with running(commands, options.output, signals) as demo.processes:
-            print(f"{options.config} in ROS domain {os.environ['ROS_DOMAIN_ID']}")
+            print(f"{options.config} in ROS domain {os.environ['ROS_DOMAIN_ID']}", flush=True)
             demo.start(simulated, bag)
             demo.run()
     except Interrupted:
@@ -364,12 +371,9 @@ def record(options: argparse.Namespace, climbers: Sequence[str], signals: Sequen
         said = f"{error}" + (f": {lines[-1]}" if lines else "")
     except (RuntimeError, ValueError, OSError) as error:
         said = in_words(error)
-    finally:
-        if demo is not None:
-            demo.destroy_node()
     if not said:
-        return
+        return demo, ""
     if demo is not None and demo.has_begun:
-        sys.exit(f"\nrun_demo: {said}; recorded so far, and the logs: {options.output}")
+        return demo, f"\nrun_demo: {said}; recorded so far, and the logs: {options.output}"
     shutil.rmtree(options.output)
-    sys.exit(f"run_demo: {said}")
+    return demo, f"run_demo: {said}"

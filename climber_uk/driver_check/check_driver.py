@@ -32,6 +32,7 @@ from climber_uk.messages.topics import CONTROLLER, ODOMETRY
 from climber_uk.parameters.changed_parameters import write_sections
 from climber_uk.parameters.parameter_file import Section, nothing_for, read_sections, refuse_unknown
 from climber_uk.parameters.parameter_files import paths
+from climber_uk.ros.leaving import leave
 from climber_uk.ros.running import in_a_line
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser, between
@@ -93,10 +94,9 @@ class Spinner:
 
 
 def check(
-    options: argparse.Namespace, arguments: Sequence[str], ended: Callable[[], bool]
+    options: argparse.Namespace, node: DriverNode, ended: Callable[[], bool]
 ) -> report.Report:
     """Report after listening and, with `--move`, a trial; raises `Interrupted`."""
-    node = DriverNode(arguments)
     for remark in node.parameters.remarks:
         say(remark)
     spin = Spinner(node, ended)
@@ -110,7 +110,6 @@ def check(
     finally:
         node.end_with_zero()
         spin.executor.shutdown()
-        node.destroy_node()
 
 
 def listen(node: DriverNode, spin: Spinner, options: argparse.Namespace) -> None:
@@ -186,19 +185,19 @@ def main() -> None:
     """Print the report and exit with its status."""
     caught: list[int] = []
     on_end(lambda number, _: caught.append(number))
+    node, status = None, 2
     try:
         use_udp()
         options = parse(remove_ros_args(sys.argv)[1:])
         with as_the_controller(sys.argv) as arguments:
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-            found = check(options, arguments, lambda: bool(caught))
+            node = DriverNode(arguments)
+            found = check(options, node, lambda: bool(caught))
+        print(report.as_json(found) if options.json else report.as_text(found))
+        status = int(report.has_failed(found))
     except Interrupted:
         say("interrupted")
-        sys.exit(2)
     except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
         say(in_a_line(error))
-        sys.exit(2)
-    finally:
-        rclpy.try_shutdown()
-    print(report.as_json(found) if options.json else report.as_text(found))
-    sys.exit(int(report.has_failed(found)))
+    leave(status, node)
+    sys.exit(status)

@@ -33,9 +33,10 @@ from std_srvs.srv import SetBool, Trigger
 from climber_uk.messages import writing
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PROGRESS, PUSH
 from climber_uk.operating import watching
+from climber_uk.ros.leaving import leave
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser, between, printable
-from climber_uk.system.signals import Interrupted, ignore_end, on_end
+from climber_uk.system.signals import Interrupted, on_end
 
 REFUSED, SILENT = 1, 3  # exit statuses
 PERIOD = 0.05  # [s] in which it is looked for what is waited for
@@ -179,19 +180,19 @@ def main() -> None:
     node = Node("climber", namespace=options.namespace)
     try:
         is_done, said = DO[options.verb](Operator(node, options.timeout), options.values)
+        print(printable(said))
+        status = 0 if is_done else REFUSED
     except NoAnswerError as error:
         print(f"climber: {error}", file=sys.stderr)
-        sys.exit(SILENT)
+        status = SILENT
     except (KeyError, ValueError) as error:  # others publish there, too
-        is_done, said = False, f"{PROGRESS} is not what it should be ({error})"
+        print(printable(f"{PROGRESS} is not what it should be ({error})"))
+        status = REFUSED
     except Interrupted:
-        is_done, said = True, ""
-    finally:
-        ignore_end()
-        node.destroy_node()
-        rclpy.try_shutdown()
-    print(printable(said))
-    sys.exit(0 if is_done else REFUSED)
+        print()
+        status = 0
+    leave(status, node)
+    sys.exit(status)
 
 
 def _interrupt(*_: object) -> None:

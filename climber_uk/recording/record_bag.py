@@ -34,9 +34,10 @@ from climber_uk.bags.bag_writer import NEVER, BagWriter
 from climber_uk.bags.log_clock import LogClock
 from climber_uk.bags.storage import STORAGES, is_known
 from climber_uk.recording.offered_qos import QUEUE_DEPTH, is_compatible, request_for, to_metadata
+from climber_uk.ros.leaving import leave
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import Parser, in_words
-from climber_uk.system.signals import ignore_end, on_end
+from climber_uk.system.signals import on_end
 
 FLUSH_PERIOD = 0.5  # [s] of messages that a killed recorder loses
 DISCOVERY_PERIOD = 0.2  # [s]
@@ -312,9 +313,8 @@ def topic_name(name: str) -> str:
     return name
 
 
-def record(options: Namespace) -> None:
+def record(recorder: BagRecorder) -> None:
     """Record until a signal to end."""
-    recorder = BagRecorder(options)
     try:
         recorder.run()
     finally:
@@ -322,7 +322,6 @@ def record(options: Namespace) -> None:
         recorder.get_logger().info(f"{recorder.bag.message_count} messages in {recorder.bag.path}")
         for what, how_much in recorder.bag.custom_data.items():
             recorder.get_logger().warning(f"{what}: {how_much}")
-        recorder.destroy_node()
 
 
 def main() -> None:
@@ -330,15 +329,17 @@ def main() -> None:
     options = parse(remove_ros_args(sys.argv)[1:])
     use_udp()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    recorder, status = None, 0
     try:
-        record(options)
+        recorder = BagRecorder(options)
+        record(recorder)
     except KeyboardInterrupt:
         pass
     except OSError as error:
-        sys.exit(f"record_bag: {in_words(error)}")
-    finally:
-        ignore_end()
-        rclpy.try_shutdown()
+        print(f"record_bag: {in_words(error)}", file=sys.stderr)
+        status = 1
+    leave(status, recorder)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -33,10 +33,11 @@ from climber_uk.messages.names import Names
 from climber_uk.messages.topics import CLOCK, DIAGNOSTICS
 from climber_uk.parameters.declaration import QOS, parameter, parameters
 from climber_uk.parameters.parameter_files import ParameterFiles
+from climber_uk.ros.leaving import LONGEST_END, leave
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import in_words
-from climber_uk.system.signals import ignore_end, on_end
+from climber_uk.system.signals import on_end
 
 # else the first message type would have the generator of message types loaded, and its parser
 sys.modules.setdefault("rosidl_generator_py.generate_py_impl", None)  # type: ignore[arg-type]
@@ -46,7 +47,6 @@ RELIABLE = QoSProfile(depth=10)
 SENT = QoSProfile(depth=1000)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
-LONGEST_END = 4  # [s] from a signal to the end of the process, whatever hangs, step by step
 PUBLISH_PERIOD = SECOND // 20  # [ns] of topics that need not be published every time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LINES, LINES_PERIOD = 6, 10.0  # most lines of the log on one subject, in so many [s]
@@ -279,13 +279,9 @@ def run(
     end = Future()
 
     def stop(*_: object) -> None:
-        signal.alarm(LONGEST_END)  # by the kernel: the middleware may not come back
+        if nodes:  # else they are being made, which takes a slow machine its time
+            signal.alarm(LONGEST_END)  # by the kernel: a callback may hang in the middleware
         end.set_result(None)
-
-    def give_time() -> None:
-        """A slow machine is no reason to be killed: each step of the end has that time."""
-        if end.done():
-            signal.alarm(LONGEST_END)
 
     on_end(stop)
     try:
@@ -307,13 +303,8 @@ def run(
             raise
         sys.exit(f"{Path(sys.argv[0]).name}: {in_a_line(error)}")
     finally:
-        ignore_end()  # the terminal and launch may both send a signal
-        for node in nodes:
-            give_time()
-            node.destroy_node()
-        give_time()
-        rclpy.try_shutdown()
-        give_time()
+        signal.alarm(0)
+        leave(int(sys.exc_info()[0] is not None), *nodes)
 
 
 def parse(
