@@ -92,6 +92,14 @@ def test_the_report_counts_and_names_the_worst_first(store):
     assert quantiles == ["0.001", "0.001", "0.18", "0.4", "0.4"]
 
 
+@pytest.fixture
+def few(monkeypatch):
+    """Metrics that are drawn: each panel takes a tenth of a second."""
+    some = {name: figures.METRICS[name] for name in ("max_distance", "rms_distance", "fall_time")}
+    monkeypatch.setattr(figures, "METRICS", some)
+
+
+@pytest.mark.usefixtures("few")
 def test_figures_are_drawn_of_every_limit_but_yes_and_no_whichever_runs_are_finished_first(
     filled, tmp_path
 ):
@@ -119,6 +127,7 @@ def test_bins_of_a_parameter_are_alike_and_of_a_choice_one_for_each_value(filled
         np.testing.assert_allclose(bins["plant_simulator.mass"][row], expected)
 
 
+@pytest.mark.usefixtures("few")
 def test_a_campaign_in_which_nothing_is_drawn_but_noise_has_its_histograms(filled, tmp_path):
     fixed = {"plant_simulator.mass": 5.0, "plant_simulator.initial_x": 0.0}
     paths = figures.draw(*filled(parameters=fixed), tmp_path / "figures")

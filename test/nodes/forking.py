@@ -11,10 +11,11 @@ import subprocess
 import sys
 from importlib.metadata import entry_points
 
+PARTS = "nodes", "recording", "operating", "driver_check"
 PROGRAMS = {
     script.name: script
     for script in entry_points(group="console_scripts")
-    if script.module.startswith(("climber_uk.nodes.", "climber_uk.recording."))
+    if script.module.startswith(tuple(f"climber_uk.{part}." for part in PARTS))
 }
 SERVER = multiprocessing.get_context("forkserver")
 SERVER.set_forkserver_preload([script.module for script in PROGRAMS.values()])

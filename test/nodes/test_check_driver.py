@@ -120,6 +120,7 @@ def drive(world, fault, *parameters, board=PARAMETERS):
 )
 def test_the_plant_passes_all_checks(world, clock, parameters, skipped):
     world.start_node("plant_simulator", f"simulated_time:={clock}", config="climber.yaml")
+    world.wait(lambda: world.node.count_publishers("odom"), "the plant")
     status, rows, said = check(world, "--move", "--duration", "0.5", parameters=parameters)
     assert status == 0, told(rows)
     assert not those(rows, "fail"), told(rows)

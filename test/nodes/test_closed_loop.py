@@ -71,9 +71,9 @@ def runs(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper_bags(runs):
-    """3 s of a lap, and its first 1.5 s again."""
+    """2 s of a lap, and its first one again."""
     bags = [runs.directory / "first" / "bag", runs.directory / "second" / "bag"]
-    for bag, duration in zip(bags, ["3", "1.5"], strict=True):
+    for bag, duration in zip(bags, ["2", "1"], strict=True):
         demo(runs, bag.parent, "paper.yaml", "--duration", duration)
         hold_up_the_recorder(runs)
         finished(runs)
@@ -86,7 +86,7 @@ SMALL = {  # a fifth of the size of climber.yaml's lap, in a fifth of its time
     "rate: 0.12": "rate: 0.6",
     "ramp_time: 3.0": "ramp_time: 1.0",
 }
-SLOW = {"control_period: 0.005": "control_period: 0.01"}
+SLOW = {"control_period: 0.005": "control_period: 0.02"}
 DURATION = 14.0  # [s] of that lap, and of rest after it
 
 
@@ -110,23 +110,25 @@ def climber_bag(runs):
 
 
 def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay):
-    """In steps of 1 mm/s, with a dead band of 20 mm/s: below it a wheel stands."""
+    """In steps of 1 mm/s, with a dead band of 20 mm/s: below it a wheel stands.
+
+    A whole lap, and rest after it: test/closed_loop/test_speed_motors.py.
+    """
     dead_band = {"velocity_dead_band: 0.0": "velocity_dead_band: 0.02"}
-    bag = small_bag(runs, "velocity.yaml", 12.5, SMALL | dead_band)
+    bag = small_bag(runs, "velocity.yaml", 5.0, SMALL | dead_band)
     run = read_run(bag)
-    assert run.time[-1] >= 12.0
+    assert run.time[-1] >= 4.5
     assert np.sqrt(np.mean(run.distance**2)) < 3e-3
     told = np.array(list(by_stamp(bag, "/wheel_torques", lambda m: list(m.velocity)).values()))
     changes = 0.027 * np.diff(told, axis=0)
     assert np.sqrt(np.mean(changes**2)) < 3e-3
-    assert np.abs(changes[-100:]).max() < 1e-6
     assert not replay(bag, "--fail-above", "1e-9")["changed"]
 
 
 def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(paper_bags):
     bags = paper_bags
     run = read_run(bags[0])
-    assert run.time[-1] >= 3.0
+    assert run.time[-1] >= 2.0
     assert len(run.time) == round(run.time[-1] * 200) + 1  # not one is missing
     assert np.sqrt(np.mean(run.distance**2)) <= 0.05e-3
     assert run.distance.max() <= 0.15e-3
@@ -142,7 +144,7 @@ def test_the_papers_scenario_in_lock_step_is_exact_and_repeats_to_the_last_bit(p
     }.items():
         first, second = (by_stamp(bag, topic, content) for bag in bags)
         common = sorted(first.keys() & second.keys())
-        assert len(common) >= 300
+        assert len(common) >= 190
         assert all(first[stamp] == second[stamp] for stamp in common)
 
 
@@ -151,7 +153,7 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     assert run.margins.values[:, :2].min() > 2.8
     assert np.abs(run.error[:, 1]).max() < 2e-3
     assert run.time[-1] >= DURATION
-    assert np.abs(run.pose[-100:] - run.pose[-1]).max() < 1e-9  # the last second
+    assert np.abs(run.pose[-50:] - run.pose[-1]).max() < 1e-9  # the last second
     assert run.distance[-1] < 5e-3
 
 
@@ -178,7 +180,7 @@ def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_it
 
 
 def test_in_lock_step_a_replay_gives_the_recorded_torques(paper_bags, climber_bag, replay):
-    for bag, answers in ((paper_bags[0], 590), (climber_bag, 1390)):
+    for bag, answers in ((paper_bags[0], 390), (climber_bag, 690)):
         numbers = replay(bag, "--fail-above", "1e-9")
         odometry, torques = (set(by_stamp(bag, of, str)) for of in ("/odom", "/wheel_torques"))
         # the recorder may end between the last odometries and their answers; before there is a
@@ -206,8 +208,8 @@ def test_a_replay_that_expects_more_friction_asks_for_its_torque_until_it_has_le
     wheels = replay(paper_bags[0], "-p", more)["wheels"]
     assert wheels["difference, largest [N m]"] == pytest.approx([by_hand] * 2, rel=0.02)
     assert wheels["largest at [s]"] == [0.0, 0.0]
-    # no more in all of the 3 s than if it were wrong for 25 ms, and then right
-    assert max(wheels["difference, RMS [N m]"]) < by_hand * (0.025 / 3) ** 0.5
+    # no more in all of the 2 s than if it were wrong for 25 ms, and then right
+    assert max(wheels["difference, RMS [N m]"]) < by_hand * (0.025 / 2) ** 0.5
 
 
 def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
@@ -222,7 +224,7 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
     )
     # these sensors have no errors; the recorder may have ended between the two
     number = min(odometry.num_poses, truth.num_poses)
-    assert number >= 600
+    assert number >= 390
     for one in ("timestamps", "positions_xyz", "orientations_quat_wxyz"):
         np.testing.assert_array_equal(getattr(odometry, one)[:number], getattr(truth, one)[:number])
     run = read_run(paper_bags[0])
@@ -245,9 +247,9 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
 
 
 def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_end(world, tmp_path):
-    """At 2 s the pump's pressure is lost, with 1 s to the volume: P = 8 kPa exp(2 - t)."""
+    """The pump fails at 1 s, with 0.6 s to the volume: P = 8 kPa exp((1 - t) / 0.6)."""
     config = tmp_path / "lost.yaml"
-    lost = "initial_y: 3.0\n    pressure_loss_time: 2.0\n    suction:\n      pump_time: 1.0"
+    lost = "initial_y: 3.0\n    pressure_loss_time: 1.0\n    suction:\n      pump_time: 0.6"
     text = (CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", lost)
     config.write_text(text.replace("control_period: 0.005", "control_period: 0.01"))
     demo(world, tmp_path / "run", config, "--duration", "8")
@@ -265,11 +267,11 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
                 errors.append(status.name)
                 if "suction pressure too low" in status.message:
                     stopped.append(time)
-    # at 5 kPa, told every 0.1 s; by hand: 8 exp(2 - t) = 5
-    assert stopped[0] == pytest.approx(2.0 + np.log(8 / 5), abs=0.11)
+    # at 5 kPa, told every 0.1 s; by hand: 8 exp((1 - t) / 0.6) = 5
+    assert stopped[0] == pytest.approx(1.0 + 0.6 * np.log(8 / 5), abs=0.11)
     assert {"/uk_torque_controller", "/plant_simulator"} <= set(errors)
     # by hand: P S l/2 = m g h
-    falls = 2.0 + np.log(8000 * 0.06 * 0.125 / (5 * 9.81 * 0.05))
+    falls = 1.0 + 0.6 * np.log(8000 * 0.06 * 0.125 / (5 * 9.81 * 0.05))
     assert max(states) == pytest.approx(falls, abs=0.01)
     assert states[max(time for time in states if time < falls - 1.0)] == 0.0  # it stood by then
 
@@ -300,6 +302,7 @@ def test_climbers_in_one_time_keep_their_names_apart(world, tmp_path):
     assert len(set(ways)) == 2
 
 
+@pytest.mark.soak  # as nodes without a demo: test_faults.py; as a demo: test_processes.py
 def test_on_the_wall_clock_the_climber_stays_on_the_path(world, tmp_path):
     # The machine may be busy, and not keep to it all the time: what an idle one does is shown by
     # `make demo CLOCK=wall`

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.nodes
 
 OWN = "ros__parameters"
 PATH = {"origin_y": 3.0, "parabola.length": 0.6, "one_go.rate": 0.3}
-PERIOD = {"control_period": 0.01}
+PERIOD = {"control_period": 0.02}
 START = {"initial_x": 0.0, "initial_y": 3.0, "initial_heading": 0.0, **PERIOD}
 ELECTRIC = {"adhesion": "electroadhesion", "electroadhesion.film_pressure": 6000.0}
 SECTIONS = {  # the first climber is that of the document

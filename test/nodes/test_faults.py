@@ -73,7 +73,7 @@ class Climb:
         self.torques = world.hear(JointState, "wheel_torques")
         self.joints = world.hear(JointState, "joint_states")
         self.odometry = world.hear(Odometry, "odom")
-        self.reference = world.hear(MultiDOFJointTrajectory, "reference")
+        world.subscribe(MultiDOFJointTrajectory, "reference")  # what the plant waits for
         self.errors = world.hear(Vector3Stamped, f"{CONTROLLER}/tracking_error")
         for name in parameters:
             self.start(name)
@@ -241,7 +241,7 @@ def test_in_lock_step_a_plant_whose_time_starts_again_is_brought_to_the_path(wor
 
     def is_silent():
         before = [len(messages) for messages in heard]
-        world.executor.spin_once(timeout_sec=0.2)
+        world.spin(0.2)
         return before == [len(messages) for messages in heard]
 
     world.wait(is_silent, "silence of a plant that is dead")

@@ -37,15 +37,13 @@ class Operated(Waiting):
 
     def command(self, *words):
         """Status and output of `climber` with some arguments."""
-        program = [executable("climber"), *words]
-        with subprocess.Popen(
-            program, env=self.world.environment, stdout=subprocess.PIPE, text=True
-        ) as asked:
-            try:
-                self.world.wait(lambda: asked.poll() is not None, "an answer to a command")
-                return asked.returncode, asked.stdout.read()
-            finally:
-                asked.kill()
+        asked = self.world.start("climber", *words)
+        del self.world.processes["climber"]  # it may fail
+        try:
+            self.world.wait(lambda: asked.poll() is not None, "an answer to a command")
+            return asked.returncode, self.world.log("climber")
+        finally:
+            asked.kill()
 
     def ask(self, service):
         return self.world.call(Trigger, f"{PLANNER}/{service}", Trigger.Request())

@@ -221,7 +221,7 @@ class Answering:
     def answer_all(self):
         """The same, with what is on its way; looks are counted, as a slow machine has few."""
         for _ in range(15):
-            self.world.executor.spin_once(timeout_sec=0.02)
+            self.world.spin(0.02)
             self.answer()
         return len(self.states)
 
@@ -445,11 +445,11 @@ def test_time_does_not_run_until_the_one_that_is_waited_for_listens_to_all(world
     odometry = world.listen(Odometry, "odom")
     heard = {"joint_states": JointState, "wheel_torques": JointState}
     for topic, kind in heard.items():
-        world.node.create_subscription(kind, topic, lambda _: None, 10)
+        world.subscribe(kind, topic)
     stepped = world.call(SetBool, "plant_simulator/pause", SetBool.Request(data=False))
     assert "1.000 s" in stepped.message
     assert not odometry
-    world.node.create_subscription(MultiDOFJointTrajectory, "reference", lambda _: None, 10)
+    world.subscribe(MultiDOFJointTrajectory, "reference")
     world.wait(lambda: odometry, "first odometry")
     assert reading.nanoseconds(odometry[0].header.stamp) == SECOND
     assert "test listens" in world.log("plant_simulator")

@@ -101,7 +101,8 @@ def test_a_demo_that_is_ended_leaves_no_process_and_a_complete_bag(
     world, start, tmp_path, end, by_another
 ):
     command = [executable("run_demo"), *DEMO, tmp_path / "run"]
-    process = start(*PARENT, *command, "--with-parent") if by_another else start(*command)
+    of_another, alone = [*PARENT, *command, "--with-parent"], [*command, "--clock", "wall"]
+    process = start(*(of_another if by_another else alone))
     is_under_way(process)
     family = descendants(process.pid)
     assert len(family) == 4 + by_another
@@ -204,9 +205,10 @@ def test_check_driver_ends_in_words(world, start, number):
 
 
 def test_a_run_of_a_campaign_again_ends_with_its_demo(world, start, tmp_path):
-    process = start(
-        *(executable("campaign"), CONFIG / "campaign.yaml", "--rerun", "1", "-o", tmp_path / "run")
-    )
+    file = tmp_path / "short.yaml"
+    text = (CONFIG / "campaign.yaml").read_text().replace("base: ", f"base: {CONFIG}/")
+    file.write_text(text.replace("duration: 20.0", "duration: 2.0"))
+    process = start(executable("campaign"), file, "--rerun", "1", "-o", tmp_path / "run")
     world.wait(lambda: len(descendants(process.pid)) == 5, "the demo")
     family = descendants(process.pid)
     interrupt_twice(process)

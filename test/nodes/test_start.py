@@ -3,7 +3,8 @@
 import signal
 
 import pytest
-from world import CONFIG, TIMEOUT
+from forking import Forked
+from world import CONFIG, TIMEOUT, installation
 
 pytestmark = pytest.mark.nodes
 
@@ -274,3 +275,8 @@ def test_a_signal_ends_a_node_cleanly_even_if_it_comes_twice(world, number):
     for name in NODES:
         assert world.end(name, number) == 0
         assert "Traceback" not in world.log(name)
+
+
+@pytest.mark.skipif(installation() is not None, reason="what is installed is started as it is")
+def test_what_the_tests_start_is_forked_which_takes_a_third_of_the_time(world):
+    assert isinstance(world.start_node("markers"), Forked)

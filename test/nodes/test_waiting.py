@@ -247,6 +247,6 @@ def test_what_comes_and_goes_is_said_a_few_times_only(world):
         if number % 2:
             message.pose.pose.position.x = math.nan
         odometry.publish(message)
-        world.executor.spin_once(timeout_sec=0.001)
+        world.spin(0.001)
     world.wait(lambda: len(torques) > 100, "answers")
     assert len(world.log(CONTROLLER).splitlines()) <= 20

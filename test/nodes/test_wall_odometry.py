@@ -160,7 +160,7 @@ def test_on_a_floor_it_says_what_it_waits_for(world):
 def test_the_climber_of_field_yaml_follows_its_path_by_what_its_sensors_tell(world, tmp_path):
     """In lock-step, through all nodes: true distances beside those that it believes."""
     run = tmp_path / "run"
-    arguments = "--config", CONFIG / "field.yaml", "--output", run, "--duration", "5"
+    arguments = "--config", CONFIG / "field.yaml", "--output", run, "--duration", "3.5"
     world.run("run_demo", *command("run_demo"), *arguments)
     demo = world.processes["run_demo"]
     world.wait(lambda: demo.poll() is not None, "end of the run")

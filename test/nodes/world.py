@@ -13,12 +13,13 @@ import rclpy
 from ament_index_python import PackageNotFoundError, get_package_prefix
 from forking import PROGRAMS, Forked
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 from climber_uk.ros.transport import reserved
 
-DOMAIN = {"ROS_DOMAIN_ID": ""}
+OWN = {"ROS_DOMAIN_ID": "", "PYTEST_CURRENT_TEST": ""}  # other at each start
+USUAL = {**os.environ, **OWN}  # that of the server that forks, as no test has changed it yet
 OPTION = {False: "-p", True: "-r"}
 TIMEOUT = 120.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
@@ -84,7 +85,11 @@ def command(name):
 
 
 class World:
-    """One ROS domain with the processes started in it, and a node of the test's own."""
+    """One ROS domain with the processes started in it, and two nodes of the test's own.
+
+    `node` speaks and calls, and has its callbacks executed. `ears` only listens: an executor that
+    woke for each message of each topic would cost more than the nodes that are tested.
+    """
 
     def __init__(self, directory):
         self.domain, self.mark = reserved_domain()
@@ -93,14 +98,16 @@ class World:
         self.processes = {}
         self.context = Context()
         rclpy.init(context=self.context, domain_id=self.domain)
-        self.node = Node("test", context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        how = {"context": self.context, "start_parameter_services": False}
+        self.node, self.ears = Node("test_speaks", **how), Node("test", **how)
+        self.heard = []
+        self.executor = EventsExecutor(context=self.context)
         self.executor.add_node(self.node)
 
     def start(self, name, *arguments):
         """Start an executable of the package; its output is `log(name)`."""
-        is_as_here = {**self.environment, **DOMAIN} == {**os.environ, **DOMAIN}
-        if name not in PROGRAMS or not is_as_here or installation():
+        is_usual = {**self.environment, **OWN} == USUAL
+        if name not in PROGRAMS or not is_usual or installation():
             return self.run(name, *command(name), *arguments)
         self.log_file(name).write_text("")
         self.processes[name] = Forked(name, arguments, self.log_file(name), self.domain)
@@ -136,7 +143,7 @@ class World:
         """Spin until `condition()` holds, and return what it gave."""
         deadline = time.monotonic() + TIMEOUT
         while not (value := condition()):
-            self.executor.spin_once(timeout_sec=0.02)
+            self.spin()
             for name, process in self.processes.items():
                 assert process.poll() in (None, 0), f"{name} failed:\n{self.log(name)}"
             if time.monotonic() > deadline:
@@ -144,20 +151,21 @@ class World:
                 raise AssertionError(f"no {what} within {TIMEOUT} s\n{logs}")
         return value
 
-    def hear(self, kind, topic, depth=1000):
-        """List that fills with the messages of a topic.
-
-        All that have come are taken at once: the executor takes ten times as long for each.
-        """
-        received = []
-
-        def take(message):
-            received.append(message)
+    def spin(self, longest=0.01):
+        """Wait [s] for a callback of `node`, and take the messages that are heard."""
+        self.executor.spin_once(timeout_sec=longest)
+        for subscription, received in self.heard:
             with subscription.handle:
-                while found := subscription.handle.take_message(kind, False):
+                while found := subscription.handle.take_message(subscription.msg_type, False):
                     received.append(found[0])
 
-        subscription = self.node.create_subscription(kind, topic, take, depth)
+    def subscribe(self, kind, topic, depth=1000):
+        """Subscription, for those who look whether there is one; nothing is taken from it."""
+        return self.ears.create_subscription(kind, topic, print, depth)
+
+    def hear(self, kind, topic, depth=1000):
+        """List that fills with the messages of a topic."""
+        self.heard.append((self.subscribe(kind, topic, depth), received := []))
         return received
 
     def listen(self, kind, topic):
@@ -204,5 +212,6 @@ class World:
                 os.kill(number, signal.SIGKILL)
         self.executor.shutdown()
         self.node.destroy_node()
+        self.ears.destroy_node()
         self.context.try_shutdown()
         self.mark.close()

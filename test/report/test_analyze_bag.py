@@ -14,7 +14,7 @@ from made_bag import a_run, write
 
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.topics import Topics
-from climber_uk.report import analyze_bag, compare_bags
+from climber_uk.report import analyze_bag, compare_bags, figures
 from climber_uk.report.cards import WIDTH, verdict
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import METRICS, Case
@@ -52,6 +52,15 @@ def run(monkeypatch, capsys, tmp_path):
         return ended.value.code, said.out.splitlines(), said.err.splitlines()
 
     return run
+
+
+@pytest.fixture
+def few_figures(monkeypatch):
+    """Those of curves over time take longest."""
+    monkeypatch.setattr(figures, "CURVES", {})
+
+
+few = pytest.mark.usefixtures("few_figures")
 
 
 class Page(HTMLParser):
@@ -116,6 +125,7 @@ def test_a_condition_says_what_failed(bags, condition, failure):
     assert said == (failure and f"a: {failure}")
 
 
+@few
 def test_a_condition_that_holds_sets_the_exit_status(bags, run):
     conditions = "--fail-if", "duration<0", "--fail-if", "rms_along_track>0.003"
     status, _, err = run(bags / "first", *conditions)
@@ -148,6 +158,7 @@ def test_a_bag_that_cannot_be_read_is_one_line(bags, run, name):
     assert str(bags / name) in err[0]
 
 
+@few
 def test_what_was_lost_is_said_and_the_rest_is_told(bags, run, tmp_path):
     data = (bags / "first" / "first_0.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[:-40])
@@ -160,6 +171,7 @@ def test_what_was_lost_is_said_and_the_rest_is_told(bags, run, tmp_path):
     assert "cut off" in (tmp_path / "out" / "report.html").read_text()
 
 
+@few
 def test_parameters_come_from_the_file_of_the_nodes(bags, run, tmp_path):
     (tmp_path / "nodes.yaml").write_text(
         "/**/uk_torque_controller:\n  ros__parameters:\n    max_wheel_torque: 1.0\n"
@@ -178,6 +190,7 @@ def test_bags_are_compared_side_by_side_with_ratios(bags, run, tmp_path):
     assert "second / first" in page
 
 
+@few
 @pytest.mark.parametrize("name", ["=1+1", pytest.param("@x", marks=pytest.mark.soak)])
 def test_no_name_becomes_a_formula_in_a_spreadsheet_and_numbers_stay_numbers(run, tmp_path, name):
     made = a_run(200, torques=lambda time, _: np.full((len(time), 2), -2.0))
@@ -198,6 +211,7 @@ def test_what_begins_like_a_formula_is_marked_as_text(name):
     assert plain("a" + name) == "a" + name
 
 
+@few
 def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_path):
     made = a_run(200)
     made.add_truth(made.pose + np.array([0.3, 0, 0]))
@@ -238,6 +252,7 @@ def test_the_verdict_says_what_became_of_the_run(bags, change, sentence):
     assert sentence in verdict(column)
 
 
+@few
 def test_at_a_glance_each_side_and_what_nodes_warned_of_are_in_few_lines(bags, run, tmp_path):
     status, out, err = run(bags / "first")
     assert (status, err) == (0, [])

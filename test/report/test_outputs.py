@@ -9,7 +9,7 @@ from test_restarts import at_once, two_runs
 
 from climber_uk.identification import identify
 from climber_uk.replay import replay_controller
-from climber_uk.report import analyze_bag, compare_bags, export_tum
+from climber_uk.report import analyze_bag, compare_bags, export_tum, figures
 from climber_uk.report.outputs import output
 from climber_uk.system.command_line import printable
 
@@ -28,6 +28,12 @@ def by_name(tool):
 
 each_tool = pytest.mark.parametrize("tool", TOOLS, ids=by_name)
 each_reader = pytest.mark.parametrize("tool", [*TOOLS, identify], ids=by_name)
+
+
+@pytest.fixture(autouse=True)
+def few_figures(monkeypatch):
+    """Those of curves over time take longest; test_analyze_bag.py has them all."""
+    monkeypatch.setattr(figures, "CURVES", {})
 
 
 @pytest.fixture

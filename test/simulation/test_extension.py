@@ -22,7 +22,7 @@ def end_of(law, slip):
     """Where a climber comes to, from rest, with torques that swing."""
     plant, state = Plant(Climber(), 0.0025, Contact(friction=law), slip=slip), None
     state = State(np.array([0.0, 1.0, 0.3]), np.zeros(3))
-    for number in range(200):
+    for number in range(90):
         pull = 2.0 * np.sin(0.05 * number)
         state = plant.advance(state, np.array([pull, 0.9 * pull + 0.1]), 1)
     return np.concatenate([state.pose, state.velocity, getattr(state, "deflection", [])])

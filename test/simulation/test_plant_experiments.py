@@ -38,9 +38,10 @@ def test_viscous_friction_follows_the_spring_without_stick_slip():
 
 
 def test_lugres_first_slip_is_that_of_the_published_equations():
-    ours = pulled(PUBLISHED, spring(), 10.0, 2e-3)
-    theirs = published(spring(), 10.0, ours.time)
-    assert ours.x[-1] > 0.5  # it has slipped
+    stiff = spring(8.0)
+    ours = pulled(PUBLISHED, stiff, 2.6, 2e-3)
+    theirs = published(stiff, 2.6, ours.time)
+    assert ours.x[-1] > 0.1  # it has slipped
     assert np.abs(ours.x - theirs.x).max() < 1e-5
 
 
