@@ -87,7 +87,7 @@ class Braking(NamedTuple):
 
     drive: float  # [1/s]
     yaw: float  # [1/s]
-    carries: bool = True  # whether the weight is carried
+    carries: float = 1.0  # share of the weight; -1 by motors that turn the wrong way round
     shaking: tuple[float, float] = (0.0, 0.0)  # [m/s²] beside that: of the speed, of a rim by yaw
 
 
@@ -294,7 +294,7 @@ class ControlLaw:
     def braking(self, situation: ControlInput, braking: Braking) -> Torques:
         """Torques that carry the weight and brake what moves."""
         climber, motion = self.climber, situation.motion
-        weight = self.weight(motion) if braking.carries else 0.0
+        weight = braking.carries * self.weight(motion)
         shaken, shaken_yaw = braking.shaking
         force = weight + climber.driven_mass * (shaken - braking.drive * motion.speed)
         turning = shaken_yaw / climber.half_track - braking.yaw * motion.yaw_rate

@@ -32,11 +32,14 @@ class SafeOutput:
         """Forget since when it brakes, or coasts."""
         self.end()
         self._coasts_until = 0  # [ns]
+        self._way = 1  # -1 if the speed was known last to go against its torques
 
     def end(self) -> None:
         """Something is followed again."""
         self._braked: tuple[int, float] | None = None  # [ns] begin of the safe output, rim speed
         self._doubted: int | None = None  # [ns] since when speeds are in doubt
+        self._coasts_from = 0.0  # [m/s] of a rim
+        self._is_carried = True  # the weight, as it coasts
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -44,6 +47,7 @@ class SafeOutput:
         if observed is not None:
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
+            self._way = self.polarities.drive.sign or self._way
             return
         self.polarities.restart()
         pose = motion._replace(
@@ -59,13 +63,16 @@ class SafeOutput:
         motion, climber, safety = estimator.motion, law.climber, self.safety
         if motion is None or safety.safe_output != "hold":
             return _let_go(estimator, age)
-        if stamp < self._coasts_until:
-            return _coast(mode, estimator, law, age)
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
+        if stamp < self._coasts_until:
+            if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
+                self._is_carried = False
+            return self._coast(mode, estimator, law, age)
         begin, before = self._braked = self._braked or (stamp, rim)
         if stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
-            return _coast(mode, estimator, law, age)
+            self._coasts_from = rim
+            return self._coast(mode, estimator, law, age)
         try:
             if not mode.doubts_odometry:
                 self._doubted = None
@@ -79,6 +86,17 @@ class SafeOutput:
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
+
+    def _coast(self, mode: Mode, estimator: Estimator, law: ControlLaw, age: float) -> Torques:
+        """Torques that brake nothing, and carry the weight: where no seal holds it, or less of it.
+
+        Where odometry is in doubt, its heading may be wrong, and a seal that holds is trusted; so
+        it is where the climber goes ever faster that way.
+        """
+        if not law.falls and (mode.doubts_odometry or not self._is_carried):
+            return _let_go(estimator, age)
+        way = self._way if mode.is_fault and not mode.doubts_odometry else 1
+        return _brake(estimator, law, age, Braking(0.0, 0.0, way), None)
 
     def _believed(self, mode: Mode, motion: Motion) -> tuple[Motion, tuple[int, int]]:
         """Motion in doubt, with those speeds that follow torques, and their signs.
@@ -106,13 +124,15 @@ class SafeOutput:
         """How to brake; `doubted` is for how long [ns] speeds are in doubt, None: they are not."""
         rate = self.safety.braking_rate
         if doubtful is None or doubted is None:
-            drive, yaw = (rate * (sign or 1) for sign in self.polarities.signs)
+            way = self._way if mode.is_fault else 1
+            sign, yaw_sign = self.polarities.signs
+            drive, yaw = rate * (sign or way), rate * (yaw_sign or 1)
             # the other wheel can brake a turn, while the seal holds what it drives
             holds = not law.falls
             if mode is Mode.DEAD_WHEEL and holds:
-                return Braking(0.0, yaw, carries=False)
+                return Braking(0.0, yaw, carries=0.0)
             # nobody knows its heading where odometry is stuck
-            return Braking(drive, yaw, carries=not (mode is Mode.STALLED and holds))
+            return Braking(drive, yaw, 0.0 if mode is Mode.STALLED and holds else way)
         if law.falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
             doubtful = doubtful[0] or 1, doubtful[1] or 1
         rims = motion.speed, law.climber.half_track * motion.yaw_rate
@@ -133,16 +153,6 @@ def _shaking(doubted: int) -> float:
 def _let_go(estimator: Estimator, age: float) -> Torques:
     estimator.sent(estimator.begin(age), NO_TORQUES)
     return NO_TORQUES
-
-
-def _coast(mode: Mode, estimator: Estimator, law: ControlLaw, age: float) -> Torques:
-    """Torques that brake nothing, and carry the weight: where no seal holds it, or less of it.
-
-    Where odometry is in doubt, its heading may be wrong, and a seal that holds is trusted.
-    """
-    if mode.doubts_odometry and not law.falls:
-        return _let_go(estimator, age)
-    return _brake(estimator, law, age, Braking(0.0, 0.0), None)
 
 
 def _brake(
