@@ -232,7 +232,7 @@ def test_a_summary_of_waypoints_has_the_sizes_of_its_path(folder):
 
 
 def test_more_sharp_corners_than_can_be_looked_at_are_refused(folder):
-    corners = np.arange(9_000)
+    corners = np.arange(14_000)
     lanes = np.c_[corners // 2 % 2, 0.1 * ((corners + 1) // 2)]
     with pytest.raises(ValueError, match=r"points.txt': too many bends: .* 8000 sharp corners"):
         made(folder, lanes).at_rate(RATE)

@@ -37,9 +37,9 @@ class Lockstep:
     def __init__(self, world):
         self.world, self.step = world, 0
         # its poses are not where its twist leads: that would be learnt as a side slip; and it obeys
-        # no torque, which no disturbance explains
-        free = "observer.side_slip_bandwidth:=0.0", "guard.max_disturbance:=0.0"
-        world.start_node(NAME, "use_sim_time:=true", *free)
+        # no torque, which no disturbance explains, nor a motor
+        free = "guard.max_disturbance:=0.0", "guard.response_time:=0.0"
+        world.start_node(NAME, "use_sim_time:=true", "observer.side_slip_bandwidth:=0.0", *free)
         self.torques = world.listen(JointState, "wheel_torques")
         self.odometry = world.speak(Odometry, "odom")
         self.clock = world.speak(Clock, "/clock")

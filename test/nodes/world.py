@@ -18,8 +18,16 @@ from rclpy.node import Node
 
 from climber_uk.ros.transport import reserved
 
-OWN = {"ROS_DOMAIN_ID": "", "PYTEST_CURRENT_TEST": ""}  # other at each start
-USUAL = {**os.environ, **OWN}  # that of the server that forks, as no test has changed it yet
+HEEDED = "AMENT", "FAST", "LD_", "PATH", "PYTHON", "RCUTILS", "RMW", "ROS"  # by programs
+
+
+def heeded(environment):
+    """What programs heed of an environment, but for the domain, which is other at each start."""
+    names = (name for name in environment if name.startswith(HEEDED) and name != "ROS_DOMAIN_ID")
+    return {name: environment[name] for name in names}
+
+
+USUAL = heeded(os.environ)  # that of the server that forks, as no test has changed it yet
 OPTION = {False: "-p", True: "-r"}
 TIMEOUT = 120.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
@@ -106,7 +114,7 @@ class World:
 
     def start(self, name, *arguments):
         """Start an executable of the package; its output is `log(name)`."""
-        is_usual = {**self.environment, **OWN} == USUAL
+        is_usual = heeded(self.environment) == USUAL
         if name not in PROGRAMS or not is_usual or installation():
             return self.run(name, *command(name), *arguments)
         self.log_file(name).write_text("")
