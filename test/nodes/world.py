@@ -18,7 +18,7 @@ from rclpy.node import Node
 
 from climber_uk.ros.transport import reserved
 
-HEEDED = "AMENT", "FAST", "LD_", "PATH", "PYTHON", "RCUTILS", "RMW", "ROS"  # by programs
+HEEDED = "AMENT", "FAST", "LD_", "PATH", "PYTHONPATH", "RCUTILS", "RMW", "ROS"  # by programs
 
 
 def heeded(environment):
