@@ -71,7 +71,7 @@ class SafeOutput:
         begin, before = self._braked = self._braked or (stamp, rim)
         if stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
-            self._coasts_from = rim
+            self._coasts_from, self._way = rim, 1  # a push looks like motors the wrong way round
             return self._coast(mode, estimator, law, age)
         try:
             if not mode.doubts_odometry:
