@@ -11,7 +11,8 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import NO_TORQUES, Motion, Torques
 
 BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
-PUSHED = 0.05  # [m/s] by which it may be faster than before; if it is, something pushes it:
+PUSHED = 0.05  # [m/s] by which it may be faster than before, and
+DRIVEN = 0.2  # than it was braked to; if it is, something pushes it:
 COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
 # what moves, but in doubt and with a polarity that nobody knows, is shaken a little to find it out
 SHAKEN = 0.02  # [m/s] of a rim, above which it is
@@ -36,7 +37,8 @@ class SafeOutput:
 
     def end(self) -> None:
         """Something is followed again."""
-        self._braked: tuple[int, float] | None = None  # [ns] begin of the safe output, rim speed
+        # begin of the safe output [ns], and a rim's speed then, and the lowest since
+        self._braked: tuple[int, float, float] | None = None
         self._doubted: int | None = None  # [ns] since when speeds are in doubt
         self._coasts_from = 0.0  # [m/s] of a rim
         self._is_carried = True  # the weight, as it coasts
@@ -68,8 +70,10 @@ class SafeOutput:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
                 self._is_carried = False
             return self._coast(mode, estimator, law, age)
-        begin, before = self._braked = self._braked or (stamp, rim)
-        if stamp - begin > BRAKING * SECOND and rim > before + PUSHED:
+        begin, before, lowest = self._braked or (stamp, rim, rim)
+        self._braked = begin, before, min(lowest, rim)
+        is_pushed = rim > before + PUSHED or rim > lowest + DRIVEN
+        if stamp - begin > BRAKING * SECOND and is_pushed:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
             self._coasts_from, self._way = rim, 1  # a push looks like motors the wrong way round
             return self._coast(mode, estimator, law, age)
