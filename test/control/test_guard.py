@@ -129,7 +129,7 @@ def test_motors_that_are_too_weak_stall_safely_and_give_up_after_some_attempts()
 def test_a_push_is_ridden_out_and_the_path_goes_on_where_it_was_left(turned):
     climb = deepcopy(healthy(False, 7.0))
     active = climb.state.heading + turned
-    climb.run(0.25, push=150.0 * np.array([np.cos(active), np.sin(active), 0.02]))
+    climb.run(0.3, push=150.0 * np.array([np.cos(active), np.sin(active), 0.02]))
     climb.run(3.0)
     for _ in range(10):
         if climb.follows():
