@@ -165,7 +165,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="runs of each row (default: 3)")
     parser.add_argument("--only", default="", help="rows whose name and path contain this")
-    parser.add_argument("--truth", action="store_true", help="tell it the controller")
+    parser.add_argument("--truth", action="store_true", help="the controller gets the true motion")
     parser.add_argument("--slip", action="store_true", help="how four wheels slip")
     options = parser.parse_args()
     if options.slip:

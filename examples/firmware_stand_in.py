@@ -29,6 +29,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.messages import writing
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.ros import plant_parts
+from climber_uk.ros.leaving import leave
 from climber_uk.ros.plant_time import ASK_AGAIN, TICK
 from climber_uk.ros.running import ClimberNode, Throttle
 from climber_uk.ros.transport import use_udp
@@ -163,16 +164,19 @@ def main() -> None:
     end = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: end.set())
+    board, status = None, 1
     try:
         use_udp()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        FirmwareStandIn().run(end)
+        board = FirmwareStandIn()
+        board.run(end)
+        status = 0
     except (ValueError, OSError, RCLError) as error:
-        sys.exit(f"firmware_stand_in: {error}")
+        print(f"firmware_stand_in: {error}", file=sys.stderr)
     except FellOff as fall:
-        sys.exit(f"firmware_stand_in: the climber fell off: {fall}")
-    finally:
-        rclpy.try_shutdown()
+        print(f"firmware_stand_in: the climber fell off: {fall}", file=sys.stderr)
+    leave(status, board)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

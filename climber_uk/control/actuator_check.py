@@ -21,7 +21,8 @@ WENT, GOES, STANDS = 0.05, 0.01, 1e-3  # [m/s] of a rim: before, of the other on
 ASKED = 0.02  # [m/s] of a rim that is not to stand: of one that turns back all tell a little else
 # odometry messages for which a rim stands that went before; that is asked to go, and never did
 STANDS_AT_ONCE, STANDS_ON = 3, 10
-NEITHER, SILENT = "neither", 0.05  # [s] for which both do not answer
+NEITHER = "neither"  # name of both wheels, where
+SILENT = 0.05  # [s] they have not answered for more than that
 EXCITED = 0.12  # of the largest torque: its standard deviation that shows if a wheel answers
 
 

@@ -97,7 +97,8 @@ class DelayCheck:
         if time < WINDOW - TICK:
             self._first = before
             return None
-        is_known = self._begin - LONGEST_DELAY >= self._until[0]  # what was asked for by then
+        # what was asked for by the delays that may be learnt; before, nothing counts as asked for
+        is_known = self._begin - LONGEST_DELAY >= self._until[0]
         drives, yaws = self._asked(time)
         self._first, self._begin, new = None, self._time, 1 - math.exp(-time / MEMORY)
         if not is_known:

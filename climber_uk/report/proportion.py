@@ -1,17 +1,9 @@
 """The probability of an event, by how often it happened."""
 
-import math
-from statistics import NormalDist
-
-Z = NormalDist().inv_cdf(0.975)
-
 
 def wilson(count: int, number: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a probability, of `count` events in `number` trials.
+    """Wilson's 95 % interval of a probability, of `count` events in `number` trials."""
+    from scipy.stats import binomtest  # slow to import
 
-    As `scipy.stats.binomtest` has it, which takes a second to import.
-    """
-    share, more = count / number, Z**2 / number
-    middle = share + more / 2
-    half = math.sqrt(more * (share * (1 - share) + more / 4))
-    return max((middle - half) / (1 + more), 0.0), min((middle + half) / (1 + more), 1.0)
+    interval = binomtest(count, number).proportion_ci(confidence_level=0.95, method="wilson")
+    return float(interval.low), float(interval.high)

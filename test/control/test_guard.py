@@ -47,21 +47,24 @@ def dead(side, since):
     "since", [0.0, pytest.param(2.0, marks=soak), pytest.param(4.0, marks=soak)]
 )
 @pytest.mark.parametrize(
-    ("signs", "scrubs", "parameters"),
+    ("wiring", "scrubs", "parameters"),
     [
-        pytest.param((-1, -1), False, {}, id="both"),
-        pytest.param((1, -1), False, {}, id="left"),
-        pytest.param((-1, 1), False, {}, id="right", marks=soak),
-        pytest.param((-1, -1), True, {}, id="both, tracks", marks=soak),
-        pytest.param((1, -1), True, {}, id="left, tracks", marks=soak),
-        pytest.param((-1, 1), True, {}, id="right, tracks", marks=soak),
-        pytest.param((-1, -1), False, {"adhesion": "none"}, id="both, nothing rubs"),
+        pytest.param(-np.eye(2), False, {}, id="both"),
+        pytest.param(np.diag([1, -1]), False, {}, id="left"),
+        pytest.param(np.diag([-1, 1]), False, {}, id="right", marks=soak),
+        pytest.param(np.eye(2)[::-1], False, {}, id="swapped", marks=soak),
+        pytest.param(-np.eye(2)[::-1], False, {}, id="both, swapped", marks=soak),
+        pytest.param(-np.eye(2), True, {}, id="both, tracks", marks=soak),
+        pytest.param(np.diag([1, -1]), True, {}, id="left, tracks", marks=soak),
+        pytest.param(np.diag([-1, 1]), True, {}, id="right, tracks", marks=soak),
+        pytest.param(np.eye(2)[::-1], True, {}, id="swapped, tracks", marks=soak),
+        pytest.param(-np.eye(2), False, {"adhesion": "none"}, id="both, nothing rubs"),
     ],
 )
-def test_motors_that_turn_the_wrong_way_round_do_not_run_away(signs, scrubs, parameters, since):
+def test_motors_that_turn_the_wrong_way_round_do_not_run_away(wiring, scrubs, parameters, since):
     """Neither by the brake of the safe output, nor by the weight that it carries."""
     climb = Climb(scrubs=scrubs, **parameters).run(since)
-    climb.run(3.0, motors=lambda _, torques: np.array(signs) * torques)
+    climb.run(3.0, motors=lambda _, torques: wiring @ torques)
     assert climb.controller.guard.faults
     assert climb.fastest(since) < 0.6
 
