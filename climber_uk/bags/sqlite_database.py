@@ -10,7 +10,7 @@ import re
 import shutil
 import sqlite3
 from collections.abc import Callable, Collection
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from time import monotonic
 from urllib.parse import quote_from_bytes
@@ -45,19 +45,18 @@ class Patience:
 
 def open_database(path: Path, patience: Patience) -> sqlite3.Connection:
     """Open a database for nothing but to select from its tables; raises `sqlite3.Error`."""
-    database = _connect(path, "mode=ro&immutable=1", patience)
-    database.text_factory = lambda text: text.decode("utf-8", "replace")
-    database.set_authorizer(_authorize)
-    try:
+    with ExitStack() as stack:
+        database = stack.enter_context(closing(_connect(path, "mode=ro&immutable=1")))
+        _restrict(database, patience)
+        database.text_factory = lambda text: text.decode("utf-8", "replace")
+        database.set_authorizer(_authorize)
         definitions = database.execute(
             f"SELECT sql FROM sqlite_master WHERE typeof(sql) = 'text' LIMIT {MOST_DEFINITIONS}"
         ).fetchall()
         for (sql,) in definitions:
             if not PLAIN.match(sql):
                 raise sqlite3.DatabaseError(f"it defines more than tables: {sql:.40}")
-    except BaseException:
-        database.close()
-        raise
+        stack.pop_all()  # it stays open
     return database
 
 
@@ -84,7 +83,8 @@ def recovered(path: Path, scratch: Path, lose: Callable[[str], None]) -> Path:
         shutil.copyfile(file, target)
         with target.open("ab") as journal:  # its end may name another file, which SQLite removes
             journal.write(bytes(NOTHING))
-    with suppress(sqlite3.Error), closing(_connect(copy, "mode=rw", Patience())) as database:
+    with suppress(sqlite3.Error), closing(_connect(copy, "mode=rw")) as database:
+        _restrict(database, Patience())
         database.execute("PRAGMA journal_mode = DELETE").fetchall()
         database.execute("SELECT count(*) FROM sqlite_master").fetchall()
     lose(f"its recorder was killed, read together with {left[0].name}")
@@ -103,9 +103,12 @@ def stated_size(path: Path) -> int:
     return (65536 if page_size == 1 else page_size) * int.from_bytes(header[28:32])
 
 
-def _connect(path: Path, how: str, patience: Patience) -> sqlite3.Connection:
+def _connect(path: Path, how: str) -> sqlite3.Connection:
     uri = f"file:{quote_from_bytes(bytes(path.absolute()))}?{how}"
-    database = sqlite3.connect(uri, uri=True, isolation_level=None)
+    return sqlite3.connect(uri, uri=True, isolation_level=None)
+
+
+def _restrict(database: sqlite3.Connection, patience: Patience) -> None:
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE + LARGEST_SQL)
     database.setlimit(sqlite3.SQLITE_LIMIT_SQL_LENGTH, LARGEST_SQL)
     database.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
@@ -117,7 +120,6 @@ def _connect(path: Path, how: str, patience: Patience) -> sqlite3.Connection:
         "writable_schema = ON",  # else one with missing pages does not open
     ):
         database.execute(f"PRAGMA {pragma}")
-    return database
 
 
 def _authorize(
