@@ -109,7 +109,8 @@ class ForceBudget:
         before, after, time = observed.before, observed.after, observed.time
         push = _push(climber, observed.torques, _weight(climber, observed))
         holds = self._holds(climber)
-        is_late = self._rests and self.pushes > 0 and _ends(climber, push, holds)
+        # a pose that a fix corrects moves as well, but no twist tells it
+        is_late = self._creeps and self._rests and self.pushes > 0 and _ends(climber, push, holds)
         if self._rests:
             self._rests, self.paused, self._slid, self.pushes = False, None, 0.0, self.pushes // 2
         self._slid += time

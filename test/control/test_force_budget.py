@@ -127,6 +127,20 @@ def given(budget, law, force, moment):
     return law.climber.wrench(*budget.within(asked, law, ahead, []).wheels)
 
 
+@pytest.mark.parametrize(("speed", "troubles"), [(0.02, [Mode.LATE]), (0.002, [])])
+def test_what_moves_after_a_push_is_late_if_its_twist_tells_so_and_not_where_a_fix_corrects_it(
+    speed, troubles
+):
+    law, budget = Climb().controller._law, ForceBudget()
+    moved = RESTS._replace(x=1e-4, speed=speed)
+    for force, after, times in ((150.0, RESTS, 10), (0.0, RESTS, 60), (0.0, moved, 1)):
+        acted = [(law.climber.torques(force, 0.0), PERIOD)]
+        for _ in range(times):
+            observed = Observed(RESTS, after, PERIOD, acted, Wrench(0.0, 0.0), 0.01)
+            trouble = budget.see(law.climber, observed, 0.1, 0.2)
+    assert [it[0] for it in (trouble,) if it] == troubles
+
+
 @pytest.mark.parametrize("met", [0.0, 30.0])
 @pytest.mark.parametrize("back", [0, 20])
 def test_a_turn_is_given_on_trust_what_turns_have_met_and_a_fifth_more(met, back):
