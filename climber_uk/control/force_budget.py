@@ -155,7 +155,9 @@ class ForceBudget:
             return None
         _, moment = climber.wrench(*observed.torques)
         holds = BREAKS_LOOSE * self._scrubs
-        self.turn = _rolled(self.turn, moment, holds, time * _rims(climber))
+        told = climber.half_track * after.yaw_rate
+        rolled = _rolled(self.turn, moment, holds, time * _rims(climber))
+        self.turn = told if self._turns else rolled
         self._astray += 0.0 if self._turns else abs(self.turn) / climber.half_track * time
         if self.paused is not None:
             self.paused += time
@@ -225,6 +227,8 @@ class ForceBudget:
         """A moment [N m], or what of it is given while no turn is told: none in a pause."""
         if self.paused is not None:
             return 0.0
+        if self._turns:  # as it is told
+            return moment
         holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
         lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
         return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))
