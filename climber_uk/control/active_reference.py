@@ -250,6 +250,13 @@ class ActiveReference:
         if self.way is None and target.progress.time is not None:
             self._position = target.progress.at(target.progress.time)
 
+    def wait(self, target: Target) -> None:
+        """Stand still on what is followed, until the time [ns] of a target."""
+        before, time = self.progress.time, target.progress.time
+        if before is not None and time is not None:
+            waited = self.progress.waited + time - before
+            self.progress = self.progress._replace(time=time, waited=waited)
+
     # Beginning, and going on after a pause
 
     def _first_position(self, time: int) -> int:

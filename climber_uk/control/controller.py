@@ -37,6 +37,8 @@ from climber_uk.mechanics.quantities import Motion, Speeds, Torques
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
 CLOCK_STEP = round(0.2 * SECOND)  # [ns] back, from which time has started anew
+LONGEST_SILENCE = SECOND  # [ns] by which odometry that was silent so long may be late at most
+PATIENCE = 3.0  # periods of silence, or `LONGEST_STEP`, after which no torque is held on
 SELDOM = 0.8  # of the timeout from one odometry to the next: the least delay would exceed it
 RETUNING_TIME = 0.5  # [s] in which changed gains come to act
 FOLLOWING, APPROACHING, WAITING = Mode.FOLLOWING, Mode.APPROACHING, Mode.WAITING
@@ -103,6 +105,7 @@ class Controller:
         self._trouble: Trouble | None = None  # with that odometry
         self._stamp = 0  # [ns] of the last good one
         self._now = 0  # [ns] of the last look at the clock
+        self._resumes = 0  # [ns] stamp from which on odometry that was silent is believed
         self._unsettled = 0  # odometry messages until a jump is forgiven
         self._twist, self.encoders = TwistCheck(), EncoderCheck()
         self._without_twist = ""  # field of the twist that is zero while the pose goes
@@ -183,9 +186,11 @@ class Controller:
         if now > 0:
             self.ages.add(now, off)
         if stamp != self._stamp:
-            if self._stamp and abs(stamp - self._stamp) > round(timeout * SECOND):
+            silent = abs(stamp - self._stamp)
+            if self._stamp and silent > round(timeout * SECOND):
                 self.estimator.reset()
                 self._watch_anew()
+                self._resumes = stamp + min(silent, LONGEST_SILENCE)
             self._trouble = self._see(stamp, motion)
             self._stamp = stamp
         return self._answer(now)
@@ -219,7 +224,7 @@ class Controller:
         if self._heard is not None:
             self._heard = min(self._heard, now)
         # stamps of before the step are no newer ones
-        self._stamp, self._waiting_since = 0, None
+        self._stamp, self._resumes, self._waiting_since = 0, 0, None
         self._forget_when()
         self.estimator.restart()
         if back > CLOCK_STEP:
@@ -358,8 +363,12 @@ class Controller:
             return Mode.NO_CLOCK, ""
         if self._heard is None:
             return Mode.WAITING, ""
-        if now - self._heard > self.safety.odometry_timeout * SECOND:
+        silent, patience = (now - self._heard) / SECOND, PATIENCE * self.estimator.period
+        is_silent = silent - self.ages.least > max(LONGEST_STEP, patience)
+        if silent > self.safety.odometry_timeout or is_silent:
             return Mode.NO_ODOMETRY, ""
+        if self._stamp < self._resumes:  # what comes may be as old as it was silent
+            return Mode.NO_ODOMETRY, "until now"
         # first what doubts the odometry, as that is what a stop brakes by
         wrong = self._trouble or self.guard.trouble
         return wrong or self.stops.trouble(now) or self._unfit() or self._missing(now)
@@ -412,7 +421,7 @@ class Controller:
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
-        active.go_on(target)
+        (active.wait if self.guard.budget.listens else active.go_on)(target)
         if not self.board.teaches(law.climber, point):
             estimator.learnt = DisturbanceEstimate()
         wheels, fits, speeds = command.wheels, command.fits, (point.speed, command.yaw_rate)

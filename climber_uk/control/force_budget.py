@@ -24,6 +24,7 @@ STOPPED, STOPPED_PUSHES = 0.05, 1
 TRIED = 2  # pushes, from which on a climber off its path is stalled
 SPENT = 0.8  # of it, from which it is used up
 FIRST_PAUSE, PAUSE = 0.18, 0.05  # [s] from one to the next, for which nothing drives
+ECHO = 1.1  # [s] after the very first one, in which an answer comes that is late
 HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
 MOVES_NOTHING = 0.85  # of it, up to which a push surely has ended
 LATE = 0.02  # [s] after a push has ended, from which on a motion that begins comes too late
@@ -45,6 +46,7 @@ class ForceBudget:
         """Know nothing of a climber."""
         self.pause()
         self.late = 0.0  # [s] by which a motion came later than its push
+        self.is_new = True  # until its first push was answered, or an answer waited for
         self.is_doubted = False  # odometry that changes, until the climber has slid for a while
         self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
         # [N m] that is turned against, of late, and what a turn is known to meet
@@ -68,6 +70,12 @@ class ForceBudget:
     def first(self) -> float:
         """Speed [m/s] that is given at first."""
         return FIRST + FIRST_SHARE * self._allowed
+
+    @property
+    def listens(self) -> bool:
+        """Whether it waits for an answer to the first push there was, however late."""
+        is_new = self.is_new and self.is_gentle
+        return self.paused is not None and self.pushes == 1 and is_new
 
     @property
     def most(self) -> float:
@@ -112,8 +120,11 @@ class ForceBudget:
         # a pose that a fix corrects moves as well, but no twist tells it
         is_late = self._creeps and self._rests and self.pushes > 0 and _ends(climber, push, holds)
         if self._rests:
+            self.is_new = False  # it has answered
             self._rests, self.paused, self._slid, self.pushes = False, None, 0.0, self.pushes // 2
         self._slid += time
+        if self._slid > KNOWN:
+            self.is_new = self.is_doubted = False
         resists = push - climber.driven_mass * (after.speed - before.speed) / time
         new = max(1 - math.exp(-time / MEMORY), time / self._slid)
         self._friction += new * (math.copysign(1.0, after.speed) * resists - self._friction)
@@ -145,13 +156,16 @@ class ForceBudget:
             return None
         _, moment = climber.wrench(*observed.torques)
         holds = BREAKS_LOOSE * self._scrubs
-        self.turn = _rolled(self.turn, moment, holds, time * _rims(climber))
+        told = climber.half_track * after.yaw_rate
+        rolled = _rolled(self.turn, moment, holds, time * _rims(climber))
+        self.turn = told if self._turns else rolled
         self._astray += 0.0 if self._turns else abs(self.turn) / climber.half_track * time
         if self.paused is not None:
             self.paused += time
             pause = FIRST_PAUSE if self.pushes == 1 else PAUSE
+            pause = ECHO if self.listens else pause
             if self.paused > pause + observed.reaction and self.speed == 0:
-                self.paused = None
+                self.is_new, self.paused = False, None
         elif abs(self.speed) > SPENT * self.most:
             self.paused, self.pushes = 0.0, self.pushes + 1
         return self.unanswered if self.pushes > self._most_pushes else None
@@ -159,9 +173,7 @@ class ForceBudget:
     @property
     def _is_told(self) -> bool:
         """Whether odometry tells what moves, so that nothing is given on trust."""
-        lives = self._lives or self._turns
-        if self.is_doubted and self._slid <= KNOWN:
-            lives = False
+        lives = self._lives and not self.is_doubted
         return self.paused is None and (lives or self._creeps)
 
     @property
@@ -216,6 +228,8 @@ class ForceBudget:
         """A moment [N m], or what of it is given while no turn is told: none in a pause."""
         if self.paused is not None:
             return 0.0
+        if self._turns:  # as it is told
+            return moment
         holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
         lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
         return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))

@@ -13,6 +13,7 @@ from climber_uk.mechanics.quantities import NO_TORQUES, Motion, Torques
 BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
 PUSHED = 0.05  # [m/s] by which it may be faster than before, and
 DRIVEN = 0.2  # than it was braked to; if it is, something pushes it:
+GENTLER, CALM = 0.5, SECOND  # times as fast it is braked after that, for [ns] without another
 COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
 # what moves, but in doubt and with a polarity that nobody knows, is shaken a little to find it out
 SHAKEN = 0.02  # [m/s] of a rim, above which it is
@@ -42,6 +43,7 @@ class SafeOutput:
         self._doubted: int | None = None  # [ns] since when speeds are in doubt
         self._coasts_from = 0.0  # [m/s] of a rim
         self._is_carried = True  # the weight, as it coasts
+        self._gently = 1.0  # share of its rate that it brakes with, less each time it is pushed
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -65,6 +67,8 @@ class SafeOutput:
         motion, climber, safety = estimator.motion, law.climber, self.safety
         if motion is None or safety.safe_output != "hold":
             return _let_go(estimator, age)
+        if mode is Mode.NO_ODOMETRY and age < safety.odometry_timeout and not law.falls:
+            return self._coast(mode, estimator, law, age)  # it comes again, and may be old
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
         if stamp < self._coasts_until:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
@@ -75,8 +79,11 @@ class SafeOutput:
         is_pushed = rim > before + PUSHED or rim > lowest + DRIVEN
         if stamp - begin > BRAKING * SECOND and is_pushed:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
+            self._gently *= GENTLER
             self._coasts_from, self._way = rim, 1  # a push looks like motors the wrong way round
             return self._coast(mode, estimator, law, age)
+        if stamp - begin > CALM:
+            self._gently = 1.0
         try:
             if not mode.doubts_odometry:
                 self._doubted = None
@@ -99,7 +106,8 @@ class SafeOutput:
         """
         if not law.falls and (mode.doubts_odometry or not self._is_carried):
             return _let_go(estimator, age)
-        way = self._way if mode.is_fault and not mode.doubts_odometry else 1
+        knows = mode.is_fault and not mode.doubts_odometry and mode is not Mode.NO_ODOMETRY
+        way = self._way if knows else 1
         return _brake(estimator, law, age, Braking(0.0, 0.0, way), None)
 
     def _believed(self, mode: Mode, motion: Motion) -> tuple[Motion, tuple[int, int]]:
@@ -126,7 +134,7 @@ class SafeOutput:
         doubted: int | None,
     ) -> Braking:
         """How to brake; `doubted` is for how long [ns] speeds are in doubt, None: they are not."""
-        rate = self.safety.braking_rate
+        rate = self._gently * self.safety.braking_rate
         if doubtful is None or doubted is None:
             way = self._way if mode.is_fault else 1
             sign, yaw_sign = self.polarities.signs

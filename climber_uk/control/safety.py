@@ -8,6 +8,7 @@ import math
 from collections import deque
 from enum import Enum
 
+from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion
@@ -138,6 +139,11 @@ class Safety:
     max_twist_error: float = parameter(
         0.05, "m", "of the way in half a second, between twist and pose, beside 30 %", above=0
     )
+
+    @property
+    def shortest(self) -> float:
+        """Time [s], the shortest after which silence of something is to be noticed."""
+        return min(self.odometry_timeout, self.reference_timeout, LONGEST_STEP)
 
     def has_jumped(self, expected: Motion, measured: Motion, half_track: float) -> bool:
         """Whether a wheel is, or will soon be, further than `max_jump` from where expected."""

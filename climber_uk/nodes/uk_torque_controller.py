@@ -124,7 +124,7 @@ class UkTorqueController(ManagedNode):
         self.parameter_values = self.publisher(ParameterEvent, private(PARAMETERS), LATCHED)
         self.publish_parameters()
         safety = self.controller.safety
-        shortest = max(min(safety.odometry_timeout, safety.reference_timeout), SHORTEST)
+        shortest = max(safety.shortest, SHORTEST)
         # on the wall clock: one in simulated time would not notice that there is no clock
         self.create_timer(shortest / 2, self.look, clock=WALL_CLOCK)
         self.start_diagnostics(self.values, alone_on=(ODOMETRY, REFERENCE, TORQUES))

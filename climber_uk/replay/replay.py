@@ -65,9 +65,8 @@ class Replay:
         self.torques: dict[int, Array] = {}  # by stamp, right, left [N m]
         self.modes: Modes = []
         self.clock = self.looked = 0  # times of the node's clock, and of the wall clock
-        safety = self.controller.safety
-        timeout = min(safety.odometry_timeout, safety.reference_timeout)
-        self.look_period = max(round(timeout / 2 * SECOND), SHORTEST_LOOK)
+        shortest = self.controller.safety.shortest
+        self.look_period = max(round(shortest / 2 * SECOND), SHORTEST_LOOK)
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:

@@ -47,7 +47,7 @@ def test_a_reference_waits_at_its_begin_for_a_controller_that_is_enabled_late(la
     climb.controller.enable(False)
     climb.run(0.5)
     climb.time += late  # of which nothing is heard
-    climb.run(0.5)
+    climb.run(1.0)  # odometry that was silent is not believed at once
     assert climb.controller.mode is Mode.DISABLED
     climb.controller.enable(True)
     begin = climb.time
@@ -109,7 +109,7 @@ def test_a_reference_that_is_not_held_back_is_kept_over_a_long_wait():
         climb.time += 1.0
         now = SECOND + round(climb.time * SECOND)
         climb.controller.on_reference(now, Preview(*(values[times] for values in told)))
-    climb.run(0.5)
+    climb.run(1.0)
     assert climb.position == stopped
     here = SECOND + round(stopped * SECOND)
     np.testing.assert_array_equal(

@@ -126,6 +126,17 @@ def test_odometry_that_stops_is_noticed_and_followed_when_it_is_back(loop):
     assert loop.answer is None
     assert loop.look(60 * MILLISECOND) is Mode.NO_ODOMETRY
     assert is_safe(loop)
+    assert loop.tell() is Mode.NO_ODOMETRY  # it may be as old as it was silent
+    assert is_safe(loop)
+    assert loop.tell(times=22) is Mode.NO_ODOMETRY
+    assert loop.tell() is Mode.FOLLOWING
+
+
+def test_odometry_that_is_silent_is_noticed_however_patient_its_timeout(loop):
+    loop.controller.safety = replace(loop.controller.safety, odometry_timeout=2.0)
+    assert loop.look(290 * MILLISECOND) is Mode.FOLLOWING
+    assert loop.look(20 * MILLISECOND) is Mode.NO_ODOMETRY
+    assert is_safe(loop)
     assert loop.tell() is Mode.FOLLOWING
 
 

@@ -15,6 +15,7 @@ from climber_uk.control.delay_check import BORNE, DELAYS, EXCITED, DelayCheck
 from climber_uk.control.observed import Observed
 from climber_uk.control.safety import Mode
 from climber_uk.control.timing import LONGEST_DELAY
+from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench
 
@@ -178,6 +179,64 @@ def test_odometry_that_is_late_where_it_stands_in_mid_course_is_learnt(delay, nu
     since = climb.time
     climb.run(2.5, odometry=every(number, Late(delay, climb.state)))
     assert_goes_on(climb, since, delay)
+
+
+LATER = [*(pytest.param(it, marks=soak) for it in (0.25, 0.3, 0.6, 1.0)), 0.4]
+
+
+@pytest.mark.parametrize(("planner", "number"), WAYS)
+@pytest.mark.parametrize("delay", LATER)
+def test_odometry_that_is_silent_and_then_as_late_stops_it(delay, number, planner):
+    """As of a buffer that fills while nothing comes; stamps tell when it arrives."""
+    climb = deepcopy(healthy(planner, number))
+    late = Late(delay, climb.state)
+    late.past += climb.states[-200:]
+
+    def resumes(time, state):
+        told = late(time, state)
+        return told if time - 4.0 >= delay - 1e-9 else None
+
+    climb.run(2 * delay + 1.5, odometry=every(number, resumes))
+    assert_never_runs_away(climb, 4.0)
+    assert climb.controller.guard.fault is not None
+    climb.run(1.0, odometry=every(number, resumes))
+    assert climb.fastest(climb.time - 0.5) < 0.1
+
+
+@pytest.mark.parametrize(("planner", "number"), WAYS)
+@pytest.mark.parametrize("delay", LATER)
+@pytest.mark.parametrize("what", ["odometry", pytest.param("motors", marks=soak)])
+def test_what_is_later_than_can_be_learnt_from_the_start_is_found_by_the_first_push(
+    what, delay, number, planner
+):
+    climb = Climb(planner=PLANNERS[planner])
+    late = Late(delay, climb.state if what == "odometry" else climb.torques)
+    seldom = every(number, late if what == "odometry" else as_it_is)
+    climb.run(delay + 0.7, odometry=seldom, **({"motors": late} if what == "motors" else {}))
+    assert climb.controller.mode is Mode.LATE
+    assert climb.fastest() < 0.1
+
+
+@pytest.mark.parametrize(("planner", "number"), WAYS)
+@pytest.mark.parametrize("gap", [0.5, pytest.param(1.0, marks=soak), pytest.param(1.9, marks=soak)])
+def test_odometry_in_bursts_drives_nothing_however_patient_its_timeout(gap, number, planner):
+    climb = Climb(planner=PLANNERS[planner], odometry_timeout=2.0)
+    climb.run(2.0, odometry=every(number, as_it_is))
+    held, calls = [], count()
+
+    def bursts(time, state):
+        if next(calls) % number == 0:
+            held.append((SECOND + round(time * SECOND), state))
+        if (time - 2.0) % (gap + 0.5) < gap - 1e-9:
+            return None
+        for stamp, each in held[:-1]:
+            climb.controller.on_odometry(SECOND + round(time * SECOND), stamp, each.motion)
+        told = held[-1][1] if held and held[-1][0] == SECOND + round(time * SECOND) else None
+        held.clear()
+        return told
+
+    climb.run(2 * gap + 1.0, odometry=bursts)
+    assert_never_runs_away(climb, 2.0)
 
 
 def growing(rate):

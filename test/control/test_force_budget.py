@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_odometry_that_is_stuck_from_the_start_stalls_and_lets_nothing_run_away():
-    climb = Climb().run(2.5, odometry=frozen(pose=True, twist=True)())
+    climb = Climb().run(3.5, odometry=frozen(pose=True, twist=True)())
     assert climb.controller.mode is Mode.STALLED
     assert "pushes moved nothing" in climb.controller.detail
     assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
@@ -39,7 +39,7 @@ def test_odometry_that_is_stuck_from_the_start_stalls_and_lets_nothing_run_away(
 @pytest.mark.parametrize("scrubs", [False, pytest.param(True, marks=pytest.mark.soak)])
 def test_odometry_that_is_stuck_turns_nothing_away_that_is_to_be_elsewhere(offset, planner, scrubs):
     climb = Climb(planner=planner, offset=offset, scrubs=scrubs)
-    climb.run(3.0, odometry=frozen(pose=True, twist=True)())
+    climb.run(4.0, odometry=frozen(pose=True, twist=True)())
     print(f"{climb.fastest():.2f} m/s, {climb.fastest_turn():.2f} rad/s")
     assert climb.controller.mode is Mode.STALLED
     assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
