@@ -50,7 +50,7 @@ class Channel:
         """Of the guidance, along a line."""
         omega, damping = gains.frequency, 2 * gains.damping
         omega_n = HEADING_SHARE * omega
-        g = gains.cross_track_gain * speed / np.hypot(speed, gains.fade_speed)
+        g = gains.steering(speed)
         turn = [omega_n**2 * g, omega_n**2 + damping * omega_n * g * speed]
         turn += [damping * omega_n + g * speed]
         drive = [0.0, omega**2, damping * omega]

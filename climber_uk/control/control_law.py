@@ -80,6 +80,7 @@ class ControlInput(NamedTuple):
     turning: Any = 0.0  # [N m] that resists turning
     aside: Any = 0.0  # [m/s] at which wheels give way to the left
     course: Course | None = None  # None: where its heading is
+    missing: Any = 0.0  # [m/s] asked for, and held by friction: see `DisturbanceEstimate`
 
 
 class Braking(NamedTuple):
@@ -161,13 +162,13 @@ class ControlLaw:
         A fixed-point iteration of two passes: the answer itself moves the state to the time that it
         is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
-        motion, held, (r_F, r_N), period, _, friction, turning, aside, course = situation
+        motion, held, (r_F, r_N), period, _, friction, turning, aside, course, missing = situation
         climber = self.climber
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         bounds = self._fixed_bounds or climber.bounds(motion)
         near = None if everywhere(self.options.max_torque_rate == 0) else self._bounds(situation)
-        solve, comes = self._solve, self.comes(target)
+        solve, comes = self._solve, self.comes(target, missing)
         drive, yaw_moment = climber.wrench(held.right, held.left)
         wall, push, left_pull = self.wall, r_F, 0.0
         if wall is not None:
@@ -200,10 +201,14 @@ class ControlLaw:
         waits = clipped(1.0 + relative * comes / CLEARLY, 0.0, 1.0)
         return tanh(SLOPE * waits * (relative + comes))
 
-    def comes(self, target: ReferencePoint) -> Any:
-        """How clearly a reference moves: ±`CLEARLY` forwards, backwards, and 0 at rest."""
-        v = target.speed
-        return CLEARLY * v / (abs(v) + RESTS * self.options.friction_speed)
+    def comes(self, target: ReferencePoint, missing: Any = 0.0) -> Any:
+        """How clearly a reference moves: ±`CLEARLY` forwards, backwards, and 0 at rest.
+
+        Then what is `missing` [m/s] of the speed counts: all of friction is overcome at last.
+        """
+        v, least = target.speed, self.options.friction_speed
+        comes = CLEARLY * v / (abs(v) + RESTS * least)
+        return clipped(comes + missing / least, -CLEARLY, CLEARLY)
 
     def closed_form(
         self,

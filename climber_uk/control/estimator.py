@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from climber_uk.control.control_law import ControlInput
 from climber_uk.control.delay_check import DelayCheck
 from climber_uk.control.model import (
+    EXPECTED_REST,
     SETTLES,
     SLOW,
     SLOW_TURN,
@@ -157,8 +158,11 @@ class Estimator:
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
         held, resistance = self._sent.last, (learnt.friction, learnt.turning)
-        aside = self._aside(motion)
-        return ControlInput(motion, held, disturbance, self.period, begins, *resistance, aside)
+        return ControlInput(
+            *(motion, held, disturbance, self.period, begins, *resistance),
+            aside=self._aside(motion),
+            missing=learnt.missing,
+        )
 
     def pending(self, begins: int) -> Acting:
         """Torques that act from the last odometry until `begins` [ns]."""
@@ -194,10 +198,11 @@ class Estimator:
         learning: Any = False,
         speed: Any | None = None,
         yaw_rate: Any = 0.0,
+        forward: Any = 0.0,
     ) -> None:
         """Torques were sent, which act from `begins` [ns] on, to drive at a `speed` [m/s].
 
-        The `yaw_rate` [rad/s] is the one that is wanted.
+        The `yaw_rate` [rad/s] and the acceleration `forward` [m/s²] are those that are wanted.
 
         `learning` is whether they are what was wanted: where a limit cut them, nothing is
         learnt of the disturbance.
@@ -205,6 +210,9 @@ class Estimator:
         self._learning = learning
         if speed is not None:
             self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
+            stands = abs(self.motion.speed) < EXPECTED_REST
+            rests = self._direction == 0
+            self.learnt = self.learnt.asked(forward, rests, stands, self.period)
             self._turning = yaw_rate
             self._turn = sign(select(abs(yaw_rate) > SLOW_TURN, yaw_rate, 0.0))
         later = round(self._known * SECOND)

@@ -33,6 +33,8 @@ TURNING_SHARE = 0.95  # of an unknown moment, put down to what resists turning
 SETTLES = 0.2  # [s] after a rest, in which friction that lets go is a step, and no ramp
 LETS_GO = 0.05  # [m/s] of what broke loose
 UNSTICKING_TIME = 0.02  # [s] of unlearning what only held it at rest
+PATIENCE = 3.0  # [s] in which it is forgotten what was asked for of a climber at rest
+MOST_MISSING = 0.01  # [m/s] of it
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 Shares = tuple[Any, Any]  # of an error, put down to the disturbance and to its change
 
@@ -103,11 +105,21 @@ class DisturbanceEstimate(NamedTuple):
     turning: Any = 0.0  # [N m] that resists turning: none in the model
     settling: Any = 0.0  # [s] left after a rest: what was learnt there may hold there only
     stuck: Any = 0.0  # [N] of force and friction that was learnt there, and is believed yet
+    missing: Any = 0.0  # [m/s] that was asked for and did not come, by a reference that rests
 
     @property
     def without_rates(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
         return self._replace(force_rate=0.0, moment_rate=0.0)
+
+    def asked(self, forward: Any, rests: Any, stands: Any, time: float) -> "DisturbanceEstimate":
+        """With an acceleration [m/s²] asked for, for `time` [s], of what `stands` held by friction.
+
+        Nothing is missing unless the reference `rests`.
+        """
+        missing = self.missing * exp(-time / PATIENCE) + time * forward
+        missing = clipped(missing, -MOST_MISSING, MOST_MISSING)
+        return self._replace(missing=select(rests, select(stands, missing, self.missing), 0.0))
 
     def lets_go(self, unexpected: Any, speed: Any, time: float) -> Any:
         """How much [N] of what was learnt at rest is taken back in `time` [s], soon after it.
@@ -159,7 +171,7 @@ class Observer:
     """
 
     bandwidth: float = parameter(
-        14.0, "1/s", "K of the disturbance observer; 0 switches it off", at_least=0, runtime=True
+        17.0, "1/s", "K of the disturbance observer; 0 switches it off", at_least=0, runtime=True
     )
     velocity_source: str = parameter(
         "odometry",
@@ -205,7 +217,7 @@ class Observer:
             return self._from_pose(climber, learnt, expected, measured, time, direction, turn)
         if everywhere(self.bandwidth == 0):
             return measured, _faded(learnt, time)
-        _, _, force_rate, moment_rate, _, turning, settling, stuck = learnt
+        _, _, force_rate, moment_rate, _, turning, settling, stuck, missing = learnt
         mass, inertia, _, _ = climber.inertial
         new, newer = shares
         acceleration = (measured.speed - expected.speed) / time
@@ -228,7 +240,7 @@ class Observer:
         moment_rate = select(held, 0.0, moment_rate)
         resisting = friction, turning
         learnt = DisturbanceEstimate(
-            force, moment, force_rate, moment_rate, *resisting, settling, stuck
+            force, moment, force_rate, moment_rate, *resisting, settling, stuck, missing
         )
         return measured, learnt
 
@@ -272,12 +284,17 @@ class Observer:
         moment, turning = learnt.turned(
             climber, k / time**2 * inertia * heading_change, turn, omega
         )
-        return motion, DisturbanceEstimate(force, moment, friction=friction, turning=turning)
+        return motion, DisturbanceEstimate(
+            force, moment, friction=friction, turning=turning, missing=learnt.missing
+        )
 
 
 def _faded(learnt: DisturbanceEstimate, time: float) -> DisturbanceEstimate:
     left = exp(-time / FORGETTING_TIME)
-    force, moment, _, _, friction, turning, _, _ = learnt
+    force, moment, _, _, friction, turning, _, _, missing = learnt
     return DisturbanceEstimate(
-        left * force, left * moment, friction=left * friction, turning=left * turning
+        *(left * force, left * moment),
+        friction=left * friction,
+        turning=left * turning,
+        missing=missing,
     )
