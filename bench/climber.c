@@ -11,7 +11,7 @@ typedef struct { double x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, 
 typedef struct { double mass, inertia, radius, half_track, friction, weight, limit; } Climber;
 typedef struct { double omega, damping, omega_n, k_y, v_s, share, v_c, radius, turn_rate; } Gains;
 typedef struct { Climber climber; Gains gains; double friction_speed, bandwidth; } Law;
-typedef struct { double force, turn, force_1, turn_1, friction, missing; } Learnt;
+typedef struct { double force, turn, force_1, turn_1, friction, stiction; } Learnt;
 typedef struct { Motion motion; Wrench held; Learnt learnt; double learning, direction; } Memory;
 typedef struct {
   double x, y, heading, c, s, v, v_1, omega, omega_1;
@@ -119,7 +119,7 @@ INLINE Learnt corrected(const Law *k, const Memory *m, Motion found, double peri
   int learns = m->learning > 0;
   Learnt now = {learns ? r.force : old.force, learns ? r.turn : old.turn,
                 learns ? r.force_1 : 0, learns ? r.turn_1 : 0,
-                learns ? r.friction : old.friction, old.missing};
+                learns ? r.friction : old.friction, old.stiction};
   return now;
 }
 
@@ -132,9 +132,9 @@ INLINE Wrench wanted_of(const Law *k, const Track *t, Motion found, Wrench held,
   double turning, speed;
   demand(&k->gains, t, aim, v_1, &turning, &speed);
   double comes = 8 * t->v / (fabs(t->v) + 5 * k->friction_speed);
-  comes = clip(comes + r.missing / k->friction_speed, -8, 8);
   double fast = clip(speed / k->friction_speed, -8, 8), waits = clip(1 + fast * comes / 8, 0, 1);
-  double rub = (p->friction + r.friction) * tanh(0.8 * waits * (fast + comes));
+  double held = tanh(r.stiction);
+  double rub = (p->friction + r.friction) * (held + (1 - fabs(held)) * tanh(0.8 * waits * (fast + comes)));
   Wrench wanted = {p->mass * *v_1 + rub + p->weight * aim.sine - r.force,
                    p->inertia * turning - r.turn};
   return wanted;
@@ -148,10 +148,11 @@ INLINE Memory answered(const Law *k, Memory m, Motion found, const Track *t, dou
   Wrench guess = limited(p, wanted_of(k, t, found, m.held, r, period, &v_1));
   Wrench wanted = wanted_of(k, t, found, guess, r, period, &v_1), got = limited(p, wanted);
   double fits = (fabs(wanted.drive - got.drive) <= 1e-9) & (fabs(wanted.turn - got.turn) <= 1e-9);
-  double missing = clip(r.missing * exp(-period / 3) + period * v_1, -0.01, 0.01);
-  int rests = fabs(t->v) <= SLOW, stands = fabs(found.speed) < 1e-3;
-  r.missing = rests ? (stands ? missing : r.missing) : 0;
-  Memory now = {found, got, r, fits, rests ? 0 : sign(t->v)};
+  int held = (fabs(t->v) < 1e-4) & (fabs(found.speed) < 1e-3), same = r.stiction * v_1 >= 0;
+  double past = held & same ? r.stiction : clip(r.stiction, -3, 3);
+  double change = held ? period * (v_1 / 0.001 - past / 3) : -past;
+  r.stiction = clip(past + clip(change, -24 * period, 24 * period), -6, 6);
+  Memory now = {found, got, r, fits, fabs(t->v) > SLOW ? sign(t->v) : 0};
   return now;
 }
 
@@ -303,7 +304,7 @@ void closed_loops(int n, int ticks, int steps, double period, const Law *k, cons
         memory[7][i] = is.held.drive, memory[8][i] = is.held.turn;
         memory[9][i] = is.learnt.force, memory[10][i] = is.learnt.turn;
         memory[11][i] = is.learnt.force_1, memory[12][i] = is.learnt.turn_1;
-        memory[13][i] = is.learnt.friction, memory[14][i] = is.learnt.missing;
+        memory[13][i] = is.learnt.friction, memory[14][i] = is.learnt.stiction;
         memory[15][i] = is.learning, memory[16][i] = is.direction;
       }
       for (int i = 0; i < BLOCK; i++) {

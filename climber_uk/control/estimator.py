@@ -10,6 +10,7 @@ from climber_uk.control.control_law import ControlInput
 from climber_uk.control.delay_check import DelayCheck
 from climber_uk.control.model import (
     EXPECTED_REST,
+    REST,
     SETTLES,
     SLOW,
     SLOW_TURN,
@@ -32,7 +33,7 @@ from climber_uk.control.timing import (
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import clipped, select, sign
+from climber_uk.mechanics.elementary import clipped, select, sign, tanh
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.mechanics.wall import Wall, weight_beyond
@@ -161,7 +162,7 @@ class Estimator:
         return ControlInput(
             *(motion, held, disturbance, self.period, begins, *resistance),
             aside=self._aside(motion),
-            missing=learnt.missing,
+            stiction=tanh(learnt.stiction),
         )
 
     def pending(self, begins: int) -> Acting:
@@ -210,9 +211,8 @@ class Estimator:
         self._learning = learning
         if speed is not None:
             self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
-            stands = abs(self.motion.speed) < EXPECTED_REST
-            rests = self._direction == 0
-            self.learnt = self.learnt.asked(forward, rests, stands, self.period)
+            held = (abs(speed) < REST) & (abs(self.motion.speed) < EXPECTED_REST)
+            self.learnt = self.learnt.asked(forward, held, self.period)
             self._turning = yaw_rate
             self._turn = sign(select(abs(yaw_rate) > SLOW_TURN, yaw_rate, 0.0))
         later = round(self._known * SECOND)

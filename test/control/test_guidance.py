@@ -128,3 +128,12 @@ def test_no_false_equilibrium_is_near_the_reference(gains, nearest):
             over, state = excess(gains, radius, v_d, np.linspace(0.005, 0.995, 200) * radius)
             there = np.flatnonzero(np.diff(np.sign(over)))
             assert np.all(np.hypot(*state.pose[there, :2].T) > nearest)
+
+
+@pytest.mark.parametrize("gains", [Guidance(), CLIMBER_YAML])
+def test_the_look_ahead_gets_longer_where_the_heading_could_not_follow(gains):
+    speeds = np.geomspace(0.01, 30.0, 50)
+    rates = speeds * [gains.steering(speed) for speed in speeds]
+    assert np.all(np.diff(rates) > 0)
+    assert rates[-1] == pytest.approx(gains.heading_frequency, rel=0.01)
+    assert rates[-1] < gains.heading_frequency
