@@ -402,8 +402,10 @@ def main() -> None:
             executor.spin_once(timeout_sec=0.1)
     finally:
         driver.stop()
+        signal.alarm(5)  # [s] then the kernel ends it: now and then Fast DDS never comes back
         driver.destroy_node()
         rclpy.shutdown()
+        signal.alarm(0)
     sys.exit(driver.failure or 0)
 
 

@@ -15,6 +15,7 @@ from climber_uk.bags.time_series import TimeSeries
 from climber_uk.bags.topics import TYPES
 from climber_uk.identification.even_time import lagging, rate
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.climber import most_pressure
 from climber_uk.mechanics.quantities import across, along
 from climber_uk.messages.topics import JOINTS, ODOMETRY, PARAMETERS, PRESSURE, TORQUES
 
@@ -137,7 +138,9 @@ def read_motion(
         )
     time, values = time[kept], odometry.values[kept]
     rates = values[:, [3, 5]]
-    pressures = pressures.where(pressures.values[:, 0] >= 0)
+    measured = pressures.values[:, 0]
+    is_believed = (measured >= 0) & (measured <= most_pressure(pressure))
+    pressures, unfit = pressures.where(is_believed), unfit + int(np.sum(~is_believed))
     motion = RecordedMotion(
         time=time,
         pose=np.column_stack([values[:, :2], np.unwrap(values[:, 2])]),

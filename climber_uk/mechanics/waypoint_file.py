@@ -12,7 +12,8 @@ from climber_uk.parameters.text_file import at_home, content_of
 
 COMMENT = re.compile(r"#.*|^\s*(//|%).*")
 BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")
-UNIT = re.compile(r"[\[(](.*)[\])]")
+UNIT = re.compile(r"[\[(](.*)[\])]|_((?:mm|cm|m|km|ft|in)(?:/s)?|m?s)$", re.IGNORECASE)
+EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)  # a first line that tells the separator
 LINE_END = re.compile(r"\r\n?")
 METRES = "m", "metre", "meter", "metres", "meters"
 FARTHEST = 1e6  # [m] of the origin; beyond it a path has no millimetres left
@@ -86,7 +87,10 @@ def read_waypoint_text(text: str) -> tuple[Array, Marks]:
     rows = [(n, bare) for n, line in lines if (bare := COMMENT.sub("", line).strip(" \t"))]
     if not rows:
         raise ValueError("no points in it: want x and y [m] of a point a line")
-    separator = _separator(rows[0][1])
+    told = EXCEL.fullmatch(rows[0][1]) if len(rows) > 1 else None
+    if told:
+        rows = rows[1:]
+    separator = told[1] if told else _separator(rows[0][1])
     cells = [(n, _split(row, separator)) for n, row in rows]
     columns, cells = _columns(cells, [line for n, line in lines if n < rows[0][0]], separator)
     if len(cells) < 2:
@@ -171,7 +175,7 @@ def _named(where: str, names: list[str]) -> _Columns:
     for column, units in NUMBERS.items():
         name = names[at[column]] if column in at else ""
         unit = UNIT.search(name)
-        if unit and unit[1].strip().lower() not in units:
+        if unit and (unit[1] or unit[2] or "").strip().lower() not in units:
             raise ValueError(f"{where}: column {name!r} must be in {units[0]}")
     return _Columns(len(names), at)
 

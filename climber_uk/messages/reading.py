@@ -162,11 +162,11 @@ def wheel_torques(
     return Torques(right, left)
 
 
-def pressure(message: "FluidPressure") -> float:
-    """Pressure difference of the suction [Pa], from 0 on."""
+def pressure(message: "FluidPressure", most: float = LARGEST) -> float:
+    """Pressure difference of the suction [Pa], from 0 to `most`."""
     pressure = float(message.fluid_pressure)
-    if not 0 <= pressure <= LARGEST:
-        raise ValueError(f"fluid_pressure={pressure} must be from 0 to {LARGEST:g} [Pa]")
+    if not 0 <= pressure <= most:
+        raise ValueError(f"fluid_pressure={pressure:g} must be a difference, 0 to {most:g} [Pa]")
     return pressure
 
 

@@ -20,7 +20,7 @@ from climber_uk.control.least_suction import SuctionOptions
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
-from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.climber import Climber, most_pressure
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.reference import tracking_error
 from climber_uk.messages import reading, reading_sensors, writing
@@ -227,7 +227,8 @@ class UkTorqueController(ManagedNode):
     def on_pressure(self, message: FluidPressure) -> None:
         """Give the controller the measured pressure difference."""
         try:
-            pressure = reading.pressure(message)
+            expected = self.parameters.read(Climber).suction_pressure
+            pressure = reading.pressure(message, most_pressure(expected))
         except ValueError as error:
             self.report(PRESSURE, "refused", str(error))
             return

@@ -17,6 +17,7 @@ from climber_uk.control.build import KINDS, build_controller, settings
 from climber_uk.control.controller import Answer
 from climber_uk.control.stops import Stops
 from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.climber import Climber, most_pressure
 from climber_uk.mechanics.quantities import Torques
 from climber_uk.messages import reading, references
 from climber_uk.messages.names import Names
@@ -153,7 +154,8 @@ class Replay:
         """Put the measured pressure into the model, unless the node refuses such a one."""
         try:
             with of_its_type():
-                pressure = reading.pressure(message)
+                expected = self.parameters.read(Climber).suction_pressure
+                pressure = reading.pressure(message, most_pressure(expected))
         except ValueError:
             return
         if pressure != self.pressure:

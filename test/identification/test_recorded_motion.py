@@ -119,6 +119,13 @@ def test_pressure_and_namespace_are_those_of_the_climber(tmp_path):
     assert motion.pressure == pytest.approx(1000.0 * TIMES)
 
 
+def test_an_absolute_pressure_is_none_of_the_suction(tmp_path):
+    told = [("/suction_pressure", pressure(t, 93.0e3)) for t in (2.0, 3.0)]
+    motion, unfit = read_motion(bag_of(tmp_path, [*driving(), *told]), pressure=8000.0)
+    assert unfit == 2
+    assert motion.pressure == pytest.approx(np.full(11, 8000.0))
+
+
 def test_unfit_messages_are_left_out_and_counted(tmp_path):
     bad = [
         ("/odom", odometry(2.35, np.nan, 0.0, 0.5, 0.0)),

@@ -72,16 +72,11 @@ def test_the_nodes_are_run_one_by_one(clone):
     logs = [clone / f"{number}.log" for number in range(4)]
     lines = ONE_BY_ONE.splitlines()
     assert [line.split()[0] for line in lines][-1] == "record_bag"
-    started = [
-        subprocess.Popen(
-            shlex.split(line),
-            env=environment,
-            cwd=clone,
-            stdout=log.open("w"),
-            stderr=subprocess.STDOUT,
-        )
-        for line, log in zip(lines, logs, strict=True)
-    ]
+    started = []
+    for line, log in zip(lines, logs, strict=True):
+        with log.open("w") as file:
+            how = {"env": environment, "cwd": clone, "stdout": file, "stderr": subprocess.STDOUT}
+            started.append(subprocess.Popen(shlex.split(line), **how))
     try:
         while "done: at the end" not in logs[0].read_text():
             assert [process.poll() for process in started] == [None] * 4

@@ -327,6 +327,11 @@ def test_suction_that_is_lost_stops_the_climber_and_its_margins_tell(world):
     world.wait(lambda: margins, "margins")
     assert margins[-1].vector.z == pytest.approx(0.53 * 2500 * 0.06)  # wheels' load, k P S
     before = margins[-1].vector.y
+    absolute = 101325.0 - 2500.0
+    pressure.publish(FluidPressure(fluid_pressure=absolute))
+    refused = "must be a difference, 0 to 12500 [Pa]"
+    loop.until(lambda _: f"fluid_pressure={absolute:g} {refused}" in world.log(NAME), "word of it")
+    assert margins[-1].vector.z == pytest.approx(0.53 * 2500 * 0.06)
     pressure.publish(FluidPressure(fluid_pressure=2100.0))
     loop.until(lambda _: margins[-1].vector.z < 70, "less load on the wheels")
     assert margins[-1].vector.y == pytest.approx(before * 2100 / 2500)
