@@ -211,6 +211,7 @@ class Estimator:
         self._learning = learning
         if speed is not None:
             self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
+            assert self.motion is not None  # it was answered
             held = (abs(speed) < REST) & (abs(self.motion.speed) < EXPECTED_REST)
             self.learnt = self.learnt.asked(forward, held, self.period)
             self._turning = yaw_rate
