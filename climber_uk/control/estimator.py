@@ -33,7 +33,7 @@ from climber_uk.control.timing import (
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import clipped, select, sign, tanh
+from climber_uk.mechanics.elementary import anywhere, clipped, select, sign, tanh
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.mechanics.wall import Wall, weight_beyond
@@ -213,7 +213,8 @@ class Estimator:
             self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
             assert self.motion is not None  # it was answered
             held = (abs(speed) < REST) & (abs(self.motion.speed) < EXPECTED_REST)
-            self.learnt = self.learnt.asked(forward, held, self.period)
+            if anywhere(held | (self.learnt.stiction != 0.0)):
+                self.learnt = self.learnt.asked(forward, held, self.period)
             self._turning = yaw_rate
             self._turn = sign(select(abs(yaw_rate) > SLOW_TURN, yaw_rate, 0.0))
         later = round(self._known * SECOND)
