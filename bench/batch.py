@@ -153,7 +153,7 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[int], Array
     )
 
     def in_c(periods: int) -> Array:
-        rows = np.array(loops.start), np.zeros((16, CLOSED)), np.zeros((7, CLOSED))
+        rows = np.array(loops.start), np.zeros((17, CLOSED)), np.zeros((7, CLOSED))
         rows[-1][-1] = MAX_MARGIN
         mutable = [limit.pointer("double", numbers) for numbers in rows]
         limit.functions.closed_loops(CLOSED, periods, steps, 0.005, *given, *mutable)

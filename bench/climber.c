@@ -11,7 +11,7 @@ typedef struct { double x, y, heading, v_x, v_y, omega, a_x, a_y, omega_1, j_x, 
 typedef struct { double mass, inertia, radius, half_track, friction, weight, limit; } Climber;
 typedef struct { double omega, damping, omega_n, k_y, v_s, share, v_c, radius, turn_rate; } Gains;
 typedef struct { Climber climber; Gains gains; double friction_speed, bandwidth; } Law;
-typedef struct { double force, turn, force_1, turn_1, friction; } Learnt;
+typedef struct { double force, turn, force_1, turn_1, friction, stiction; } Learnt;
 typedef struct { Motion motion; Wrench held; Learnt learnt; double learning, direction; } Memory;
 typedef struct {
   double x, y, heading, c, s, v, v_1, omega, omega_1;
@@ -55,16 +55,18 @@ static Track track(const Gains *k, const Target *t) {
   double c = cos(t->heading), s = sin(t->heading);
   double v = t->v_x * c + t->v_y * s, v_1 = t->a_x * c + t->a_y * s;
   double v_2 = t->j_x * c + t->j_y * s + t->omega * t->omega * v;
-  double fade = k->v_s * k->v_s, square = v * v + fade, root = sqrt(square);
-  double slope = fade / (root * square), g_1 = slope * v_1;
+  double fade = k->v_s * k->v_s, fast = pow(k->k_y * v / k->omega_n, 2);
+  double square = v * v * (1 + fast) + fade, falls = fade - fast * v * v;
+  double steep = 1 / (square * sqrt(square)), g_1 = falls * steep * v_1;
+  double bend = -v * steep * (4 * fast + 3 * falls * (1 + 2 * fast) / square);
   double wait = sqrt(v * v + fade / 4), more = k->share * fabs(v);
   int below = more < k->v_c;
   double hurry = sqrt(fade / 4 + (below ? more * more : k->v_c * k->v_c));
-  double turn = root / k->radius;
+  double turn = sqrt(v * v + fade) / k->radius;
   Track found = {t->x, t->y, t->heading, c, s, v, v_1, t->omega, t->omega_1,
                  wait, hurry, fmin(turn, k->turn_rate),
-                 k->k_y * v / root, k->k_y * g_1,
-                 k->k_y * (slope * v_2 - 3 * g_1 * v * v_1 / square)};
+                 k->k_y * v / sqrt(square), k->k_y * g_1,
+                 k->k_y * (falls * steep * v_2 + bend * v_1 * v_1)};
   return found;
 }
 
@@ -117,22 +119,23 @@ INLINE Learnt corrected(const Law *k, const Memory *m, Motion found, double peri
   int learns = m->learning > 0;
   Learnt now = {learns ? r.force : old.force, learns ? r.turn : old.turn,
                 learns ? r.force_1 : 0, learns ? r.turn_1 : 0,
-                learns ? r.friction : old.friction};
+                learns ? r.friction : old.friction, old.stiction};
   return now;
 }
 
 /* What is wanted of the wheels where `held` will have led to in half a period. */
 INLINE Wrench wanted_of(const Law *k, const Track *t, Motion found, Wrench held, Learnt r,
-                        double period) {
+                        double period, double *v_1) {
   const Climber *p = &k->climber;
   Wrench push = {held.drive + r.force, held.turn + r.turn};
   Motion aim = predicted(p, found, push, period / 2, r.friction);
-  double v_1, turning, speed;
-  demand(&k->gains, t, aim, &v_1, &turning, &speed);
+  double turning, speed;
+  demand(&k->gains, t, aim, v_1, &turning, &speed);
   double comes = 8 * t->v / (fabs(t->v) + 5 * k->friction_speed);
   double fast = clip(speed / k->friction_speed, -8, 8), waits = clip(1 + fast * comes / 8, 0, 1);
-  double rub = (p->friction + r.friction) * tanh(0.8 * waits * (fast + comes));
-  Wrench wanted = {p->mass * v_1 + rub + p->weight * aim.sine - r.force,
+  double held = tanh(r.stiction);
+  double rub = (p->friction + r.friction) * (held + (1 - fabs(held)) * tanh(0.8 * waits * (fast + comes)));
+  Wrench wanted = {p->mass * *v_1 + rub + p->weight * aim.sine - r.force,
                    p->inertia * turning - r.turn};
   return wanted;
 }
@@ -141,9 +144,14 @@ INLINE Wrench wanted_of(const Law *k, const Track *t, Motion found, Wrench held,
 INLINE Memory answered(const Law *k, Memory m, Motion found, const Track *t, double period) {
   const Climber *p = &k->climber;
   Learnt r = corrected(k, &m, found, period);
-  Wrench guess = limited(p, wanted_of(k, t, found, m.held, r, period));
-  Wrench wanted = wanted_of(k, t, found, guess, r, period), got = limited(p, wanted);
+  double v_1;
+  Wrench guess = limited(p, wanted_of(k, t, found, m.held, r, period, &v_1));
+  Wrench wanted = wanted_of(k, t, found, guess, r, period, &v_1), got = limited(p, wanted);
   double fits = (fabs(wanted.drive - got.drive) <= 1e-9) & (fabs(wanted.turn - got.turn) <= 1e-9);
+  int held = (fabs(t->v) < 1e-4) & (fabs(found.speed) < 1e-3), same = r.stiction * v_1 >= 0;
+  double past = held & same ? r.stiction : clip(r.stiction, -3, 3);
+  double change = held ? period * (v_1 / 0.001 - past / 3) : -past;
+  r.stiction = clip(past + clip(change, -24 * period, 24 * period), -6, 6);
   Memory now = {found, got, r, fits, fabs(t->v) > SLOW ? sign(t->v) : 0};
   return now;
 }
@@ -274,12 +282,12 @@ void open_loops(int n, int steps, double time, const double *climbers, const dou
 void closed_loops(int n, int ticks, int steps, double period, const Law *k, const double *climbers,
                   const Target *now, const Target *aims, double load, double *motions,
                   double *memories, double *sums) {
-  double p[7][BLOCK], w[2][BLOCK], memory[16][BLOCK], sum[7][BLOCK];
+  double p[7][BLOCK], w[2][BLOCK], memory[17][BLOCK], sum[7][BLOCK];
   Motions m;
   for (int first = 0; first < n; first += BLOCK) {
     get(7, n, first, climbers, p);
     get(7, n, first, motions, m);
-    get(16, n, first, memories, memory);
+    get(17, n, first, memories, memory);
     get(7, n, first, sums, sum);
     for (int j = 0; j < ticks; j++) {
       Track t = track(&k->gains, aims + j);
@@ -288,15 +296,16 @@ void closed_loops(int n, int ticks, int steps, double period, const Law *k, cons
         Motion found = motion_of(m, i);
         Memory old = {motion_of(memory, i),
                       {memory[7][i], memory[8][i]},
-                      {memory[9][i], memory[10][i], memory[11][i], memory[12][i], memory[13][i]},
-                      memory[14][i], memory[15][i]};
+                      {memory[9][i], memory[10][i], memory[11][i], memory[12][i], memory[13][i],
+                       memory[14][i]},
+                      memory[15][i], memory[16][i]};
         Memory is = answered(k, old, found, &t, period);
         put(memory, i, found);
         memory[7][i] = is.held.drive, memory[8][i] = is.held.turn;
         memory[9][i] = is.learnt.force, memory[10][i] = is.learnt.turn;
         memory[11][i] = is.learnt.force_1, memory[12][i] = is.learnt.turn_1;
-        memory[13][i] = is.learnt.friction;
-        memory[14][i] = is.learning, memory[15][i] = is.direction;
+        memory[13][i] = is.learnt.friction, memory[14][i] = is.learnt.stiction;
+        memory[15][i] = is.learning, memory[16][i] = is.direction;
       }
       for (int i = 0; i < BLOCK; i++) {
         Climber own = climber_of(p, i);
@@ -308,7 +317,7 @@ void closed_loops(int n, int ticks, int steps, double period, const Law *k, cons
         double beside = own.mass * m[5][i] * m[6][i] + own.weight * m[3][i];
         double pull = sqrt(w[0][i] * w[0][i] + beside * beside);
         sum[0][i] += far;
-        sum[1][i] += 1 - memory[14][i];
+        sum[1][i] += 1 - memory[15][i];
         sum[2][i] = fmax(sum[2][i], far);
         sum[3][i] = far;
         sum[4][i] = far > 1e-4 ? time : sum[4][i];
@@ -318,7 +327,7 @@ void closed_loops(int n, int ticks, int steps, double period, const Law *k, cons
       for (int s = 0; s < steps; s++) step(p, m, w, period / steps);
     }
     give(7, n, first, m, motions);
-    give(16, n, first, memory, memories);
+    give(17, n, first, memory, memories);
     give(7, n, first, sum, sums);
   }
 }

@@ -8,6 +8,7 @@ from climber_uk.closed_loop.simulate import Controlling, Link, Run, simulate
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.controller import Answer, Controller, Settings
 from climber_uk.control.guidance import Guidance
+from climber_uk.control.model import Observer
 from climber_uk.control.timing import Timing
 from climber_uk.identification.estimation import CUT, identify
 from climber_uk.identification.identified import NAMES, Choice, Identified
@@ -43,6 +44,7 @@ class Scenario:
     contact: Contact = field(default_factory=Contact)
     slip: bool = False
     period: float = 0.005  # [s] from one odometry to the next; of the plant half as much
+    observer: Observer = field(default_factory=Observer)
 
     def plant(self, true: Climber, step: float) -> Plant:
         """What is driven."""
@@ -52,7 +54,7 @@ class Scenario:
         """Run of a controller that believes in a climber, and what it was told."""
         law = ControlLaw(believed, self.guidance)
         timing = Timing(control_period=self.period)
-        ear = Ear(Controller(Settings(law, timing=timing)))
+        ear = Ear(Controller(Settings(law, self.observer, timing)))
         link = replace(link, step=self.period / 2, period=self.period)
         loop = self.trajectory, self.start, self.duration, ear, true, link
         return simulate(*loop, seed=seed, plant_of=self.plant), ear
@@ -84,6 +86,7 @@ SCENARIOS = {
         Trajectory(Ellipse(), ConstantRate()),
         State(np.array([0.0, 6.0, 0.0]), np.array([10.0, 0.0, -0.6])),
         20.0,
+        observer=Observer(bandwidth=17.0),
     ),
     # 34 N m of what resists turning, on a small eight, so that a hundred seeds do not take hours
     "four wheels": Scenario(

@@ -50,7 +50,7 @@ class Channel:
         """Of the guidance, along a line."""
         omega, damping = gains.frequency, 2 * gains.damping
         omega_n = HEADING_SHARE * omega
-        g = gains.cross_track_gain * speed / np.hypot(speed, gains.fade_speed)
+        g = gains.steering(speed)
         turn = [omega_n**2 * g, omega_n**2 + damping * omega_n * g * speed]
         turn += [damping * omega_n + g * speed]
         drive = [0.0, omega**2, damping * omega]
@@ -152,21 +152,24 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--period", type=float, default=0.005, help="of the odometry [s]")
-    parser.add_argument("--bandwidth", type=float, default=Observer().bandwidth, help="[1/s]")
+    parser.add_argument("--bandwidth", type=float, help="of the observer [1/s]")
     for gain, unit in (("frequency", "rad/s"), ("damping", "")):
         parser.add_argument(f"--{gain}", type=float, help=f"of the guidance [{unit}]")
     parser.add_argument("--linear", action="store_true", help="no simulations")
     options = parser.parse_args()
-    period, observer = options.period, Observer(bandwidth=options.bandwidth)
+    period = options.period
     print(f"{'delay, lag [ms]':<20}{'linear':>16}{'simulated':>16}{'and learnt':>16}")
     asked = {gain: getattr(options, gain) for gain in ("frequency", "damping")}
     given = {gain: value for gain, value in asked.items() if value is not None}
     for name, (built, speed) in SCENARIOS.items():
         scenario = replace(built, guidance=replace(built.guidance, **given))
-        law = ControlLaw(scenario.believed, scenario.guidance)
+        observer = built.observer
+        if options.bandwidth is not None:
+            observer = replace(observer, bandwidth=options.bandwidth)
+        settings = Settings(ControlLaw(scenario.believed, scenario.guidance), observer)
 
-        def make(law: ControlLaw = law) -> Controller:
-            return Controller(Settings(law, observer), Safety(), ANYWHERE, UNGUARDED)
+        def make(settings: Settings = settings) -> Controller:
+            return Controller(settings, Safety(), ANYWHERE, UNGUARDED)
 
         cells = [linear_margins(scenario.guidance, speed, observer, period)]
         cells += [

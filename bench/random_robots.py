@@ -13,7 +13,7 @@ from multiprocessing import Pool
 from typing import NamedTuple
 
 import numpy as np
-from robustness import AT_REST, BUILT, EIGHT, SLOW_GUIDANCE, ours
+from robustness import AT_REST, BUILT, EIGHT, SLOW_GUIDANCE, SLOW_OBSERVER, ours
 
 from climber_uk.closed_loop.simulate import Link, simulate
 from climber_uk.control.controller import Answer
@@ -129,7 +129,7 @@ def driven(
 ) -> Result:
     """How the robot of a seed drives, told of a delay."""
     of = robot(seed)
-    controller = ours(BUILT, SLOW_GUIDANCE, delay_of(of))
+    controller = ours(BUILT, SLOW_GUIDANCE, delay_of(of), SLOW_OBSERVER)
     controller.guard.options = guard
     run = simulate(
         path,

@@ -246,7 +246,7 @@ def constraint_errors(
 ) -> tuple[float, float]:
     """How far speed [m/s] and heading rate [rad/s] are from what guidance wants, at this moment."""
     e_x, e_y, turned, _, turning = tracking_errors(target, motion).tolist()
-    g = gains.cross_track_gain * target.speed / np.hypot(target.speed, gains.fade_speed)
+    g = gains.steering(target.speed)
     w = g * e_y
     w_1 = g * (motion.speed * sin(turned) - target.yaw_rate * e_x)
     rate = HEADING_SHARE * gains.frequency / (2 * gains.damping)

@@ -38,14 +38,15 @@ PAPER, BUILT = PAPER_RUN.believed, BUILT_RUN.believed
 ELLIPSE, EIGHT = PAPER_RUN.trajectory, BUILT_RUN.trajectory
 IN_MOTION, AT_REST = PAPER_RUN.start, BUILT_RUN.start
 RAMPED = Trajectory(Ellipse(), RestToRest(rate=1.0, ramp_time=3.0, laps=9))
-GUIDANCE, OBSERVER, IDEAL = PAPER_RUN.guidance, Observer(), Link()
-SLOW_GUIDANCE = BUILT_RUN.guidance
+GUIDANCE, OBSERVER, IDEAL = PAPER_RUN.guidance, PAPER_RUN.observer, Link()
+SLOW_GUIDANCE, SLOW_OBSERVER = BUILT_RUN.guidance, BUILT_RUN.observer
 NOISE = Link(
     sensors=Sensors(position_noise=1e-3, heading_noise=1e-3, speed_noise=1e-2, yaw_rate_noise=1e-2)
 )
 
 
-# Found by `tune.py`, the weights by `tune.py LQR`.
+# Found by `tune.py`, the weights by `tune.py LQR`, with an observer of this bandwidth [1/s].
+RIVALS_BANDWIDTH = 14.0
 WEIGHTS = Weights(33_300.0, 112_000.0, 23_900.0, 54.0, 62.7)
 KANAYAMA = Kanayama(8.03, 1.73, 1.24, 18.2, 112.0, 17.4, 185.0)
 SUPER_TWISTING = SuperTwisting(4.91, 0.573, 1.1, 4.63, 24.9, 5.29, 20.5)
@@ -90,6 +91,7 @@ def exact(
 
 def rival(law: ForceLaw | None, controller: type[Controller] = Controller) -> Make:
     """A law in the constraints' place; one with a `controller` of its own has no observer."""
+    bandwidth = RIVALS_BANDWIDTH if controller is Controller else 0.0
 
     def make(
         climber: Climber,
@@ -97,8 +99,7 @@ def rival(law: ForceLaw | None, controller: type[Controller] = Controller) -> Ma
         delay: float = 0.0,
         observer: Observer = OBSERVER,
     ) -> Controller:
-        if controller is not Controller:
-            observer = replace(observer, bandwidth=0.0)
+        observer = replace(observer, bandwidth=bandwidth)
         return ours(climber, gains, delay, observer, controller, law and replace(law))
 
     return make
@@ -145,7 +146,7 @@ def heavier(make: Make) -> float:
 
 def without_twist(make: Make) -> float:
     """RMS [mm] after 2 s on the ramped ellipse, with noisy odometry that has a pose only."""
-    controlling = make(PAPER, observer=Observer(velocity_source="pose"))
+    controlling = make(PAPER, observer=replace(OBSERVER, velocity_source="pose"))
     link = replace(NOISE, with_twist=False)
     start = State(RAMPED.at(0.0).pose, np.zeros(3))
     return simulate(RAMPED, start, 10.0, controlling, PAPER, link).rms(after=2.0) / MILLIMETRE
@@ -153,7 +154,7 @@ def without_twist(make: Make) -> float:
 
 def slow_odometry(make: Make, duration: float = 57.0) -> float:
     """RMS [mm] on the figure of eight of climber.yaml, at 20 Hz."""
-    controlling = make(BUILT, SLOW_GUIDANCE)
+    controlling = make(BUILT, SLOW_GUIDANCE, observer=SLOW_OBSERVER)
     return (
         simulate(EIGHT, AT_REST, duration, controlling, BUILT, Link(period=0.05)).rms() / MILLIMETRE
     )
@@ -161,7 +162,7 @@ def slow_odometry(make: Make, duration: float = 57.0) -> float:
 
 def at_the_end(make: Make) -> float:
     """Distance [mm] from the end of that figure of eight at 200 Hz."""
-    controlling = make(BUILT, SLOW_GUIDANCE)
+    controlling = make(BUILT, SLOW_GUIDANCE, observer=SLOW_OBSERVER)
     return simulate(EIGHT, AT_REST, 57.0, controlling, BUILT).distance[-1] / MILLIMETRE
 
 
@@ -213,13 +214,16 @@ def interrupted(make: Make, duration: float = 20.0) -> tuple[float, int]:
 
 def untold(make: Make, link: Link, gains: Guidance = SLOW_GUIDANCE) -> tuple[float, float]:
     """RMS [mm], and RMS change of a torque in a tick [N m], of what nobody told the controller."""
-    run = simulate(EIGHT, AT_REST, 57.0, make(BUILT, gains), BUILT, link)
+    run = simulate(EIGHT, AT_REST, 57.0, make(BUILT, gains, observer=SLOW_OBSERVER), BUILT, link)
     return run.rms() / MILLIMETRE, run.chatter()
 
 
 def margins(make: Make, scenario: Scenario) -> tuple[float, float]:
     """Longest delay and lag [ms] that nobody told the controller, and that it does not learn."""
-    return simulated_margins(scenario, lambda: make(scenario.believed, scenario.guidance))
+    observer = scenario.observer
+    return simulated_margins(
+        scenario, lambda: make(scenario.believed, scenario.guidance, observer=observer)
+    )
 
 
 def links() -> dict[str, Link]:

@@ -8,12 +8,21 @@ import argparse
 from dataclasses import dataclass, replace
 
 import numpy as np
-from robustness import BUILT, GUIDANCE, PAPER, RAMPED, SLOW_GUIDANCE
+from robustness import (
+    BUILT,
+    GUIDANCE,
+    OBSERVER,
+    PAPER,
+    RAMPED,
+    SLOW_GUIDANCE,
+    SLOW_OBSERVER,
+)
 
 from climber_uk.closed_loop.batch import Loops
 from climber_uk.closed_loop.period import BatchRun
 from climber_uk.control.control_law import ControlLaw
 from climber_uk.control.guidance import Guidance
+from climber_uk.control.model import Observer
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.shapes import Ellipse, Lemniscate
@@ -32,6 +41,7 @@ class Case:
     turned: float  # [rad] from the reference's heading, at most
     speeds: tuple[float, float]  # as shares of the reference's
     duration: float  # [s]
+    observer: Observer = OBSERVER
 
     def starts(self, number: int) -> Motion:
         """Motions (N,)."""
@@ -57,7 +67,7 @@ CASES = {
     ),
     "climber.yaml, 0.18 m/s, 0.18 m": Case(
         *(BUILT, SLOW_GUIDANCE, Trajectory(Lemniscate(1.5, 0.75), ConstantRate(rate=0.12))),
-        *(0.18, 1.0, (0.0, 1.2), 15.0),
+        *(0.18, 1.0, (0.0, 1.2), 15.0, SLOW_OBSERVER),
     ),
 }
 
@@ -73,7 +83,10 @@ def main() -> None:
         if options.only not in name:
             continue
         loops = Loops(
-            case.starts(options.number), case.climber, ControlLaw(case.climber, case.gains)
+            case.starts(options.number),
+            case.climber,
+            ControlLaw(case.climber, case.gains),
+            case.observer,
         )
         outcome = loops.run(BatchRun(case.trajectory, case.duration))
         lost = int(np.sum(outcome.last > 1e-3))

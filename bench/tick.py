@@ -110,8 +110,8 @@ def tick(controller: Controller, stamp: int, motion: Motion) -> Command:
     command = controller.law.command(ahead._replace(course=course), target.point)
     check_finite(command.wheels)
     active.go_on(target)
-    speeds = target.point.speed, command.yaw_rate
-    estimator.sent(ahead.begins, command.wheels, command.fits, *speeds)
+    wanted = target.point.speed, command.yaw_rate, command.forward
+    estimator.sent(ahead.begins, command.wheels, command.fits, *wanted)
     return command
 
 
@@ -152,13 +152,13 @@ def ticks_in_c(limit: Limit, law: ControlLaw) -> tuple[Callable[[], None], Array
     numbers, preview = np.array(motions_on_the_way(TICKS)), sampled(PAPER, 1.0)
     times = (SECOND + round((number + 0.5) * PERIOD * SECOND) for number in range(TICKS))
     aims = np.array([preview.target(time) for time in times])
-    memory, torques = np.zeros(16), np.zeros((TICKS, 2))
+    memory, torques = np.zeros(17), np.zeros((TICKS, 2))
     arrays = (("Law", law_numbers(law, Observer())), ("Memory", memory), ("Motion", numbers))
     numbers_of_law, past, motions = (limit.pointer(kind, array) for kind, array in arrays)
     targets, told = limit.pointer("Target", aims), limit.pointer("double", torques)
 
     def some() -> None:
-        memory[14] = 0.0  # it has seen nothing before
+        memory[15] = 0.0  # it has seen nothing before
         in_c = limit.functions.tick  # which lives as long as the library does
         for i in range(TICKS):
             in_c(numbers_of_law, past, motions + i, targets + i, PERIOD, told + 2 * i)

@@ -89,8 +89,8 @@ class LoopsState:
         next_target = target_at(law.target_time(ahead))
         assert next_target is not None  # the preview goes beyond the duration
         command = law.command(ahead, next_target)
-        speeds = next_target.speed, command.yaw_rate
-        estimator.sent(ahead.begins, command.wheels, command.fits, *speeds)
+        wanted = next_target.speed, command.yaw_rate, command.forward
+        estimator.sent(ahead.begins, command.wheels, command.fits, *wanted)
         if not self.on_their_way:
             self.on_their_way.extend([self.first or command.wheels] * self.delay)
         self.on_their_way.append(command.wheels)

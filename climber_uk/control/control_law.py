@@ -39,6 +39,7 @@ CLEARLY = 8.0  # as many times `friction_speed` is a speed whose friction is ove
 SLOPE = 0.8  # of friction's share by relative speed: steeper, and torques change faster
 RESTS = 5.0  # of `friction_speed`: speed of a reference that may as well rest
 TURN_SPEED = 0.05  # [rad/s] of a wanted yaw rate below which what resists turning fades
+Ways = tuple[Any, Any]  # how clearly a reference `comes`, and stiction's share
 Solve = Callable[..., tuple[Any, Any, Any, Any]]  # force, moment, v̇, yaw rate wanted
 
 
@@ -80,6 +81,7 @@ class ControlInput(NamedTuple):
     turning: Any = 0.0  # [N m] that resists turning
     aside: Any = 0.0  # [m/s] at which wheels give way to the left
     course: Course | None = None  # None: where its heading is
+    stiction: Any = 0.0  # share (-1 to 1) of friction that held it: see `DisturbanceEstimate`
 
 
 class Braking(NamedTuple):
@@ -161,13 +163,13 @@ class ControlLaw:
         A fixed-point iteration of two passes: the answer itself moves the state to the time that it
         is computed for, so the first pass predicts with `held`, the second with the first's result.
         """
-        motion, held, (r_F, r_N), period, _, friction, turning, aside, course = situation
+        motion, held, (r_F, r_N), period, _, friction, turning, aside, course, stiction = situation
         climber = self.climber
         ahead = self.options.lookahead(period)
         prepared = self.constraints.prepare(target) if self.other is None else target
         bounds = self._fixed_bounds or climber.bounds(motion)
         near = None if everywhere(self.options.max_torque_rate == 0) else self._bounds(situation)
-        solve, comes = self._solve, self.comes(target)
+        solve, ways = self._solve, (self.comes(target), stiction)
         drive, yaw_moment = climber.wrench(held.right, held.left)
         wall, push, left_pull = self.wall, r_F, 0.0
         if wall is not None:
@@ -176,7 +178,7 @@ class ControlLaw:
             force, moment = drive + push, yaw_moment + r_N
             predicted = predict(climber, motion, force, moment, ahead, friction, turning, aside)
             force, moment, v_1, yaw_rate = solve(
-                prepared, predicted, comes, friction, turning, course
+                prepared, predicted, ways, friction, turning, course
             )
             if wall is not None:
                 forward_pull, left_pull = weight_beyond(wall, climber, predicted)
@@ -190,15 +192,15 @@ class ControlLaw:
         demanded, wheels = Wrench(force, moment), Torques(tau_r, tau_l)
         return Command(wheels, demanded, lateral, lost, predicted, v_1, yaw_rate)
 
-    def direction(self, speed: Any, comes: Any) -> Any:
+    def direction(self, speed: Any, comes: Any, stiction: Any = 0.0) -> Any:
         """Friction's share and sign (-1 to 1) of a wanted speed [m/s], with a reference's `comes`.
 
         Along a reference that comes it is 1 until the reference rests, 0 well ahead of it; at rest
-        it fades below `friction_speed`.
+        it fades below `friction_speed`, but for the share that held the climber there.
         """
         relative = clipped(speed / self.options.friction_speed, -CLEARLY, CLEARLY)
         waits = clipped(1.0 + relative * comes / CLEARLY, 0.0, 1.0)
-        return tanh(SLOPE * waits * (relative + comes))
+        return stiction + (1.0 - abs(stiction)) * tanh(SLOPE * waits * (relative + comes))
 
     def comes(self, target: ReferencePoint) -> Any:
         """How clearly a reference moves: ±`CLEARLY` forwards, backwards, and 0 at rest."""
@@ -209,7 +211,7 @@ class ControlLaw:
         self,
         prepared: Any,
         motion: Motion,
-        comes: Any,
+        ways: Ways,
         friction: Any = 0.0,
         turning: Any = 0.0,
         course: Course | None = None,
@@ -223,7 +225,7 @@ class ControlLaw:
         v_1, yaw_acceleration, speed, yaw_rate = self._desired(prepared, motion, course)
         sideways = 0.0 if course is None else motion.yaw_rate * motion.speed * course.slope
         mass, inertia, modelled, weight = self.climber.inertial
-        rubbing = (modelled + friction) * self.direction(speed, comes)
+        rubbing = (modelled + friction) * self.direction(speed, *ways)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
         force = mass * (v_1 - sideways) + rubbing + weight * motion.sine
         return force, inertia * yaw_acceleration + scrubbing, v_1, yaw_rate
@@ -246,7 +248,7 @@ class ControlLaw:
         self,
         prepared: Any,
         motion: Motion,
-        comes: Any,
+        ways: Ways,
         friction: Any = 0.0,
         turning: Any = 0.0,
         course: Course | None = None,
@@ -264,7 +266,7 @@ class ControlLaw:
             desired = self._desired(prepared, motion, course)
             speed, yaw_rate = desired.speed, desired.yaw_rate
             A, b = rows(state, desired, ratio, 0.0 if course is None else course.rate)
-        direction = self.direction(speed, comes)
+        direction = self.direction(speed, *ways)
         Q = self.climber.applied_force(heading, direction)
         Qc = constraint_force(self.climber.mass_matrix_at(heading), Q, A, b)
         scrubbing = turning * tanh(yaw_rate / TURN_SPEED)
@@ -279,7 +281,7 @@ class ControlLaw:
         self,
         target: ReferencePoint,
         motion: Motion,
-        comes: Any,
+        ways: Ways,
         friction: Any = 0.0,
         *_unknown: Any,
     ) -> tuple[Any, Any, Any, Any]:
@@ -287,7 +289,7 @@ class ControlLaw:
         assert self.other is not None
         force, moment = self.other.wrench(self.climber, target, motion)
         mass, _, rubbing, weight = self.climber.inertial
-        direction = self.direction(target.speed, comes)
+        direction = self.direction(target.speed, *ways)
         v_1 = (force - rubbing * direction - weight * motion.sine) / mass
         return force + friction * direction, moment, v_1, 0.0
 

@@ -424,8 +424,9 @@ class Controller:
         (active.wait if self.guard.budget.listens else active.go_on)(target)
         if not self.board.teaches(law.climber, point):
             estimator.learnt = DisturbanceEstimate()
-        wheels, fits, speeds = command.wheels, command.fits, (point.speed, command.yaw_rate)
-        estimator.sent(ahead.begins, wheels, fits, *speeds)
+        wheels, fits = command.wheels, command.fits
+        wanted = point.speed, command.yaw_rate, command.forward
+        estimator.sent(ahead.begins, wheels, fits, *wanted)
         return target.mode, target.detail, command
 
     def _law_for(self, is_gentle: bool) -> ControlLaw:

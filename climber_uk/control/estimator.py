@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 from climber_uk.control.control_law import ControlInput
 from climber_uk.control.delay_check import DelayCheck
 from climber_uk.control.model import (
+    EXPECTED_REST,
+    REST,
     SETTLES,
     SLOW,
     SLOW_TURN,
@@ -31,7 +33,7 @@ from climber_uk.control.timing import (
 from climber_uk.control.twist import TwistKind, mean_twist
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import clipped, select, sign
+from climber_uk.mechanics.elementary import anywhere, clipped, select, sign, tanh
 from climber_uk.mechanics.many import chosen
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.mechanics.wall import Wall, weight_beyond
@@ -157,8 +159,11 @@ class Estimator:
         begins, learnt = self.begin(age), self.learnt
         motion, disturbance = self.expected_at(begins), Wrench(learnt.force, learnt.moment)
         held, resistance = self._sent.last, (learnt.friction, learnt.turning)
-        aside = self._aside(motion)
-        return ControlInput(motion, held, disturbance, self.period, begins, *resistance, aside)
+        return ControlInput(
+            *(motion, held, disturbance, self.period, begins, *resistance),
+            aside=self._aside(motion),
+            stiction=tanh(learnt.stiction),
+        )
 
     def pending(self, begins: int) -> Acting:
         """Torques that act from the last odometry until `begins` [ns]."""
@@ -194,10 +199,11 @@ class Estimator:
         learning: Any = False,
         speed: Any | None = None,
         yaw_rate: Any = 0.0,
+        forward: Any = 0.0,
     ) -> None:
         """Torques were sent, which act from `begins` [ns] on, to drive at a `speed` [m/s].
 
-        The `yaw_rate` [rad/s] is the one that is wanted.
+        The `yaw_rate` [rad/s] and the acceleration `forward` [m/s²] are those that are wanted.
 
         `learning` is whether they are what was wanted: where a limit cut them, nothing is
         learnt of the disturbance.
@@ -205,6 +211,10 @@ class Estimator:
         self._learning = learning
         if speed is not None:
             self._direction = sign(select(abs(speed) > SLOW, speed, 0.0))
+            assert self.motion is not None  # it was answered
+            held = (abs(speed) < REST) & (abs(self.motion.speed) < EXPECTED_REST)
+            if anywhere(held | (self.learnt.stiction != 0.0)):
+                self.learnt = self.learnt.asked(forward, held, self.period)
             self._turning = yaw_rate
             self._turn = sign(select(abs(yaw_rate) > SLOW_TURN, yaw_rate, 0.0))
         later = round(self._known * SECOND)

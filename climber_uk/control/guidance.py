@@ -2,7 +2,8 @@
 
     wanted = v_d - L tanh(k_x e_x / L)                        the speed that leads back
     v̇ = v̇_d - 2 ζ ω (v - wanted),  k_x = ω / 2ζ               ë_x + 2 ζ ω ė_x + ω² e_x = 0, nearby
-    ψ = θ - θ_d + atan(g e_y),  g = k_y v_d / √(v_d² + v_s²)  0 for the heading that leads back
+    ψ = θ - θ_d + atan(g e_y)                                 0 for the heading that leads back
+    g = k_y v_d / √(v_s² + v_d² + (k_y v_d² / ω_n)²)
     s = ψ̇ + R tanh(k_ψ ψ / R),  k_ψ = ω_n / 2ζ                the rate of turning off the one wanted
     ψ̈ = -2 ζ ω_n s,  ω_n = 2/3 ω                              gives θ̈
 
@@ -53,8 +54,9 @@ class Guidance:
 
     Near the reference the error along the track and ψ = θ - θ_d + atan(g e_y) are oscillators with
     the damping ζ: the former with ω = `frequency`, ψ with 2/3 of it, as it is ψ that leads the
-    error across the track back, at g v. g = k_y v_d / √(v_d² + v_s²) fades where steering cannot
-    help and changes sign in reverse gear. With the no-slip row, A is orthonormal.
+    error across the track back, at g v. g fades below v_s, where steering cannot help, and changes
+    sign in reverse gear; g v stays below ω_n, as ψ cannot follow what is faster. With the no-slip
+    row, A is orthonormal.
 
     L bounds how much the speed differs from the reference's. Behind it, L = √(v_s²/4 + (c v_d)²),
     where c v_d is at most v_c. Ahead of it, L = √(v_d² + v_s²/4): a climber slows down and waits
@@ -68,7 +70,9 @@ class Guidance:
     damping: float = parameter(
         0.7, "", "ζ; 1: no overshoot, lower: faster", above=0.5, at_most=2, runtime=True
     )
-    cross_track_gain: float = parameter(1.2, "1/m", "k_y", at_least=0, runtime=True)
+    cross_track_gain: float = parameter(
+        8.0, "1/m", "k_y, less where that is too fast for ω", at_least=0, runtime=True
+    )
     fade_speed: float = parameter(1.0, "m/s", "v_s, below which k_y fades", above=0, runtime=True)
     catch_up_share: float = parameter(
         0.25, "", "c, share of its speed that is added behind the reference", above=0, runtime=True
@@ -83,12 +87,21 @@ class Guidance:
         4.0, "rad/s", "fastest turn back to the heading wanted", above=0, runtime=True
     )
 
+    @property
+    def heading_frequency(self) -> float:
+        """ω_n [rad/s]."""
+        return HEADING_SHARE * self.frequency
+
+    def steering(self, speed: float) -> float:
+        """g [1/m] at a speed [m/s] of the reference."""
+        steep = self.cross_track_gain * speed
+        return steep / math.hypot(speed, self.fade_speed, steep * speed / self.heading_frequency)
+
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """See `ConstraintSet`; steering along atan(g e_y) turns by g v at most."""
         v_s = self.fade_speed
         hurry = math.hypot(v_s / 2, min(self.catch_up_share * speed, self.catch_up_speed))
-        root = math.hypot(speed, v_s)
-        steering = self.cross_track_gain * speed / root * (speed + hurry)
+        root, steering = math.hypot(speed, v_s), self.steering(speed) * (speed + hurry)
         return_rate = min(root / self.turn_radius, self.turn_rate)
         return speed + hurry, yaw_rate + return_rate + steering
 
@@ -108,18 +121,23 @@ class Guidance:
         v_s, k_y, c = self.fade_speed, self.cross_track_gain, self.catch_up_share
         v_s2, v2 = v_s * v_s, v * v
         root2 = v2 + v_s2
-        root = sqrt(root2)
-        # g = k_y ς(v_d), ς = v/√(v² + v_s²), ς' = v_s²/(v² + v_s²)^(3/2),
-        # ς'' = -3 v ς'/(v² + v_s²):  ς̇ = ς' v̇,  ς̈ = ς' v̈ + ς'' v̇²
-        fade, slope = v / root, v_s2 / (root * root2)
+        # g = k_y ς(v_d), ς = v/√q, q = v_s² + v² + c v⁴, c = (k_y/ω_n)², N = v_s² - c v⁴:
+        # ς' = N/q^(3/2), ς'' = -v (4 c v² + 3 N (1 + 2 c v²)/q)/q^(3/2),
+        # ς̇ = ς' v̇,  ς̈ = ς' v̈ + ς'' v̇²
+        too_fast = (k_y / self.heading_frequency) ** 2 * v2
+        q, N = root2 + too_fast * v2, v_s2 - too_fast * v2
+        root_q = sqrt(q)
+        steep = 1.0 / (q * root_q)
+        fade, slope = v / root_q, N * steep
+        bend = -v * (4.0 * too_fast + 3.0 * N * (1.0 + 2.0 * too_fast) / q) * steep
         fade_1 = slope * v_1
-        fade_2 = slope * v_2 - 3.0 * fade_1 * v * v_1 / root2
+        fade_2 = slope * v_2 + bend * v_1 * v_1
         # ahead L = √(v_d² + v_s²/4), behind L = √(v_s²/4 + min(c |v_d|, v_c)²)
         slow_down = sqrt(v2 + 0.25 * v_s2)
         is_below_ceiling = c * abs(v) < self.catch_up_speed
         catch_up = sqrt(0.25 * v_s2 + select(is_below_ceiling, c * c * v2, self.catch_up_speed**2))
         # R = min(√(v_d² + v_s²)/ρ, R_max)
-        tightest = root / self.turn_radius
+        tightest = sqrt(root2) / self.turn_radius
         return_rate = select(tightest < self.turn_rate, tightest, self.turn_rate)
         gain = k_y * fade, k_y * fade_1, k_y * fade_2
         limits = slow_down, catch_up, return_rate
@@ -161,7 +179,7 @@ class Guidance:
         psi_2 = slope * w_2 - 2.0 * w * steered_1 * steered_1
 
         # s: 0 when it turns back as fast as it should; ψ̈ = -2 ζ ω_n s, solved for θ̈
-        omega_n = HEADING_SHARE * omega_x
+        omega_n = self.heading_frequency
         s = psi_1 + R * tanh(omega_n / damping * psi / R)
         theta_2 = omega_d1 - psi_2 - damping * omega_n * s
         return DesiredAcceleration(v_1, theta_2, wanted, omega - s)

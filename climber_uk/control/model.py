@@ -33,6 +33,12 @@ TURNING_SHARE = 0.95  # of an unknown moment, put down to what resists turning
 SETTLES = 0.2  # [s] after a rest, in which friction that lets go is a step, and no ramp
 LETS_GO = 0.05  # [m/s] of what broke loose
 UNSTICKING_TIME = 0.02  # [s] of unlearning what only held it at rest
+STICTION_SPEED = 1e-3  # [m/s] asked for of what stands: then most of friction is overcome
+STICTION_RATE = 24.0  # [1/s] of that ratio, at most: faster, and torques jump
+MOST_STICTION = 6.0
+NEARLY_ALL = 3.0  # of it, with 0.995 of friction
+REST = 1e-4  # [m/s] of a reference that is at rest
+PATIENCE = 3.0  # [s] in which it is forgotten
 MOST_LEARNT = 0.4  # of K (2 T + δ), at most
 Shares = tuple[Any, Any]  # of an error, put down to the disturbance and to its change
 
@@ -103,11 +109,24 @@ class DisturbanceEstimate(NamedTuple):
     turning: Any = 0.0  # [N m] that resists turning: none in the model
     settling: Any = 0.0  # [s] left after a rest: what was learnt there may hold there only
     stuck: Any = 0.0  # [N] of force and friction that was learnt there, and is believed yet
+    stiction: Any = 0.0  # tanh of it: share of friction that held it where a reference rests
 
     @property
     def without_rates(self) -> "DisturbanceEstimate":
         """The same while nothing can be learnt."""
         return self._replace(force_rate=0.0, moment_rate=0.0)
+
+    def asked(self, forward: Any, held: Any, time: float) -> "DisturbanceEstimate":
+        """With an acceleration [m/s²] asked for, for `time` [s], of what may be `held` by friction.
+
+        It is taken back once it moves, its reference does, or the opposite is asked for.
+        """
+        most, before = STICTION_RATE * time, self.stiction
+        back = clipped(before, -NEARLY_ALL, NEARLY_ALL)
+        before = select(held & (before * forward >= 0.0), before, back)
+        change = select(held, time * (forward / STICTION_SPEED - before / PATIENCE), -before)
+        stiction = clipped(before + clipped(change, -most, most), -MOST_STICTION, MOST_STICTION)
+        return self._replace(stiction=stiction)
 
     def lets_go(self, unexpected: Any, speed: Any, time: float) -> Any:
         """How much [N] of what was learnt at rest is taken back in `time` [s], soon after it.
@@ -205,7 +224,7 @@ class Observer:
             return self._from_pose(climber, learnt, expected, measured, time, direction, turn)
         if everywhere(self.bandwidth == 0):
             return measured, _faded(learnt, time)
-        _, _, force_rate, moment_rate, _, turning, settling, stuck = learnt
+        _, _, force_rate, moment_rate, _, turning, settling, stuck, stiction = learnt
         mass, inertia, _, _ = climber.inertial
         new, newer = shares
         acceleration = (measured.speed - expected.speed) / time
@@ -228,7 +247,7 @@ class Observer:
         moment_rate = select(held, 0.0, moment_rate)
         resisting = friction, turning
         learnt = DisturbanceEstimate(
-            force, moment, force_rate, moment_rate, *resisting, settling, stuck
+            force, moment, force_rate, moment_rate, *resisting, settling, stuck, stiction
         )
         return measured, learnt
 
@@ -272,12 +291,17 @@ class Observer:
         moment, turning = learnt.turned(
             climber, k / time**2 * inertia * heading_change, turn, omega
         )
-        return motion, DisturbanceEstimate(force, moment, friction=friction, turning=turning)
+        return motion, DisturbanceEstimate(
+            force, moment, friction=friction, turning=turning, stiction=learnt.stiction
+        )
 
 
 def _faded(learnt: DisturbanceEstimate, time: float) -> DisturbanceEstimate:
     left = exp(-time / FORGETTING_TIME)
-    force, moment, _, _, friction, turning, _, _ = learnt
+    force, moment, _, _, friction, turning, _, _, stiction = learnt
     return DisturbanceEstimate(
-        left * force, left * moment, friction=left * friction, turning=left * turning
+        *(left * force, left * moment),
+        friction=left * friction,
+        turning=left * turning,
+        stiction=stiction,
     )

@@ -115,7 +115,9 @@ def test_guidance_makes_speed_and_heading_errors_decay_as_it_says(case):
     def heading_error(state, time):
         reference = trajectory.at(time)
         _, e_y, turned = tracking_error(state.pose, reference)
-        return turned + np.arctan(1.3 * reference.speed / np.hypot(reference.speed, 0.4) * e_y)
+        v_d = reference.speed
+        steering = 1.3 * v_d / np.sqrt(v_d**2 + 0.4**2 + (1.3 * v_d**2 / 4.0) ** 2)
+        return turned + np.arctan(steering * e_y)
 
     reference_rate = differences(lambda _, time: trajectory.at(time).speed, state, demand, time)[1]
     value, _, _ = differences(speed_error, state, demand, time)

@@ -13,7 +13,9 @@ CLIMBER_YAML = Guidance(frequency=11.0, cross_track_gain=12.0, fade_speed=0.1)
 
 
 def steering(gains, v_d):
-    return gains.cross_track_gain * v_d / np.hypot(v_d, gains.fade_speed)
+    steep = gains.cross_track_gain * v_d
+    too_fast = steep * v_d / (2 / 3 * gains.frequency)
+    return steep / np.sqrt(v_d**2 + gains.fade_speed**2 + too_fast**2)
 
 
 def on_a_circle(v_d, omega_d):
@@ -80,7 +82,7 @@ def test_behind_a_reference_of_any_speed_it_does_so_with_any_gains(gains):
     assert largest_approach(gains, 0.05, 12.0, 2.0, (np.pi / 2, 3 * np.pi / 2)) < 0
 
 
-@pytest.mark.parametrize(("speed", "radius"), [(0.7, 0.85), (0.5, 0.45), (0.3, 0.21)])
+@pytest.mark.parametrize(("speed", "radius"), [(0.5, 1.48), (0.3, 0.6), (0.2, 0.35)])
 def test_ahead_of_a_slower_reference_the_disc_is_smaller(speed, radius):
     assert largest_approach(Guidance(), speed, speed, radius) < 0
     assert largest_approach(Guidance(), speed, speed, 1.1 * radius) > 0
@@ -117,3 +119,21 @@ def test_there_is_no_false_equilibrium_where_the_look_ahead_is_long_beside_the_r
         for v_d in np.geomspace(0.01, fastest, 40):
             e_y = np.linspace(0.01, 0.99, 100) * radius
             assert excess(gains, radius, v_d, e_y)[0].max() < 0
+
+
+@pytest.mark.parametrize(("gains", "nearest"), [(Guidance(), 1.3), (CLIMBER_YAML, 0.5)])
+def test_no_false_equilibrium_is_near_the_reference(gains, nearest):
+    for radius in np.geomspace(0.2, 20, 30):
+        for v_d in np.geomspace(0.1, 12, 15):
+            over, state = excess(gains, radius, v_d, np.linspace(0.005, 0.995, 200) * radius)
+            there = np.flatnonzero(np.diff(np.sign(over)))
+            assert np.all(np.hypot(*state.pose[there, :2].T) > nearest)
+
+
+@pytest.mark.parametrize("gains", [Guidance(), CLIMBER_YAML])
+def test_the_look_ahead_gets_longer_where_the_heading_could_not_follow(gains):
+    speeds = np.geomspace(0.01, 30.0, 50)
+    rates = speeds * [gains.steering(speed) for speed in speeds]
+    assert np.all(np.diff(rates) > 0)
+    assert rates[-1] == pytest.approx(gains.heading_frequency, rel=0.01)
+    assert rates[-1] < gains.heading_frequency

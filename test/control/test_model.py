@@ -318,3 +318,15 @@ def test_of_many_that_take_speeds_from_poses_each_has_its_own_bandwidth():
         for got, wanted in zip(many, corrected(bandwidth, expected), strict=True):
             for numbers, number in zip(got, wanted, strict=True):
                 assert np.broadcast_to(numbers, 2)[i] == pytest.approx(number, rel=1e-12)
+
+
+def test_friction_that_holds_at_rest_is_overcome_and_taken_back_without_a_jump():
+    learnt, shares = DisturbanceEstimate(), []
+    for _ in range(200):
+        learnt = learnt.asked(0.01, True, 0.005)
+    assert np.tanh(learnt.stiction) > 0.9999
+    for _ in range(40):  # as its reference goes on
+        learnt = learnt.asked(-0.01, False, 0.005)
+        shares.append(np.tanh(learnt.stiction))
+    assert shares[-1] == 0.0
+    assert np.abs(np.diff(shares)).max() <= 24.0 * 0.005
