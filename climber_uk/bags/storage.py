@@ -7,7 +7,7 @@ after every `write`.
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -178,13 +178,15 @@ class Sqlite3:
         self.path = stem.with_name(f"{stem.name}.db3")
         self._types: set[str] = set()
         self._database = sqlite3.connect(self.path)
-        with self._transaction() as database:
+        with ExitStack() as stack, self._transaction() as database:
+            stack.callback(self._database.close)
             # Between two commits all rows have to be in the file itself: rosbags reads nothing
             # beside it, so no write-ahead log. Waiting for the disk, which is off in rosbag2 too,
             # would guard against power cuts, not against a kill.
             database.executescript("PRAGMA journal_mode = DELETE; PRAGMA synchronous = OFF;")
             database.executescript(f"BEGIN; {self.SCHEMA} COMMIT;")
             database.execute("INSERT INTO schema VALUES (4, ?)", (distro,))
+            stack.pop_all()  # it stays open
 
     def add_topic(self, topic: Topic) -> None:
         """Store the topic, and its type where that is new."""

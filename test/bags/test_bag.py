@@ -127,6 +127,7 @@ def test_a_killed_recording_is_read_up_to_its_last_flush(tmp_path, storage):
     writer.write("/odd", 40, 40, serialized(INT, 40))
 
     assert numbers(tmp_path / "bag") == list(range(40))
+    writer.close()
 
 
 @pytest.fixture(scope="module")

@@ -167,6 +167,7 @@ def test_a_bag_opens_with_rosbags_after_every_flush(tmp_path, storage):
             assert reader.message_count == len(written)
 
         assert read == written
+    writer.close()
 
 
 def test_an_mcap_file_does_not_grow_by_being_flushed(tmp_path):
@@ -190,6 +191,7 @@ def test_log_times_do_not_fall_from_one_flush_to_the_next(tmp_path, storage):
     read = [(log_time, message.data) for _, log_time, message in read_messages(tmp_path / "bag")]
 
     assert read == [(10, "10"), (20, "20"), (30, "30"), (30, "25"), (40, "40")]
+    writer.close()
 
 
 def test_publish_times_are_kept_in_an_mcap_file(tmp_path):
