@@ -113,7 +113,11 @@ class Safety:
     )
     braking_rate: float = parameter(5.0, "1/s", "of the safe output 'hold'", at_least=0)
     odometry_timeout: float = parameter(
-        0.1, "s", "age at which odometry is stale", above=0, plausible=(0.002, 5)
+        0.1,
+        "s",
+        "age at which odometry is stale; a silence of 0.3 s, or three periods, is too long anyhow",
+        above=0,
+        plausible=(0.002, 5),
     )
     reference_timeout: float = parameter(
         0.1, "s", "how long a reference is waited for", above=0, plausible=(0.002, 5)
