@@ -118,7 +118,8 @@ class ForceBudget:
         push = _push(climber, observed.torques, _weight(climber, observed))
         holds = self._holds(climber)
         # a pose that a fix corrects moves as well, but no twist tells it
-        is_late = self._creeps and self._rests and self.pushes > 0 and _ends(climber, push, holds)
+        is_told = abs(after.speed) >= SLOW
+        is_late = is_told and self._rests and self.pushes > 0 and _ends(climber, push, holds)
         if self._rests:
             self.is_new = False  # it has answered
             self._rests, self.paused, self._slid, self.pushes = False, None, 0.0, self.pushes // 2
