@@ -47,7 +47,7 @@ def _histograms(campaign: Campaign, store: Store, directory: Path) -> Path:
         for limit in campaign.limits:
             if limit.metric == metric:
                 axes.axvline(limit.bound, color="tab:red", linestyle="--", label=str(limit))
-                axes.legend(fontsize="small")
+                axes.legend(loc="upper right", fontsize="small")
     figure.suptitle(f"How often, in {campaign.size.runs} runs")
     return saved(figure, directory / "histograms.png")
 

@@ -166,7 +166,9 @@ def pressure(message: "FluidPressure", most: float = LARGEST) -> float:
     """Pressure difference of the suction [Pa], from 0 to `most`."""
     pressure = float(message.fluid_pressure)
     if not 0 <= pressure <= most:
-        raise ValueError(f"fluid_pressure={pressure:g} must be a difference, 0 to {most:g} [Pa]")
+        raise ValueError(
+            f"fluid_pressure={pressure:g} must be from 0 to {most:g} [Pa], a difference"
+        )
     return pressure
 
 

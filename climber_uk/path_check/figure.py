@@ -30,6 +30,6 @@ def draw(found: Demands, path: Path) -> Path:
         below.plot(found.distance, reserve.clip(0.0, ENOUGH), label=name)
     below.axhline(1.0, color="k", linewidth=0.8)
     below.set(xlabel="along the path [m]", ylabel="reserve", ylim=(0, ENOUGH))
-    below.legend(fontsize=8)
+    below.legend(loc="upper right", fontsize=8)
     figure.tight_layout()
     return saved(figure, path)

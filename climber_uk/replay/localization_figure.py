@@ -27,7 +27,7 @@ def draw(sensors: RecordedSensors, found: Localized, path: Path) -> Path:
     axes[1, 1].set(xlabel="time [s]", ylabel="dotted: forwards")
     for axis in axes.flat:
         axis.grid(alpha=0.3)
-        axis.legend(fontsize="small")
+        axis.legend(loc="upper right", fontsize="small")
     return saved(figure, path, 110)
 
 

@@ -119,7 +119,7 @@ def test_motors_that_are_too_weak_stall_safely_and_give_up_after_some_attempts()
         if guard.is_for_good:
             break
     assert len(guard.faults) == 2
-    assert climb.controller.mode in (Mode.STALLED, Mode.DISTURBED, Mode.TOO_FAST)
+    assert climb.controller.mode in (Mode.STALLED, Mode.DISTURBED, Mode.OFF_PATH)
     assert climb.controller.detail.endswith("~/enable to go on")
     assert climb.fastest(7.0) < climb.reference_speed
 
@@ -199,10 +199,11 @@ def test_friction_that_is_not_as_believed_is_no_runaway_however_late_the_loop_an
     link, share_of_friction, share_of_mass, breakaway
 ):
     climb = Climb()
-    run = assert_is_never_stopped(climb, link, share_of_friction, share_of_mass, breakaway, 4.0)
+    run = assert_is_never_stopped(climb, link, share_of_friction, share_of_mass, breakaway, 5.5)
     speed = np.hypot(run.velocity[:, 0], run.velocity[:, 1])
     assert speed.max() < 2.4 * climb.reference_speed
-    assert run.distance[-1] < 5e-3
+    there = climb.trajectory.at(climb.position).pose  # the reference waits until it moves
+    assert np.hypot(*(run.pose[-1] - there)[:2]) < 5e-3
 
 
 def assert_is_never_stopped(climb, link, share_of_friction, share_of_mass, breakaway, seconds):

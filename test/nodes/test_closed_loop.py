@@ -153,7 +153,8 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     assert run.margins.values[:, :2].min() > 2.8
     assert np.abs(run.error[:, 1]).max() < 2e-3
     assert run.time[-1] >= DURATION
-    assert np.abs(run.pose[-25:] - run.pose[-1]).max() < 1e-9  # the last half second
+    # the last half second, in which it creeps home
+    assert np.abs(run.pose[-25:] - run.pose[-1]).max() < 1e-6
     assert run.distance[-1] < 5e-3
 
 

@@ -329,7 +329,7 @@ def test_suction_that_is_lost_stops_the_climber_and_its_margins_tell(world):
     before = margins[-1].vector.y
     absolute = 101325.0 - 2500.0
     pressure.publish(FluidPressure(fluid_pressure=absolute))
-    refused = "must be a difference, 0 to 12500 [Pa]"
+    refused = "must be from 0 to 12500 [Pa], a difference"
     loop.until(lambda _: f"fluid_pressure={absolute:g} {refused}" in world.log(NAME), "word of it")
     assert margins[-1].vector.z == pytest.approx(0.53 * 2500 * 0.06)
     pressure.publish(FluidPressure(fluid_pressure=2100.0))
