@@ -149,7 +149,8 @@ def row(name: str, path: str, loops: list[Loop]) -> str:
     now, pose, off = rows[0, :, 0], rows[..., 1:4], rows[..., 4:7]
     covariance = rows[..., 7:].reshape(*rows.shape[:2], 3, 3)
     nees = np.einsum("sni,snij,snj->sn", off, np.linalg.inv(covariance), off)
-    along, across, _ = tracking_error(pose, loops[0].trajectory.at(now))
+    waited = np.array([loop.record.waited for loop in loops])
+    along, across, _ = tracking_error(pose, loops[0].trajectory.at(now - waited))
     away, distance = np.hypot(along, across), np.hypot(off[..., 0], off[..., 1])
     cells = [
         f"{rms(away) / MILLIMETRE:.1f}, {away.max() / MILLIMETRE:.1f}",

@@ -107,6 +107,7 @@ class Record:
     """What a run leaves: one row for each odometry."""
 
     rows: list[list[float]] = field(default_factory=list)
+    waited: list[float] = field(default_factory=list)  # [s] by the reference until then
     remarks: list[str] = field(default_factory=list)
     filter_time: float = 0.0  # [s] of the processor
     fault: str = ""  # the controller's first, and when
@@ -162,6 +163,7 @@ class Loop:
             located = self.locate(stamp, now)
             if located is not None:
                 self.record.add(now, self.robot, located)
+                self.record.waited.append(self.controller.active.waited)
                 if case.rests:
                     continue
                 motion = self.robot.state.motion if case.believes_truth else located.motion
@@ -255,7 +257,8 @@ def figures(loops: list[Loop]) -> str:
     mean, of_seeds = nees.mean(axis=0), nees.mean(axis=1)
     low, high = (mean < bounds[0]).mean(), (mean > bounds[1]).mean()
     distance = np.hypot(off[..., 0], off[..., 1])
-    desired = loops[0].trajectory.at(now)
+    waited = np.array([loop.record.waited for loop in loops])
+    desired = loops[0].trajectory.at(now - waited)
     along, across, _ = tracking_error(pose, desired)
     away = np.hypot(along, across)
     sent = np.array([loop.sent for loop in loops])
