@@ -149,7 +149,7 @@ def closed_in_c(limit: Limit, loops: Loops, steps: int) -> Callable[[int], Array
         limit.pointer("Law", law),
         limit.pointer("double", climbers),
         *(limit.pointer("Target", points) for points in (targets, aims)),
-        contact.grip.wheel_friction_coefficient * load,
+        *(load, contact.grip.wheel_friction_coefficient, contact.grip.centre_height),
     )
 
     def in_c(periods: int) -> Array:

@@ -133,8 +133,8 @@ INLINE Wrench wanted_of(const Law *k, const Track *t, Motion found, Wrench held,
   demand(&k->gains, t, aim, v_1, &turning, &speed);
   double comes = 8 * t->v / (fabs(t->v) + 5 * k->friction_speed);
   double fast = clip(speed / k->friction_speed, -8, 8), waits = clip(1 + fast * comes / 8, 0, 1);
-  double held = tanh(r.stiction);
-  double rub = (p->friction + r.friction) * (held + (1 - fabs(held)) * tanh(0.8 * waits * (fast + comes)));
+  double stuck = tanh(r.stiction), slides = tanh(0.8 * waits * (fast + comes));
+  double rub = (p->friction + r.friction) * (stuck + (1 - fabs(stuck)) * slides);
   Wrench wanted = {p->mass * *v_1 + rub + p->weight * aim.sine - r.force,
                    p->inertia * turning - r.turn};
   return wanted;
@@ -276,12 +276,19 @@ void open_loops(int n, int steps, double time, const double *climbers, const dou
   }
 }
 
+/* Grip by what is asked of a wheel that has a part of the load. */
+INLINE double margin_of(double part, double friction, double drive, double beside) {
+  double asked = sqrt(drive * drive + part * part * beside * beside), grip = friction * part;
+  return grip < 100 * asked ? grip / asked : 100;
+}
+
 /* Ticks of n climbers with their controllers, which share a law: `now` are the references at the
- * odometry, `aims` those that the answers aim at, `load` is what grips. Sums are those of `Sums`,
- * without falls: squares, saturated, worst, last, settled, peak torque, slip margin. */
+ * odometry, `aims` those that the answers aim at; the wheels carry `load`, the centre of mass is at
+ * a `height`. Sums are those of `Sums`, without falls: squares, saturated, worst, last, settled,
+ * peak torque, slip margin. */
 void closed_loops(int n, int ticks, int steps, double period, const Law *k, const double *climbers,
-                  const Target *now, const Target *aims, double load, double *motions,
-                  double *memories, double *sums) {
+                  const Target *now, const Target *aims, double load, double friction,
+                  double height, double *motions, double *memories, double *sums) {
   double p[7][BLOCK], w[2][BLOCK], memory[17][BLOCK], sum[7][BLOCK];
   Motions m;
   for (int first = 0; first < n; first += BLOCK) {
@@ -315,14 +322,17 @@ void closed_loops(int n, int ticks, int steps, double period, const Law *k, cons
         w[0][i] = (right + left) / own.radius;
         w[1][i] = own.half_track * (right - left) / own.radius;
         double beside = own.mass * m[5][i] * m[6][i] + own.weight * m[3][i];
-        double pull = sqrt(w[0][i] * w[0][i] + beside * beside);
+        double more = clip(own.weight * m[3][i] * height / (2 * own.half_track), -load / 2, load / 2);
+        double margin = fmin(
+            margin_of(load / 2 + more, friction, right / own.radius, beside / load),
+            margin_of(load / 2 - more, friction, left / own.radius, beside / load));
         sum[0][i] += far;
         sum[1][i] += 1 - memory[15][i];
         sum[2][i] = fmax(sum[2][i], far);
         sum[3][i] = far;
         sum[4][i] = far > 1e-4 ? time : sum[4][i];
         sum[5][i] = fmax(sum[5][i], fmax(fabs(right), fabs(left)));
-        sum[6][i] = fmin(sum[6][i], load < 100 * pull ? load / pull : 100);
+        sum[6][i] = fmin(sum[6][i], margin);
       }
       for (int s = 0; s < steps; s++) step(p, m, w, period / steps);
     }
