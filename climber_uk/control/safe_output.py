@@ -139,9 +139,10 @@ class SafeOutput:
             way = self._way if mode.is_fault else 1
             sign, yaw_sign = self.polarities.signs
             drive, yaw = rate * (sign or way), rate * (yaw_sign or 1)
-            # the other wheel can brake a turn, while the seal holds what it drives
             holds = not law.falls
-            if mode is Mode.DEAD_WHEEL and holds:
+            # The other wheel can brake a turn, while the seal holds what it drives. What goes
+            # against its torques has motors the wrong way round, or late ones: a seal stops both.
+            if holds and (mode is Mode.DEAD_WHEEL or drive < 0):
                 return Braking(0.0, yaw, carries=0.0)
             # nobody knows its heading where odometry is stuck
             return Braking(drive, yaw, 0.0 if mode is Mode.STALLED and holds else way)
