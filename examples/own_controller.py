@@ -31,18 +31,28 @@ class OwnController(Node):
         super().__init__("own_controller")
         self.points: list[MultiDOFJointTrajectoryPoint] = []
         self.start = self.last = 0.0  # [s]
+        self.waiting: Odometry | None = None  # for a reference
         self.sums = [0.0, 0.0]
         self.torques = self.create_publisher(JointState, "wheel_torques", 10)
         self.create_subscription(MultiDOFJointTrajectory, "reference", self.on_reference, 10)
         self.create_subscription(Odometry, "odom", self.on_odometry, qos_profile_sensor_data)
 
     def on_reference(self, message: MultiDOFJointTrajectory) -> None:
-        """Keep the next second of the reference."""
+        """Keep the next second of the reference; answer an odometry that waits for it."""
         self.points, self.start = message.points, seconds(message.header.stamp)
+        if self.waiting is not None:
+            self.on_odometry(self.waiting)
 
     def on_odometry(self, odometry: Odometry) -> None:
-        """Answer with torques, in the wall's frame: x horizontal, y up."""
+        """Answer with torques, in the wall's frame: x horizontal, y up.
+
+        What no reference reaches to is not answered yet: in lock-step, time waits for both.
+        """
         now = seconds(odometry.header.stamp)
+        ends = self.start + seconds(self.points[-1].time_from_start) if self.points else -math.inf
+        self.waiting = odometry if now > ends else None
+        if self.waiting is not None:
+            return
         step, self.last = now - (self.last or now), now
         force, moment = self.law(odometry, now, step)
         halves = force / 2 - moment / HALF_TRACK / 2, force / 2 + moment / HALF_TRACK / 2

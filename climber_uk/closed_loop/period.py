@@ -89,8 +89,10 @@ class LoopsState:
         next_target = target_at(law.target_time(ahead))
         assert next_target is not None  # the preview goes beyond the duration
         command = law.command(ahead, next_target)
-        wanted = next_target.speed, command.yaw_rate, command.forward
-        estimator.sent(ahead.begins, command.wheels, command.fits, *wanted)
+        wanted = {"yaw_rate": command.yaw_rate, "forward": command.forward}
+        estimator.sent(
+            ahead.begins, command.wheels, command.fits, speed=next_target.speed, **wanted
+        )
         if not self.on_their_way:
             self.on_their_way.extend([self.first or command.wheels] * self.delay)
         self.on_their_way.append(command.wheels)

@@ -421,12 +421,14 @@ class Controller:
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
-        (active.wait if self.guard.budget.listens else active.go_on)(target)
+        if self.guard.budget.listens:
+            active.wait(target)
+        else:
+            active.go_on(target)
         if not self.board.teaches(law.climber, point):
             estimator.learnt = DisturbanceEstimate()
-        wheels, fits = command.wheels, command.fits
-        wanted = point.speed, command.yaw_rate, command.forward
-        estimator.sent(ahead.begins, wheels, fits, *wanted)
+        wanted = {"yaw_rate": command.yaw_rate, "forward": command.forward}
+        estimator.sent(ahead.begins, command.wheels, command.fits, speed=point.speed, **wanted)
         return target.mode, target.detail, command
 
     def _law_for(self, is_gentle: bool) -> ControlLaw:

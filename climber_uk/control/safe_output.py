@@ -104,10 +104,10 @@ class SafeOutput:
         Where odometry is in doubt, its heading may be wrong, and a seal that holds is trusted; so
         it is where the climber goes ever faster that way.
         """
-        if not law.falls and (mode.doubts_odometry or not self._is_carried):
-            return _let_go(estimator, age)
         knows = mode.is_fault and not mode.doubts_odometry and mode is not Mode.NO_ODOMETRY
         way = self._way if knows else 1
+        if not law.falls and (mode.doubts_odometry or not self._is_carried or way < 0):
+            return _let_go(estimator, age)
         return _brake(estimator, law, age, Braking(0.0, 0.0, way), None)
 
     def _believed(self, mode: Mode, motion: Motion) -> tuple[Motion, tuple[int, int]]:

@@ -19,12 +19,11 @@ from climber_uk.parameters.declaration import parameter, parameters
 GRAVITY = 9.81  # [m/s²]
 DEGREE = math.pi / 180  # [rad]
 MEASURED_PRESSURE = 5.0  # at most, by `suction_pressure`: an absolute pressure is beyond
-LARGEST_PRESSURE = 1e6  # [Pa]
 
 
 def most_pressure(suction_pressure: float) -> float:
     """Largest measured pressure difference [Pa] that is believed beside `suction_pressure` [Pa]."""
-    return min(MEASURED_PRESSURE * suction_pressure or LARGEST_PRESSURE, LARGEST_PRESSURE)
+    return MEASURED_PRESSURE * suction_pressure or math.inf
 
 
 @parameters

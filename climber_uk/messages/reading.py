@@ -163,8 +163,8 @@ def wheel_torques(
 
 
 def pressure(message: "FluidPressure", most: float = LARGEST) -> float:
-    """Pressure difference of the suction [Pa], from 0 to `most`."""
-    pressure = float(message.fluid_pressure)
+    """Pressure difference of the suction [Pa], from 0 to `most`, and to `LARGEST`."""
+    pressure, most = float(message.fluid_pressure), min(most, LARGEST)
     if not 0 <= pressure <= most:
         raise ValueError(
             f"fluid_pressure={pressure:g} must be from 0 to {most:g} [Pa], a difference"

@@ -1,6 +1,5 @@
 """The package of docs/extending.md, installed and run through the real nodes, in lock-step."""
 
-import re
 import shlex
 import sys
 
@@ -83,14 +82,13 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
 def test_a_controller_of_somebody_else_s_takes_ours_place(world, tmp_path):
     own = shlex.join([sys.executable, str(CONFIG.parent / "examples" / "own_controller.py")])
     options = ["--config", CONFIG / "climber.yaml", "--output", tmp_path / "run"]
-    # it answers without waiting for a reference, so time runs ahead of planner and demonstration
-    words = [*options, "--duration", "6", "--controller", own]
+    words = [*options, "--duration", "2", "--controller", own]
     demo = world.run("run_demo", executable("run_demo"), *words)
     assert demo.wait(TIMEOUT) == 0, world.log("run_demo")
-    assert re.search(r"The path was not finished: [45]\d s", world.log("run_demo"))  # of 55 s
+    assert "The path was not finished: 5" in world.log("run_demo")  # of 55 s
     run = read_run(tmp_path / "run" / "bag")
     assert run.travelled > 0.02
-    assert np.median(run.distance) < 0.01
+    assert run.distance.max() < 0.01
     assert not run.parameters  # it is not ours
 
 
