@@ -36,7 +36,7 @@ from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.leaving import LONGEST_END, leave
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
-from climber_uk.system.command_line import in_words
+from climber_uk.system.command_line import in_words, printable
 from climber_uk.system.signals import on_end
 
 # else the first message type would have the generator of message types loaded, and its parser
@@ -49,6 +49,7 @@ BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 PUBLISH_PERIOD = SECOND // 20  # [ns] of topics that need not be published every time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
+LONGEST_LINE = 2000  # [characters] of an error
 LINES, LINES_PERIOD = 6, 10.0  # most lines of the log on one subject, in so many [s]
 EPILOG = (
     "Parameters, which docs/parameters.md lists, come after --ros-args: --params-file FILE, or -p "
@@ -162,7 +163,7 @@ class ClimberNode(Node):
         about = self.summary()
         self.get_logger().info(self.parameters.origin + (about and f"; {about}"))
         for remark in [*self.parameters.remarks, *self._idle_overrides()]:
-            self.get_logger().warning(remark)
+            self.get_logger().warning(printable(remark))
 
     def _idle_overrides(self) -> list[str]:
         """Lines about `qos_overrides` that no publisher or subscription of this node has used."""
@@ -324,8 +325,9 @@ def parse(
 
 
 def in_a_line(error: Exception) -> str:
-    """Message of an error in one line, without rcl's file names."""
+    """Message of an error in one line that is safe to print, without rcl's file names."""
     if isinstance(error, UnknownROSArgsError):
         return f"not known after --ros-args: {str(error).strip('[]')}"
     said = " ".join(in_words(error).split()) or type(error).__name__
-    return re.sub(r", at /[^, ]*:\d+", "", said)
+    said = re.sub(r", at /[^, ]*:\d+", "", said)
+    return printable(said[:LONGEST_LINE]) + "…" * (len(said) > LONGEST_LINE)

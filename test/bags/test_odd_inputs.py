@@ -1,6 +1,7 @@
 """Odd bags and odd words on the command lines: the right result, or a line that says why not."""
 
 import re
+import resource
 import sqlite3
 import subprocess
 import sys
@@ -475,3 +476,15 @@ def test_an_output_that_cannot_be_written_is_said(tmp_path):
         "the output is not written: No space left on device\n",
     )
     assert (bag / "tum" / "odom.tum").exists()
+
+
+def test_a_full_disk_is_said_with_its_place(tmp_path, run):
+    bag = a_whole_run().write(tmp_path / "bag")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        failed, said = run("export_tum", bag, "-o", "tum")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert failed
+    assert said.startswith("export_tum: File too large: in tum, or ")
