@@ -32,6 +32,7 @@ class Marks:
     speed: Array  # (n,) [m/s] at most, from each to the next; infinite: as fast as planned
     dwell: Array  # (n,) [s] of rest at each
     tags: tuple[str, ...]  # (n,) that are told when each is reached; empty: nothing is told
+    unused: tuple[str, ...] = ()  # columns of the file by which nothing is done
 
     @classmethod
     def none(cls, number: int) -> "Marks":
@@ -79,6 +80,7 @@ class _Columns:
 
     number: int
     at: dict[str, int] = field(default_factory=lambda: {"x": 0, "y": 1})
+    unused: tuple[str, ...] = ()  # names of the others
 
 
 def read_waypoint_text(text: str) -> tuple[Array, Marks]:
@@ -111,7 +113,7 @@ def read_waypoint_text(text: str) -> tuple[Array, Marks]:
     speed = [_size(n, row, "speed", is_comma, math.inf) for n, row in rows_of]
     dwell = [_size(n, row, "dwell", is_comma, 0.0) for n, row in rows_of]
     tags = tuple(row.get("tag", "") for _, row in rows_of)
-    return np.array(points), Marks(np.array(speed), np.array(dwell), tags)
+    return np.array(points), Marks(np.array(speed), np.array(dwell), tags, columns.unused)
 
 
 def _size(line: int, row: dict[str, str], name: str, is_comma: bool, default: float) -> float:
@@ -177,7 +179,8 @@ def _named(where: str, names: list[str]) -> _Columns:
         unit = UNIT.search(name)
         if unit and (unit[1] or unit[2] or "").strip().lower() not in units:
             raise ValueError(f"{where}: column {name!r} must be in {units[0]}")
-    return _Columns(len(names), at)
+    unused = (name for column, name in enumerate(names) if name and column not in at.values())
+    return _Columns(len(names), at, tuple(unused))
 
 
 def _name(cell: str) -> str:
