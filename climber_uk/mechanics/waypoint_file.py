@@ -83,9 +83,39 @@ class _Columns:
     unused: tuple[str, ...] = ()  # names of the others
 
 
-def read_waypoint_text(text: str) -> tuple[Array, Marks]:
-    """Points (n, 2) [m] of the text of a file, and marks; `ValueError` naming the line."""
-    lines = list(enumerate(text.split("\n"), start=1))
+def blocks(text: str) -> list[tuple[int, str]]:
+    """Texts between empty lines that have points, each with the number of its first line.
+
+    A header, or comments, above the first of them are put above each that has no header of its own.
+    """
+    head, block = list[str](), list[str]()
+    found: list[tuple[int, str]] = []
+    for number, line in enumerate([*text.split("\n"), ""], start=1):
+        if line.strip():
+            block.append(line)
+            continue
+        bare = [COMMENT.sub("", row).strip(" \t") for row in block]
+        top = next((i for i, row in enumerate(bare) if _has_number(row)), len(block))
+        if not found:
+            head += block[:top]
+        elif any(bare[:top]):
+            head = block[:top]
+        if top < len(block) or (found and any(bare)):
+            found.append((number - len(block[top:]) - len(head), "\n".join(head + block[top:])))
+        block = []
+    return found
+
+
+def _has_number(row: str) -> bool:
+    return any(map(_is_number, _split(row, _separator(row))))
+
+
+def read_waypoint_text(text: str, first: int = 1) -> tuple[Array, Marks]:
+    """Points (n, 2) [m] of the text of a file, and marks; `ValueError` naming the line.
+
+    `first` is the number of its first line.
+    """
+    lines = list(enumerate(text.split("\n"), start=first))
     rows = [(n, bare) for n, line in lines if (bare := COMMENT.sub("", line).strip(" \t"))]
     if not rows:
         raise ValueError("no points in it: want x and y [m] of a point a line")
