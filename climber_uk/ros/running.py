@@ -49,7 +49,8 @@ BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 PUBLISH_PERIOD = SECOND // 20  # [ns] of topics that need not be published every time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
-LONGEST_LINE = 2000  # [characters] of an error
+LONGEST_LINE = 1000  # [characters] of what is logged of others
+TYPES_PERIOD = 2.0  # [s] in which topics are looked at for publishers of another type
 LINES, LINES_PERIOD = 6, 10.0  # most lines of the log on one subject, in so many [s]
 EPILOG = (
     "Parameters, which docs/parameters.md lists, come after --ros-args: --params-file FILE, or -p "
@@ -163,7 +164,17 @@ class ClimberNode(Node):
         about = self.summary()
         self.get_logger().info(self.parameters.origin + (about and f"; {about}"))
         for remark in [*self.parameters.remarks, *self._idle_overrides()]:
-            self.get_logger().warning(printable(remark))
+            self.get_logger().warning(clipped(remark))
+        self.create_timer(TYPES_PERIOD, self.check_types, clock=WALL_CLOCK)
+
+    def check_types(self) -> None:
+        """Report topics on which something of another type is published: none of it arrives."""
+        for subscription in self.subscriptions:
+            topic, kind = subscription.topic_name, subscription.msg_type
+            wanted = f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+            found = {of.topic_type for of in self.get_publishers_info_by_topic(topic)} - {wanted}
+            trouble = f"{', '.join(sorted(found))} is published, not {wanted}" if found else ""
+            self.report(f"type of {topic}", trouble, is_fault=False)
 
     def _idle_overrides(self) -> list[str]:
         """Lines about `qos_overrides` that no publisher or subscription of this node has used."""
@@ -204,7 +215,7 @@ class ClimberNode(Node):
             return
         self._troubles[subject] = trouble, is_fault
         _, before = self._unlogged.get(subject, ("", -1))
-        self._unlogged[subject] = detail, before + 1
+        self._unlogged[subject] = clipped(detail), before + 1
         self._log(subject)
 
     def _log(self, subject: str) -> None:
@@ -330,4 +341,9 @@ def in_a_line(error: Exception) -> str:
         return f"not known after --ros-args: {str(error).strip('[]')}"
     said = " ".join(in_words(error).split()) or type(error).__name__
     said = re.sub(r", at /[^, ]*:\d+", "", said)
-    return printable(said[:LONGEST_LINE]) + "…" * (len(said) > LONGEST_LINE)
+    return clipped(said)
+
+
+def clipped(text: str) -> str:
+    """Text of a user or a message that is safe to print, and has an end."""
+    return printable(text[:LONGEST_LINE]) + "…" * (len(text) > LONGEST_LINE)

@@ -1,13 +1,19 @@
 """What all nodes have in common, in the process of the test."""
 
+import time
 from types import SimpleNamespace
 
 import pytest
 import rclpy
-from world import new_domain
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from world import TIMEOUT, new_domain
 
 from climber_uk.mechanics import SECOND
 from climber_uk.ros import running
+
+ODOMETRY = "nav_msgs/msg/Odometry"
 
 pytestmark = pytest.mark.nodes
 
@@ -24,8 +30,8 @@ def node():
 def test_of_troubles_that_come_and_go_some_are_said_and_the_last_one_in_the_end(
     node, monkeypatch, capfd
 ):
-    time = SimpleNamespace(nanoseconds=0)
-    monkeypatch.setattr(running, "WALL_CLOCK", SimpleNamespace(now=lambda: time))
+    now = SimpleNamespace(nanoseconds=0)
+    monkeypatch.setattr(running, "WALL_CLOCK", SimpleNamespace(now=lambda: now))
     for number in range(20):
         node.report("wheels", "" if number % 2 else "stuck")
     node.report("wheels", "gone", "both")
@@ -36,7 +42,43 @@ def test_of_troubles_that_come_and_go_some_are_said_and_the_last_one_in_the_end(
         return [line.split("]: ")[1] for line in capfd.readouterr().err.splitlines()]
 
     assert said() == [*["wheels: stuck", "wheels: ok again"] * 3, "seal: worn"]
-    time.nanoseconds = round(running.LINES_PERIOD * SECOND)
+    now.nanoseconds = round(running.LINES_PERIOD * SECOND)
     node.check_publishers()
     node.check_publishers()
     assert said() == ["wheels: gone (both) [14 changes were not logged]"]
+
+
+def test_a_topic_on_which_another_type_is_published_is_said(node, capfd):
+    node.subscription(Odometry, "odom", lambda _: None)
+    node.publisher(Odometry, "odom")
+    node.check_types()
+    elsewhere = Context()  # one participant has one type on a topic
+    rclpy.init(context=elsewhere, domain_id=node.context.get_domain_id())
+    try:
+        other = rclpy.create_node("other", context=elsewhere)
+        publisher = other.create_publisher(PoseStamped, "odom", 1)
+        said = wait_for_line(node.check_types, capfd)
+        assert said == "type of /odom: geometry_msgs/msg/PoseStamped is published, not " + ODOMETRY
+        other.destroy_publisher(publisher)
+        assert wait_for_line(node.check_types, capfd) == "type of /odom: ok again"
+        other.destroy_node()
+    finally:
+        rclpy.shutdown(context=elsewhere)
+
+
+def wait_for_line(do, capfd):
+    """Do it until a line is logged: the middleware takes its time."""
+    end = time.monotonic() + TIMEOUT
+    while not (said := capfd.readouterr().err):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+        do()
+    (line,) = said.splitlines()
+    return line.split("]: ")[1]
+
+
+def test_what_others_told_has_an_end_and_is_safe_to_print(node, capfd):
+    node.report("names", "refused", "a\x1b[2J" + "x" * 10**6)
+    (line,) = capfd.readouterr().err.splitlines()
+    assert r"a\x1b[2Jxxx" in line
+    assert len(line) < 2 * running.LONGEST_LINE
