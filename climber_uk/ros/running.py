@@ -37,7 +37,7 @@ from climber_uk.ros.leaving import LONGEST_END, leave
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import in_words, printable
-from climber_uk.system.signals import on_end
+from climber_uk.system.signals import Interrupted, on_end
 
 # else the first message type would have the generator of message types loaded, and its parser
 sys.modules.setdefault("rosidl_generator_py.generate_py_impl", None)  # type: ignore[arg-type]
@@ -288,15 +288,20 @@ def run(
     ends in rclpy 7.1, and it sees signals only between callbacks, hence the idle timer.
     """
     nodes: Sequence[ClimberNode] = ()
-    end = Future()
+    end, is_asked = Future(), False
 
     def stop(*_: object) -> None:
-        if nodes:  # else they are being made, which takes a slow machine its time
-            signal.alarm(LONGEST_END)  # by the kernel: a callback may hang in the middleware
+        nonlocal is_asked
+        if is_asked:  # once more, maybe while `end` is locked
+            return
+        is_asked = True
         end.set_result(None)
+        if not nodes:  # they are being made, of which there may be no end
+            raise Interrupted
+        signal.alarm(LONGEST_END)  # by the kernel: a callback may hang in the middleware
 
-    on_end(stop)
     try:
+        on_end(stop)
         ParameterFiles(sys.argv, "")  # raises with the line that is wrong, unlike rcl
         chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})
         use_udp()
@@ -310,6 +315,8 @@ def run(
         gc.freeze()  # to look through all that was imported would halt the loop for 20 ms
         while not end.done():
             executor.spin_until_future_complete(end, timeout_sec=3600.0)
+    except Interrupted:
+        pass
     except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
         if nodes:
             raise

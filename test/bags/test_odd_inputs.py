@@ -1,5 +1,6 @@
 """Odd bags and odd words on the command lines: the right result, or a line that says why not."""
 
+import os
 import re
 import resource
 import sqlite3
@@ -452,6 +453,11 @@ def test_a_parameter_file_without_end_is_refused():
         pytest.raises(ValueError, match="larger than 16 MiB"),
     ):
         read_sections(Path(f"/dev/fd/{endless.fileno()}"))
+
+
+def test_a_pipe_into_which_nobody_writes_is_an_empty_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert not read_sections(tmp_path / "pipe")
 
 
 def test_an_odd_number_in_a_few_odometries_costs_these_at_most(tmp_path):

@@ -1,5 +1,9 @@
 """What all nodes have in common, in the process of the test."""
 
+import os
+import signal
+import subprocess
+import sys
 import time
 from types import SimpleNamespace
 
@@ -11,6 +15,7 @@ from rclpy.context import Context
 from world import TIMEOUT, new_domain
 
 from climber_uk.mechanics import SECOND
+from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros import running
 
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -82,3 +87,31 @@ def test_what_others_told_has_an_end_and_is_safe_to_print(node, capfd):
     (line,) = capfd.readouterr().err.splitlines()
     assert r"a\x1b[2Jxxx" in line
     assert len(line) < 2 * running.LONGEST_LINE
+
+
+ENDLESS = """
+import time
+from climber_uk.ros.running import run
+def make_nodes():
+    print("begins", flush=True)
+    time.sleep(1000.0)
+run(make_nodes, None)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_start_without_end_is_ended_by_a_signal_or_two(number):
+    command = [sys.executable, "-c", ENDLESS]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+        assert process.stdout.readline() == b"begins\n"
+        process.send_signal(number)
+        process.send_signal(number)
+        assert process.communicate(timeout=TIMEOUT)[0] == b""
+        assert process.returncode == 0
+
+
+@pytest.mark.parametrize("name", ["pipe", "/dev/zero"])
+def test_a_parameter_file_that_can_be_read_only_once_is_refused(tmp_path, name):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ValueError, match=r"(pipe|zero) is no regular file"):
+        ParameterFiles(["--ros-args", "--params-file", str(tmp_path / name)], "/x")
