@@ -22,7 +22,7 @@ STAMP, POSE = 8, 56  # [bytes] of a stamp, and of position and orientation
 
 
 def path_points(data: bytes, odom_frame: str) -> Array:
-    """Places (n, 2) [m] of a path's poses, all in `odom_frame`; orientations are not read, z is one.
+    """Places (n, 2) [m] of a path's poses, all in `odom_frame`; orientations are not read.
 
     Raises `ValueError` naming the pose, counted from 1, and what is wrong with it.
     """
