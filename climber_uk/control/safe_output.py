@@ -28,6 +28,7 @@ class SafeOutput:
     def __init__(self, safety: Safety) -> None:
         self.safety, self.polarities, self.by_pose = safety, Polarities(), PoseSpeeds()
         self._seen: Motion | None = None
+        self._is_driven = False  # ever faster, against the torques that act
         self.forget()
 
     def forget(self) -> None:
@@ -48,7 +49,11 @@ class SafeOutput:
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
         seen, self._seen = self._seen or motion, motion
+        self._is_driven = False
         if observed is not None:
+            force, _ = climber.wrench(*observed.torques)
+            last, now = observed.before.speed, observed.after.speed
+            self._is_driven = force * now < 0 and abs(now) > abs(last)
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
             self._way = self.polarities.drive.sign or self._way
@@ -70,9 +75,7 @@ class SafeOutput:
         if mode is Mode.NO_ODOMETRY and age < safety.odometry_timeout and not law.falls:
             return self._coast(mode, estimator, law, age)  # it comes again, and may be old
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
-        if stamp < self._coasts_until:
-            if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
-                self._is_carried = False
+        if self._coasts(mode, stamp, rim, law):
             return self._coast(mode, estimator, law, age)
         begin, before, lowest = self._braked or (stamp, rim, rim)
         self._braked = begin, before, min(lowest, rim)
@@ -97,6 +100,15 @@ class SafeOutput:
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
+
+    def _coasts(self, mode: Mode, stamp: int, rim: float, law: ControlLaw) -> bool:
+        """Whether it is left alone at a `stamp` [ns], with a rim's speed [m/s]."""
+        if self._braked is None and mode is Mode.TOO_FAST and self._is_driven and not law.falls:
+            # motors the wrong way round, perhaps: what brakes would drive, and a seal stops a push
+            self._coasts_until, self._is_carried = stamp + round(COASTING * SECOND), False
+        if stamp < self._coasts_until and rim > self._coasts_from + PUSHED:
+            self._is_carried = False  # motors that are not as believed, perhaps
+        return stamp < self._coasts_until
 
     def _coast(self, mode: Mode, estimator: Estimator, law: ControlLaw, age: float) -> Torques:
         """Torques that brake nothing, and carry the weight: where no seal holds it, or less of it.
@@ -142,7 +154,9 @@ class SafeOutput:
             holds = not law.falls
             # The other wheel can brake a turn, while the seal holds what it drives. What goes
             # against its torques has motors the wrong way round, or late ones: a seal stops both.
-            if holds and (mode is Mode.DEAD_WHEEL or drive < 0):
+            # Where that is known of the yaw alone, the drive is left to the seal as well.
+            is_against = drive < 0 or (yaw < 0 and sign == 0)
+            if holds and (mode is Mode.DEAD_WHEEL or is_against):
                 return Braking(0.0, yaw, carries=0.0)
             # nobody knows its heading where odometry is stuck
             return Braking(drive, yaw, 0.0 if mode is Mode.STALLED and holds else way)

@@ -124,14 +124,16 @@ class Localizer:
         rolled = self.encoders.roll(right, left, duration)
         sample, weight = self._sample(rolled)
         self.history.add(stamp, sample)
-        self.smoothing.go_on(duration)
+        travel = sample.travel
+        self.smoothing.go_on(duration, travel.distance, turn(self.estimate.mean, travel))
         if weight is not None:
             self._watch_gravity(weight)
         early, self._early = self._early, []
         for fix in early:
             self.on_fix(fix)
-        if self.located or (self.knows_heading and self.knows_position):
-            self.located = self._locate(rolled, sample.travel)
+        is_known = self.knows_heading and self.knows_position and not self._is_first
+        if self.located or is_known:
+            self.located = self._locate(rolled, travel)
             self.doubts.look(self.estimate)
         return self.located
 
