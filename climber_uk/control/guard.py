@@ -20,6 +20,7 @@ from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.parameters.declaration import parameter, parameters
 
+TOO_FAST_IN_A_ROW = 2  # odometry messages that are too fast: a single one may be wrong
 MOVES = 0.02  # [m/s] from which a climber does not rest
 RESTS = 1e-9  # [m/s] of a reference that does: one that begins is slow at first
 AT_LIMIT = 0.98  # of the largest torque
@@ -129,6 +130,7 @@ class Guard:
 
     def restart(self) -> None:
         """Watch from now on."""
+        self._too_fast = 0
         self.late = 0.0  # [s] by which what is observed is, where it is LATE
         self._stalled = 0.0  # [s]
         self._swings = Swings(), Swings()
@@ -183,17 +185,17 @@ class Guard:
         most = allowed.speed + lets_go
         if is_against:
             most = min(allowed.speed, expected.against)
-        before = observed.before
-        checks = (
-            (before.speed, motion.speed, most, options.speed_margin, "m/s"),
-            (before.yaw_rate, motion.yaw_rate, allowed.yaw_rate, options.yaw_rate_margin, "rad/s"),
-        )
-        for last, now, most, margin, unit in checks:
-            # a single odometry may be wrong
-            is_twice = last * now > 0 and abs(last) > most
-            if margin > 0 and is_twice and abs(now) > most + margin:
-                return Mode.TOO_FAST, f"{now:.2f} {unit}, at most {most + margin:.2f} are asked for"
-        return None
+        fastest = most + options.speed_margin
+        fastest_yaw_rate = allowed.yaw_rate + options.yaw_rate_margin
+        is_fast = options.speed_margin > 0 and abs(motion.speed) > fastest
+        is_yawing = options.yaw_rate_margin > 0 and abs(motion.yaw_rate) > fastest_yaw_rate
+        self._too_fast = self._too_fast + 1 if is_fast or is_yawing else 0
+        if self._too_fast < TOO_FAST_IN_A_ROW:
+            return None
+        measured, most, unit = motion.speed, fastest, "m/s"
+        if not is_fast:
+            measured, most, unit = motion.yaw_rate, fastest_yaw_rate, "rad/s"
+        return Mode.TOO_FAST, f"{measured:.2f} {unit}, at most {most:.2f} are asked for"
 
     def _let_go(self, climber: Climber, observed: Observed) -> float:
         """Speed [m/s] at which friction may let go of it before a torque can answer.

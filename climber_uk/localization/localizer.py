@@ -131,8 +131,7 @@ class Localizer:
         early, self._early = self._early, []
         for fix in early:
             self.on_fix(fix)
-        is_known = self.knows_heading and self.knows_position and not self._is_first
-        if self.located or is_known:
+        if self.located or (self.knows_heading and self.knows_position):
             self.located = self._locate(rolled, travel)
             self.doubts.look(self.estimate)
         return self.located

@@ -52,7 +52,7 @@ def test_what_corrections_add_to_the_way_is_no_twist_that_lies(speed, yaw_rate):
         last = Motion.at(*smoothing.offset, speed, yaw_rate)
         for _ in range(300):
             way, turned = speed * STEP, yaw_rate * STEP
-            pose = pose + [way * np.cos(pose[2]), way * np.sin(pose[2]), turned]
+            pose = pose + np.array([way * np.cos(pose[2]), way * np.sin(pose[2]), turned])
             smoothing.go_on(STEP, way, turned)
             now = Motion.at(*(pose + smoothing.offset), speed, yaw_rate)
             check.add(last, now, STEP, 0.3)
