@@ -98,7 +98,7 @@ class SafeOutput:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
                 self._is_carried = False
             return self._coast(mode, estimator, law, age)
-        if self._is_pushed(stamp, rim):
+        if self._is_pushed(stamp, rim, falls):
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
             self._gently *= GENTLER
             self._coasts_from, self._way = rim, 1  # a push looks like motors the wrong way round
@@ -125,9 +125,12 @@ class SafeOutput:
         braking = self._braking(mode, law, believed, signs, since)
         return _brake(estimator, law, age, braking, None if since is None else believed)
 
-    def _is_pushed(self, stamp: int, rim: float) -> bool:
-        """Whether a rim's speed [m/s] has grown, though it has been braked for a while."""
-        if self._braked is None or self._braked[3] != self._way:  # what brakes has turned round
+    def _is_pushed(self, stamp: int, rim: float, falls: bool) -> bool:
+        """Whether a rim's speed [m/s] has grown, though it has been braked for a while.
+
+        Of what `falls`, what brakes may turn round: then it has been driven until now.
+        """
+        if self._braked is None or (falls and self._braked[3] != self._way):
             self._braked = stamp, rim, rim, self._way
         begin, before, lowest, way = self._braked
         self._braked = begin, before, min(lowest, rim), way

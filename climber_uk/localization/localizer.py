@@ -125,7 +125,10 @@ class Localizer:
         sample, weight = self._sample(rolled)
         self.history.add(stamp, sample)
         travel = sample.travel
-        self.smoothing.go_on(duration, travel.distance, turn(self.estimate.mean, travel))
+        # at rest a gyro's noise tells of turns all the time, and of no way
+        rests = sample.rests and travel.is_gyro
+        turned = math.inf if rests else turn(self.estimate.mean, travel)
+        self.smoothing.go_on(duration, travel.distance, turned)
         if weight is not None:
             self._watch_gravity(weight)
         early, self._early = self._early, []
