@@ -1,5 +1,7 @@
 """The safe output: no torque, or brake while carrying the weight, as `Safety` says."""
 
+import math
+
 from climber_uk.control.control_law import Braking, ControlLaw, check_finite
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.observed import Observed
@@ -7,7 +9,7 @@ from climber_uk.control.polarity import Polarities, PoseSpeeds
 from climber_uk.control.safety import Mode, Safety
 from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
-from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import NO_TORQUES, Motion, Torques
 
 BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
@@ -15,6 +17,9 @@ PUSHED = 0.05  # [m/s] by which it may be faster than before, and
 DRIVEN = 0.2  # than it was braked to; if it is, something pushes it:
 GENTLER, CALM = 0.5, SECOND  # times as fast it is braked after that, for [ns] without another
 COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
+NOTHING = 0.05  # of the weight: a drive that is let go
+FALLS = 0.1  # [m/s] by which it may get faster without a torque, if its seal holds it
+LETS_GO = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
 # what moves, but in doubt and with a polarity that nobody knows, is shaken a little to find it out
 SHAKEN = 0.02  # [m/s] of a rim, above which it is
 SHAKING = 0.3  # [m/s²] to and fro: 1.5 cm/s
@@ -28,6 +33,7 @@ class SafeOutput:
     def __init__(self, safety: Safety) -> None:
         self.safety, self.polarities, self.by_pose = safety, Polarities(), PoseSpeeds()
         self._seen: Motion | None = None
+        self._is_driven = False  # ever faster against its torques, by more than its weight
         self.forget()
 
     def forget(self) -> None:
@@ -38,17 +44,27 @@ class SafeOutput:
 
     def end(self) -> None:
         """Something is followed again."""
-        # begin of the safe output [ns], and a rim's speed then, and the lowest since
-        self._braked: tuple[int, float, float] | None = None
+        # begin of the braking [ns], a rim's speed then, the lowest since; and which way it brakes
+        self._braked: tuple[int, float, float, int] | None = None
         self._doubted: int | None = None  # [ns] since when speeds are in doubt
         self._coasts_from = 0.0  # [m/s] of a rim
         self._is_carried = True  # the weight, as it coasts
         self._gently = 1.0  # share of its rate that it brakes with, less each time it is pushed
+        self._begins, self._left_until = True, 0  # with the next torques; [ns]
+        # [m/s] the lowest while nothing drives it; whether it has got faster, though its seal holds
+        self._slowest, self._is_falling = math.inf, False
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
         seen, self._seen = self._seen or motion, motion
+        self._is_driven = False
         if observed is not None:
+            force, _ = climber.wrench(*observed.torques)
+            gained = abs(observed.after.speed) - abs(observed.before.speed)
+            is_against = force * observed.after.speed < 0
+            self._is_driven = is_against and gained > GRAVITY * observed.time
+            if not self._begins:
+                self._watch_seal(force / (climber.mass * GRAVITY), abs(observed.after.speed))
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
             self._way = self.polarities.drive.sign or self._way
@@ -60,6 +76,11 @@ class SafeOutput:
         if self.safety.has_jumped(seen, pose, climber.half_track):
             self.by_pose.restart()
 
+    def _watch_seal(self, share: float, speed: float) -> None:
+        """Look if it holds a climber of a speed [m/s], that a share of its weight drives."""
+        self._slowest = min(self._slowest, speed) if abs(share) < NOTHING else math.inf
+        self._is_falling = self._is_falling or speed > self._slowest + FALLS
+
     def send(
         self, mode: Mode, stamp: int, age: float, estimator: Estimator, law: ControlLaw
     ) -> Torques:
@@ -67,36 +88,67 @@ class SafeOutput:
         motion, climber, safety = estimator.motion, law.climber, self.safety
         if motion is None or safety.safe_output != "hold":
             return _let_go(estimator, age)
-        if mode is Mode.NO_ODOMETRY and age < safety.odometry_timeout and not law.falls:
+        falls = law.falls or self._is_falling
+        if mode is Mode.NO_ODOMETRY and age < safety.odometry_timeout and not falls:
             return self._coast(mode, estimator, law, age)  # it comes again, and may be old
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
+        if self._lets_go(mode, stamp, falls):
+            return _let_go(estimator, age)
         if stamp < self._coasts_until:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
                 self._is_carried = False
             return self._coast(mode, estimator, law, age)
-        begin, before, lowest = self._braked or (stamp, rim, rim)
-        self._braked = begin, before, min(lowest, rim)
-        is_pushed = rim > before + PUSHED or rim > lowest + DRIVEN
-        if stamp - begin > BRAKING * SECOND and is_pushed:
+        if self._is_pushed(stamp, rim, falls):
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
             self._gently *= GENTLER
             self._coasts_from, self._way = rim, 1  # a push looks like motors the wrong way round
             return self._coast(mode, estimator, law, age)
-        if stamp - begin > CALM:
-            self._gently = 1.0
         try:
-            if not mode.doubts_odometry:
-                self._doubted = None
-            elif self._doubted is None:
-                self._doubted = stamp
-                self.polarities.forget_unknown()
-            since = None if self._doubted is None else stamp - self._doubted
-            believed, signs = self._believed(mode, motion) if since is not None else (motion, None)
-            braking = self._braking(mode, law, believed, signs, since)
-            return _brake(estimator, law, age, braking, None if since is None else believed)
+            return self._stop(mode, stamp, age, estimator, law)
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
+
+    def _stop(
+        self, mode: Mode, stamp: int, age: float, estimator: Estimator, law: ControlLaw
+    ) -> Torques:
+        """Torques that brake, by speeds that are believed; raises `ValueError` as `_brake` does."""
+        motion = estimator.motion
+        assert motion is not None  # it moves
+        if not mode.doubts_odometry:
+            self._doubted = None
+        elif self._doubted is None:
+            self._doubted = stamp
+            self.polarities.forget_unknown()
+        since = None if self._doubted is None else stamp - self._doubted
+        believed, signs = self._believed(mode, motion) if since is not None else (motion, None)
+        braking = self._braking(mode, law, believed, signs, since)
+        return _brake(estimator, law, age, braking, None if since is None else believed)
+
+    def _is_pushed(self, stamp: int, rim: float, falls: bool) -> bool:
+        """Whether a rim's speed [m/s] has grown, though it has been braked for a while.
+
+        Of what `falls`, what brakes may turn round: then it has been driven until now.
+        """
+        if self._braked is None or (falls and self._braked[3] != self._way):
+            self._braked = stamp, rim, rim, self._way
+        begin, before, lowest, way = self._braked
+        self._braked = begin, before, min(lowest, rim), way
+        if stamp - begin > CALM:
+            self._gently = 1.0
+        is_faster = rim > before + PUSHED or rim > lowest + DRIVEN
+        return is_faster and stamp - begin > BRAKING * SECOND
+
+    def _lets_go(self, mode: Mode, stamp: int, falls: bool) -> bool:
+        """Whether it leaves what may have motors the wrong way round to its seal for a moment.
+
+        What brakes would drive then, and a seal stops a push as well.
+        """
+        is_known = self.polarities.drive.sign > 0
+        if self._begins and mode is Mode.TOO_FAST and self._is_driven and not is_known:
+            self._left_until = stamp + LETS_GO
+        self._begins = False
+        return stamp < self._left_until and not falls
 
     def _coast(self, mode: Mode, estimator: Estimator, law: ControlLaw, age: float) -> Torques:
         """Torques that brake nothing, and carry the weight: where no seal holds it, or less of it.
@@ -106,7 +158,8 @@ class SafeOutput:
         """
         knows = mode.is_fault and not mode.doubts_odometry and mode is not Mode.NO_ODOMETRY
         way = self._way if knows else 1
-        if not law.falls and (mode.doubts_odometry or not self._is_carried or way < 0):
+        falls = law.falls or self._is_falling
+        if not falls and (mode.doubts_odometry or not self._is_carried or way < 0):
             return _let_go(estimator, age)
         return _brake(estimator, law, age, Braking(0.0, 0.0, way), None)
 
@@ -134,19 +187,21 @@ class SafeOutput:
         doubted: int | None,
     ) -> Braking:
         """How to brake; `doubted` is for how long [ns] speeds are in doubt, None: they are not."""
-        rate = self._gently * self.safety.braking_rate
+        rate, falls = self._gently * self.safety.braking_rate, law.falls or self._is_falling
         if doubtful is None or doubted is None:
             way = self._way if mode.is_fault else 1
             sign, yaw_sign = self.polarities.signs
             drive, yaw = rate * (sign or way), rate * (yaw_sign or 1)
-            holds = not law.falls
+            holds = not falls
             # The other wheel can brake a turn, while the seal holds what it drives. What goes
             # against its torques has motors the wrong way round, or late ones: a seal stops both.
-            if holds and (mode is Mode.DEAD_WHEEL or drive < 0):
+            # Where that is known of the yaw alone, the drive is left to the seal as well.
+            is_against = drive < 0 or (yaw < 0 and sign == 0)
+            if holds and (mode is Mode.DEAD_WHEEL or is_against):
                 return Braking(0.0, yaw, carries=0.0)
             # nobody knows its heading where odometry is stuck
             return Braking(drive, yaw, 0.0 if mode is Mode.STALLED and holds else way)
-        if law.falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
+        if falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
             doubtful = doubtful[0] or 1, doubtful[1] or 1
         rims = motion.speed, law.climber.half_track * motion.yaw_rate
         drive, yaw = (

@@ -23,6 +23,7 @@ ROUGH = 1e-3  # [m²] of these at first, when nothing is known of a pose's noise
 STILL_DISTANCE, STILL = 0.1, 0.02  # and [m/s] of a rim: less may be noise of what stands
 OPPOSED_DISTANCE = 0.1  # of the largest error: distance of both, to opposite sides
 OPPOSED_IN_A_ROW = 3  # odometry messages
+LEAPS = 2.0  # times the twist's way in a message, that a pose goes in it at most: else it leaps
 OPPOSED_IF_TOO_FAST = 0.01  # of the largest error: enough, once, where it is too fast as well
 
 
@@ -79,7 +80,8 @@ class TwistCheck:
 
     Compares distances by pose and by twist, summed over the last moments, older ones counting less.
     A sign is wrong where both go opposite ways all the time: of a climber that swings, sums of a
-    twist that is a little late do so now and then.
+    twist that is a little late do so now and then. A pose that leaps, as a fix corrects it, is no
+    motion, and counts for no more than `LEAPS`.
     """
 
     def __init__(self) -> None:
@@ -91,6 +93,8 @@ class TwistCheck:
         self._distances = (0.0, 0.0), (0.0, 0.0)
         # [m²] sums of products, of the same two: pose's by twist's, pose's and twist's squares
         self._products = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        # of the same two: distance by pose [m] and sum of products [m²], but for leaps
+        self._smooth = (0.0, 0.0), (0.0, 0.0)
         self._opposed = 0
         # of the same two: by pose while the twist is zero [m], the squares of its steps [m²], and
         # by twist while the pose stands [m]
@@ -113,6 +117,8 @@ class TwistCheck:
         )
         drive, yaw = self._products
         self._products = _summed(left, drive, forward, way), _summed(left, yaw, turned, rim)
+        drive_sums, yaw_sums = self._smooth
+        self._smooth = _smooth(left, drive_sums, forward, way), _smooth(left, yaw_sums, turned, rim)
         least, (on, round_) = STILL * time, self._alone
         self._alone = (
             _alone(on, forward, way, least, motion.speed == 0),
@@ -135,8 +141,8 @@ class TwistCheck:
 
         If something is wrong surely, what may be noise counts too.
         """
-        fields = zip(FIELDS, self._distances, self._products, strict=True)
-        for name, (pose, twist), (alike, _, _) in fields:
+        fields = zip(FIELDS, self._distances, self._smooth, strict=True)
+        for name, (_, twist), (pose, alike) in fields:
             if alike < 0 and pose * twist < 0 and min(abs(pose), abs(twist)) > least:
                 return f"twist.{name}"
         for name, it in zip(FIELDS, self._unlike, strict=True):
@@ -177,6 +183,14 @@ def _alone(sums: Products, pose: float, twist: float, least: float, is_zero: boo
     by_pose, pose_2, by_twist = sums
     by_twist = by_twist + twist if pose == 0 and abs(twist) > least else 0.0
     return (by_pose + pose, pose_2 + pose * pose, by_twist) if is_zero else (0.0, 0.0, by_twist)
+
+
+def _smooth(
+    left: float, sums: tuple[float, float], pose: float, twist: float
+) -> tuple[float, float]:
+    most = LEAPS * abs(twist)
+    pose = min(max(pose, -most), most)
+    return left * sums[0] + pose, left * sums[1] + pose * twist
 
 
 def _summed(left: float, sums: Products, pose: float, twist: float) -> Products:

@@ -124,14 +124,18 @@ class Localizer:
         rolled = self.encoders.roll(right, left, duration)
         sample, weight = self._sample(rolled)
         self.history.add(stamp, sample)
-        self.smoothing.go_on(duration)
+        travel = sample.travel
+        # at rest a gyro's noise tells of turns all the time, and of no way
+        rests = sample.rests and travel.is_gyro
+        turned = math.inf if rests else turn(self.estimate.mean, travel)
+        self.smoothing.go_on(duration, travel.distance, turned)
         if weight is not None:
             self._watch_gravity(weight)
         early, self._early = self._early, []
         for fix in early:
             self.on_fix(fix)
         if self.located or (self.knows_heading and self.knows_position):
-            self.located = self._locate(rolled, sample.travel)
+            self.located = self._locate(rolled, travel)
             self.doubts.look(self.estimate)
         return self.located
 

@@ -2,7 +2,8 @@
 
     o⁺ = o - clip(o Δt / T, ± v Δt)    o: output less estimate
 
-A controller that is fed a jump answers it with torque.
+A controller that is fed a jump answers it with torque, and one whose odometry goes otherwise than
+its twist says has to stop. So the output is corrected on the way only, by a share of it.
 """
 
 import math
@@ -11,6 +12,11 @@ import numpy as np
 
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import Array
+
+SHARE = (
+    0.3  # of what is driven and turned, that corrections add to it at most: less than a slip may
+)
+BEND = 0.05  # [rad/m] that they add, too: a heading has to be corrected on a straight as well
 
 
 class Smoothing:
@@ -24,12 +30,13 @@ class Smoothing:
         """Let the output be where it was, though the estimate's pose (3,) has moved."""
         self.offset = self.offset + before - after
 
-    def go_on(self, duration: float) -> None:
-        """Follow for `duration` [s]."""
+    def go_on(self, duration: float, distance: float, turned: float) -> None:
+        """Follow for `duration` [s], in which the climber drives [m] and turns [rad]."""
         options, (x, y, angle) = self.options, self.offset.tolist()
         share = min(duration / options.pull_time, 1.0)
-        along = bounded(share, math.hypot(x, y), options.pull_speed * duration)
-        about = bounded(share, abs(angle), options.pull_yaw_rate * duration)
+        way, bend = SHARE * abs(distance), SHARE * abs(turned) + BEND * abs(distance)
+        along = bounded(share, math.hypot(x, y), min(way, options.pull_speed * duration))
+        about = bounded(share, abs(angle), min(bend, options.pull_yaw_rate * duration))
         self.offset = self.offset * (1 - np.array([along, along, about]))
 
 

@@ -54,6 +54,21 @@ def test_a_wrong_sign_is_told_the_third_time_in_a_row(told, name, sign):
     assert found[2] == (name, True)
 
 
+@pytest.mark.parametrize("leap", [0.03, -0.03])
+def test_a_pose_that_leaps_as_a_fix_corrects_it_tells_nothing_of_a_sign(leap):
+    """It creeps on, and goes back to its path after each leap, as a controller has it."""
+    check, x, speed = TwistCheck(), 0.0, 0.02
+    last = Motion.at(x, 0.0, 0.0, speed, 0.0)
+    for number in range(1, 400):
+        leaps = leap if number % 40 == 0 else 0.0
+        speed = 0.02 - leap / 0.2 * (number >= 40 and number % 40 < 20)
+        x += 0.005 * (last.speed + speed) / 2 + leaps
+        now = Motion.at(x, 0.0, 0.0, speed, 0.0)
+        check.add(last, now, 0.005, 0.3)
+        assert check.trouble(LARGEST)[1] is False
+        last = now
+
+
 @pytest.mark.parametrize("share", [0.0, 0.5, 2.0])
 def test_a_twist_that_is_off_by_much_is_told_with_the_length(share):
     found = troubles(on_a_circle(1.0, 0.0, 0.3, lambda v, turn: (share * v, turn)))

@@ -269,7 +269,9 @@ def test_the_heading_is_off_by_its_deviation_on_average():
         told = Told(seed, heading=0.7, speed=0.15, **known).go_on(1.0)
         for _ in range(40):
             told.go_on(0.1)
-            ratios.append(told.off / told.localizer.estimate.deviation(HEADING))
+            estimate = told.localizer.estimate
+            off = wrapped(float(estimate.mean[HEADING]) - told.heading)
+            ratios.append(off / estimate.deviation(HEADING))
     assert np.mean(np.square(ratios)) == pytest.approx(1, abs=0.15)
 
 

@@ -1,13 +1,17 @@
 """The output's pose, speed and yaw rate: smooth, and not late."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from climber_uk.control.twist import TwistCheck
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.localization.output_speed import OutputSpeed
 from climber_uk.localization.smoothing import Smoothing, between
+from climber_uk.mechanics.quantities import Motion
 
 OPTIONS, STEP = LocalizationOptions(), 0.005
 METRES = st.floats(-3, 3)
@@ -16,12 +20,12 @@ METRES = st.floats(-3, 3)
 @settings(max_examples=12)
 @given(x=METRES, y=METRES, heading=METRES)
 def test_the_output_follows_a_correction_no_faster_than_it_may_and_arrives(x, y, heading):
-    smoothing, jump = Smoothing(OPTIONS), np.array([x, y, heading])
+    smoothing, jump, fast = Smoothing(OPTIONS), np.array([x, y, heading]), (10 * STEP, 10 * STEP)
     smoothing.corrected(np.zeros(3), jump)
     np.testing.assert_array_equal(smoothing.offset, -jump)  # the output is where it was
     for _ in range(round(120 / STEP)):
         before = smoothing.offset
-        smoothing.go_on(STEP)
+        smoothing.go_on(STEP, *fast)
         moved = smoothing.offset - before
         assert np.hypot(*moved[:2]) <= OPTIONS.pull_speed * STEP + 1e-12
         assert abs(moved[2]) <= OPTIONS.pull_yaw_rate * STEP + 1e-12
@@ -33,8 +37,28 @@ def test_the_output_follows_a_correction_no_faster_than_it_may_and_arrives(x, y,
 def test_after_a_long_pause_the_output_is_at_the_estimate_and_not_beyond():
     smoothing = Smoothing(OPTIONS)
     smoothing.corrected(np.zeros(3), np.array([0.01, 0.0, 0.001]))
-    smoothing.go_on(10.0)
+    smoothing.go_on(10.0, 1.0, 1.0)
     np.testing.assert_array_equal(smoothing.offset, 0)
+
+
+@pytest.mark.parametrize(
+    ("speed", "yaw_rate"), [(0.0, 0.0), (0.02, 0.0), (-0.02, 0.1), (0.2, 0.0), (0.2, -0.4)]
+)
+def test_what_corrections_add_to_the_way_is_no_twist_that_lies(speed, yaw_rate):
+    """Half a metre ahead or behind, and 0.1 rad to either side, for the controller's check."""
+    for ahead, aside in itertools.product((-0.5, 0.5), (-0.1, 0.1)):
+        smoothing, check, pose = Smoothing(OPTIONS), TwistCheck(), np.zeros(3)
+        smoothing.corrected(pose, np.array([ahead, 0.0, aside]))
+        last = Motion.at(*smoothing.offset, speed, yaw_rate)
+        for _ in range(300):
+            way, turned = speed * STEP, yaw_rate * STEP
+            pose = pose + np.array([way * np.cos(pose[2]), way * np.sin(pose[2]), turned])
+            smoothing.go_on(STEP, way, turned)
+            now = Motion.at(*(pose + smoothing.offset), speed, yaw_rate)
+            check.add(last, now, STEP, 0.3)
+            assert (check.missing(0.05), check.trouble(0.05)) == ("", ("", False))
+            last = now
+        assert (np.hypot(*smoothing.offset[:2]) < 0.5) == (speed != 0)  # it is on its way
 
 
 @given(x=METRES, y=METRES, heading=METRES)
