@@ -187,9 +187,9 @@ def moments(options: argparse.Namespace) -> Iterator[Found]:
     climber = under_way(some_path(random), Travelling).run(5.0)
     journey = climber.journey
     asked: dict[str, Callable[[], Any]] = {
-        "pause": lambda: journey.pause(climber.position),
+        "pause": climber.pause,
         "go on": climber.go_on,
-        "speed": lambda: journey.set_speed(random.uniform(0.2, 1.0), climber.position),
+        "speed": lambda: climber.set_speed(random.uniform(0.2, 1.0)),
         "another path": lambda: climber.replace(some_path(random, climber.places[-1])),
         "start": climber.start,
         "stick": lambda: [

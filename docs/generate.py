@@ -110,7 +110,7 @@ CONTENTS = {
     "~/map_to_odom": "pose of `odom` in `map_frame`, in which corrections act at once; 20 Hz",
     "~/transition_event": "changes of the managed node's state",
     "~/start": "start, or start again, at the next odometry",
-    "~/stop": "come to rest on the path, as `~/pause`",
+    "~/stop": "come to rest, as `~/pause`",
     "~/retreat": "go back along the path, heading kept",
     "~/speed": "share of the planned speed, 0.01 to 1: as the parameter `speed`",
     topics.private(
@@ -129,7 +129,7 @@ CONTENTS = {
     "~/get_transition_graph": "managed node",
     "~/reset": "back to the initial state; time goes on",
     "~/pause": "of the plant: stop time, of all climbers that share it, or let it go on; of the "
-    "planner: come to rest on the path, or go on along it",
+    "planner: come to rest, or go on along the path",
     "~/step": "one control period, while paused",
 }
 
