@@ -64,7 +64,7 @@ CONTENTS = {
     "stamp; `source`: the controller's mode",
     topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "
     "stamp plus `time_from_start` is its time",
-    topics.GIVEN_PATH: "2 to 50 000 places to drive through, in `odom`; orientations are not read",
+    topics.GIVEN_PATH: "2 to 50 000 places to drive through, in x and y of `odom`; no more is read",
     topics.FOLLOW_PATH: "an action, where nav2_msgs is installed: a path as a goal, with feedback, "
     "cancel and result",
     topics.REFERENCE_PATH: "the whole path, for display",

@@ -1,7 +1,9 @@
 """Every executable tells its use and its version, and refuses what it does not know in one line."""
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 from argparse import ArgumentTypeError
@@ -46,6 +48,29 @@ TRIES = ["--help", "--version", "--foo", "-o"]
 def test_a_number_that_is_to_be_whole_is_refused_beyond_its_bounds(text):
     with pytest.raises(ArgumentTypeError, match="must be an integer from 1 to 100"):
         whole(1, 100)(text)
+
+
+def spoken(code, **environment):
+    """Status, output and errors of a tool whose `main` does `code`."""
+    code = (
+        "from climber_uk.system.command_line import Parser\n"
+        f"Parser('tool', 'of µm').arguments()\n{code}"
+    )
+    command = [sys.executable, "-c", code]
+    ran = subprocess.run(command, capture_output=True, env=os.environ | environment, timeout=60)
+    return ran.returncode, ran.stdout, ran.stderr.decode()
+
+
+def test_ctrl_c_ends_a_tool_in_a_line_and_an_error_of_ours_in_a_traceback():
+    status, _, said = spoken("import signal; signal.raise_signal(signal.SIGINT)")
+    assert (status, said) == (-signal.SIGINT, "tool: interrupted\n")
+    assert "ZeroDivisionError" in spoken("1 / 0")[2]
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_what_a_terminal_cannot_show_is_written_otherwise(encoding):
+    status, out, _ = spoken("print('σ \\udcff')", PYTHONIOENCODING=encoding)
+    assert (status, out) == (0, b"\\u03c3 \\udcff\n")
 
 
 def test_all_executables_of_the_package_are_tried():

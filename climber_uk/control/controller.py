@@ -152,10 +152,9 @@ class Controller:
     def enable(self, enabled: bool) -> None:
         """Follow the reference, or give the safe output; what was wrong before is forgiven."""
         self._enabled = enabled
-        self._without_twist = ""
         if enabled:
             self.guard.fault = None
-            self.guard.restart()
+            self._watch_anew()
             self.stops.enable()
             self._forget_when()
 

@@ -5,7 +5,6 @@ places only, as what is nearer to an edge is convex: so all is found without off
 """
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.mechanics.waypoint_file import read_text, read_waypoint_text
+from climber_uk.mechanics.waypoint_file import blocks, read_text, read_waypoint_text
 
+MOST_CORNERS = 300  # to look at them takes a time that grows with their square
 SLACK = 1e-6  # [m] by which a distance is kept as well
 ROUND = np.arange(8) * np.pi / 4  # directions from a corner in which a way around it may lead
 FURTHER = 1.0 / np.cos(np.pi / 8) + 1e-6  # so that the straight lines between those keep clear
@@ -167,22 +167,25 @@ def _around(bend: float, side: int) -> float:
 def read_area(file: str, clearance: float) -> Area:
     """Area of a text file: corners x, y [m] a line, an empty line before each further ring.
 
-    Raises `ValueError` naming the file, also where a ring crosses itself or another one.
+    A header holds for all rings below it. Raises `ValueError` naming the file, also where a ring
+    crosses itself or another one.
     """
     try:
-        blocks = [b for b in re.split(r"\n\s*\n", read_text(file).strip()) if b.strip()]
-        if not blocks:
+        texts = blocks(read_text(file))
+        if not texts:
             raise ValueError("no corners in it: want x and y [m] of a corner a line")
         rings = []
-        for number, block in enumerate(blocks, start=1):
+        for number, (first, text) in enumerate(texts, start=1):
             try:
-                ring, _ = read_waypoint_text(block)
+                ring, _ = read_waypoint_text(text, first)
             except ValueError as error:
                 raise ValueError(f"ring {number}: {error}") from None
             ring = ring[np.hypot(*(ring - np.roll(ring, 1, axis=0)).T) > 0]
             if len(ring) < 3:
                 raise ValueError(f"ring {number}: {len(ring)} corner(s), want >= 3")
             rings.append(ring)
+        if (corners := sum(map(len, rings))) > MOST_CORNERS:
+            raise ValueError(f"{corners} corners, want <= {MOST_CORNERS}: leave some out")
         _refuse_crossings(rings)
     except ValueError as error:
         raise ValueError(f"area={file!r}: {error}") from None

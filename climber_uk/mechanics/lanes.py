@@ -20,6 +20,7 @@ from climber_uk.parameters.declaration import parameter, parameters
 SHORTEST = 1e-3  # [m] of a lane
 CUT = 0.25  # of the tolerance: most that a turn around an obstacle, of 1/8, is rounded
 MOST_LANES = 500
+MOST_LOOKS = 50_000_000  # at edges, from places to places; half a minute on a slow computer
 LEVEL = np.zeros(2)
 NEAREST_TURNS = 0.25  # of the lanes' spacing: nearer to each other, two turns are eased
 BENDS = 0.2  # [rad] from which on a corner is a turn
@@ -145,6 +146,11 @@ def joined(area: Area, lanes: Array, start: Array, up: Array = LEVEL) -> tuple[A
 
     ends = lanes.reshape(-1, 2)
     places = np.concatenate([ends, area.corners])
+    if len(places) ** 2 * len(area.edges[0]) > MOST_LOOKS:
+        raise ValueError(
+            f"{len(lanes)} lanes and {len(area.edges[0])} corners are too many to find a way: "
+            "leave corners out, or drive the area in parts"
+        )
     apart = _apart(area, places, up)
     left = np.ones(len(ends), bool)
     at = int(np.hypot(*(ends - start).T).argmin())

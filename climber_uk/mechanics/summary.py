@@ -82,6 +82,11 @@ def _remarks(trajectory: Trajectory, length: float) -> tuple[str, ...]:
     laps = getattr(trajectory.law, "laps", 1)
     if laps > 1 and not trajectory.course.closed:
         remarks.append(f"laps={laps} has no effect: the path is open")
+    if unused := getattr(trajectory.shape, "unused", ()):
+        remarks.append(
+            f"of the waypoints' columns, not used: {', '.join(unused[:5])}"
+            + " …" * (len(unused) > 5)
+        )
     return tuple(remarks)
 
 

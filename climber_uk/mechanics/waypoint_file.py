@@ -32,6 +32,7 @@ class Marks:
     speed: Array  # (n,) [m/s] at most, from each to the next; infinite: as fast as planned
     dwell: Array  # (n,) [s] of rest at each
     tags: tuple[str, ...]  # (n,) that are told when each is reached; empty: nothing is told
+    unused: tuple[str, ...] = ()  # columns of the file by which nothing is done
 
     @classmethod
     def none(cls, number: int) -> "Marks":
@@ -79,11 +80,42 @@ class _Columns:
 
     number: int
     at: dict[str, int] = field(default_factory=lambda: {"x": 0, "y": 1})
+    unused: tuple[str, ...] = ()  # names of the others
 
 
-def read_waypoint_text(text: str) -> tuple[Array, Marks]:
-    """Points (n, 2) [m] of the text of a file, and marks; `ValueError` naming the line."""
-    lines = list(enumerate(text.split("\n"), start=1))
+def blocks(text: str) -> list[tuple[int, str]]:
+    """Texts between empty lines that have points, each with the number of its first line.
+
+    A header, or comments, above the first of them are put above each that has no header of its own.
+    """
+    head, block = list[str](), list[str]()
+    found: list[tuple[int, str]] = []
+    for number, line in enumerate([*text.split("\n"), ""], start=1):
+        if line.strip():
+            block.append(line)
+            continue
+        bare = [COMMENT.sub("", row).strip(" \t") for row in block]
+        top = next((i for i, row in enumerate(bare) if _has_number(row)), len(block))
+        if not found:
+            head += block[:top]
+        elif any(bare[:top]):
+            head = block[:top]
+        if top < len(block) or (found and any(bare)):
+            found.append((number - len(block[top:]) - len(head), "\n".join(head + block[top:])))
+        block = []
+    return found
+
+
+def _has_number(row: str) -> bool:
+    return any(map(_is_number, _split(row, _separator(row))))
+
+
+def read_waypoint_text(text: str, first: int = 1) -> tuple[Array, Marks]:
+    """Points (n, 2) [m] of the text of a file, and marks; `ValueError` naming the line.
+
+    `first` is the number of its first line.
+    """
+    lines = list(enumerate(text.split("\n"), start=first))
     rows = [(n, bare) for n, line in lines if (bare := COMMENT.sub("", line).strip(" \t"))]
     if not rows:
         raise ValueError("no points in it: want x and y [m] of a point a line")
@@ -111,7 +143,7 @@ def read_waypoint_text(text: str) -> tuple[Array, Marks]:
     speed = [_size(n, row, "speed", is_comma, math.inf) for n, row in rows_of]
     dwell = [_size(n, row, "dwell", is_comma, 0.0) for n, row in rows_of]
     tags = tuple(row.get("tag", "") for _, row in rows_of)
-    return np.array(points), Marks(np.array(speed), np.array(dwell), tags)
+    return np.array(points), Marks(np.array(speed), np.array(dwell), tags, columns.unused)
 
 
 def _size(line: int, row: dict[str, str], name: str, is_comma: bool, default: float) -> float:
@@ -177,7 +209,8 @@ def _named(where: str, names: list[str]) -> _Columns:
         unit = UNIT.search(name)
         if unit and (unit[1] or unit[2] or "").strip().lower() not in units:
             raise ValueError(f"{where}: column {name!r} must be in {units[0]}")
-    return _Columns(len(names), at)
+    unused = (name for column, name in enumerate(names) if name and column not in at.values())
+    return _Columns(len(names), at, tuple(unused))
 
 
 def _name(cell: str) -> str:

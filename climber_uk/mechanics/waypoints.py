@@ -144,6 +144,11 @@ class Waypoints(ThroughPoints):
     def _read(self) -> tuple[Array, Marks]:
         return read_waypoints(self.file)
 
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """Columns of the file by which nothing is done: a name may be misspelt."""
+        return self._read[1].unused
+
     def given(self) -> Array:
         """See `ThroughPoints`."""
         return self._read[0]

@@ -154,7 +154,7 @@ def wheel_torques(
     if len(values) != len(names):
         raise ValueError(f"{len(values)} {what} must be {len(names)}")
     if not all(map(math.isfinite, values)):
-        raise ValueError(f"{what} {values} must be finite")
+        raise ValueError(f"{what} {[float(value) for value in values]} must be finite")
     told = dict(zip(names, values, strict=True))
     left, right = (sum(told[name] for name in side) for side in joints)
     if is_mean:

@@ -16,12 +16,13 @@ if TYPE_CHECKING:
     from nav_msgs.msg import Path
 
 MOST_POSES = 50_000
+FLAT = 0.1  # [m] by which z may differ: the wall's x and y are along it
 HEAD = 4  # [bytes] of the encapsulation, before which nothing is aligned
 STAMP, POSE = 8, 56  # [bytes] of a stamp, and of position and orientation
 
 
 def path_points(data: bytes, odom_frame: str) -> Array:
-    """Places (n, 2) [m] of a path's poses, all in `odom_frame`; orientations are not read.
+    """Places (n, 2) [m] of poses, all in `odom_frame`; orientations are not read, z is one.
 
     Raises `ValueError` naming the pose, counted from 1, and what is wrong with it.
     """
@@ -41,8 +42,8 @@ def message_points(message: "Path", odom_frame: str) -> Array:
         frame, place = stamped.header.frame_id, stamped.pose.position
         if frame and frame != odom_frame:
             raise _wrong_frame(i, frame, odom_frame)
-        places.append(_checked(i, place.x, place.y))
-    return np.array(places)
+        places.append(_checked(i, place.x, place.y, place.z))
+    return _on_the_wall(places)
 
 
 def _check(frame: str, number: int, odom_frame: str) -> None:
@@ -56,12 +57,24 @@ def _wrong_frame(i: int, frame: str, odom_frame: str) -> ValueError:
     return ValueError(f"pose {i}: frame_id={frame!r} must be {odom_frame!r}")
 
 
-def _checked(i: int, x: float, y: float) -> tuple[float, float]:
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise ValueError(f"pose {i} at ({x:g}, {y:g}) is not finite")
+def _checked(i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise ValueError(f"pose {i} at ({x:g}, {y:g}, {z:g}) is not finite")
     if max(abs(x), abs(y)) > LARGEST:
         raise ValueError(f"pose {i} at ({x:g}, {y:g}) must be within {LARGEST:g} m")
-    return x, y
+    return x, y, z
+
+
+def _on_the_wall(places: list[tuple[float, float, float]]) -> Array:
+    x_y_z = np.array(places)
+    off = np.abs(x_y_z[:, 2] - x_y_z[0, 2])
+    if off.max() > FLAT:
+        i = int(off.argmax())
+        raise ValueError(
+            f"pose {i + 1} has z={x_y_z[i, 2]:g}, pose 1 z={x_y_z[0, 2]:g} m: a path is along the "
+            "wall, in x and y"
+        )
+    return x_y_z[:, :2]
 
 
 def _header(data: bytes) -> tuple[str, int, int]:
@@ -77,7 +90,7 @@ def _header(data: bytes) -> tuple[str, int, int]:
 
 def _places(data: bytes, number: int, at: int, odom_frame: str) -> Array:
     size_of = struct.Struct(_order(data) + "I").unpack_from
-    place_of = struct.Struct(_order(data) + "2d").unpack_from
+    place_of = struct.Struct(_order(data) + "3d").unpack_from
     own = odom_frame.encode() + b"\0"
     places = []
     for i in range(1, number + 1):
@@ -91,7 +104,7 @@ def _places(data: bytes, number: int, at: int, odom_frame: str) -> Array:
         at += POSE
     if at > len(data):
         raise struct.error
-    return np.array(places)
+    return _on_the_wall(places)
 
 
 def _order(data: bytes) -> str:

@@ -300,6 +300,8 @@ class TrajectoryPublisher(ClimberNode):
             self.journey.planned, described = given
             self.shape, begins = "path", self.begin(PATH)
             self.get_logger().info(f"path taken: {described}; {begins}")
+            for remark in described.remarks:
+                self.get_logger().warning(remark)
         under_way = self.journey.under_way
         if under_way is not None:
             position = self.position

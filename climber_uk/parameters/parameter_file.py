@@ -34,6 +34,7 @@ FLOAT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE | re.ASC
 ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
 LEAST = sys.float_info.min
 DEEPEST = 100  # tables
+MOST = 10_000  # values; rcl takes a time that grows with their square
 NO_ALIAS = "an alias (*) is not taken"
 
 
@@ -89,13 +90,22 @@ class GivenValue(NamedTuple):
 def read_sections(path: Path) -> list[Section]:
     """Sections of a parameter file; `OSError`, or `ValueError` of one line, if it is none."""
     found: dict[str, Section] = {}
-    for keys, value in _entries(path):
+    for number, (keys, value) in enumerate(_entries(path)):
+        if number == MOST:
+            raise ValueError(f"{path} has more than {MOST} values")
         if PARAMETERS not in keys:
             raise ValueError(
                 f"{path} is no parameter file: {'/'.join(keys)} is not in {PARAMETERS}"
             )
         own = keys.index(PARAMETERS)
         name = "/".join(keys[:own])
+        if not name:
+            raise ValueError(f"{path} is no parameter file: no node's name before {PARAMETERS}")
+        if own == len(keys) - 1:
+            raise ValueError(
+                f"{path} is no parameter file: {PARAMETERS} of {name} is {value!r}, no table: "
+                "is a blank missing after a colon?"
+            )
         section = found.setdefault(name, Section(name, {}))
         parameter = ".".join(keys[own + 1 :])
         if parameter in section.values:
@@ -278,6 +288,11 @@ class _Tables:
             self._expect_value()
             self.sequence = []
         elif isinstance(event, yaml.SequenceEndEvent):
+            if len({type(value) for value in self.sequence or ()}) > 1:
+                raise ValueError(
+                    f"{self.keys[-1]}={self.sequence} must have values of one type (5.0, not 5, "
+                    "among numbers with a point)"
+                )
             yield self.sequence
             self.sequence = None
         elif isinstance(event, yaml.AliasEvent):

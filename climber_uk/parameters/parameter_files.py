@@ -19,6 +19,8 @@ class ParameterFiles:
                 parameter_file,  # where there is no file: no need of it
             )
 
+            if path.exists() and not (path.is_file() or path.is_dir()):
+                raise ValueError(f"{path} is no regular file, and a node reads it more than once")
             sections = parameter_file.read_sections(path)
             given = parameter_file.given(sections, node)
             self.names.append(str(path))

@@ -1,5 +1,6 @@
 """Texts that users give, within bounds: what is given may be no text, or have no end."""
 
+import os
 from pathlib import Path
 
 LARGEST = 2**24  # [bytes] of a file
@@ -14,12 +15,21 @@ def at_home(path: str) -> Path:
 
 
 def content_of(path: Path) -> bytes:
-    """Bytes of a file; `OSError`, or `ValueError` if it is too large."""
-    with path.open("rb") as stream:
+    """Bytes of a file; `OSError`, or `ValueError` if it is too large.
+
+    A pipe into which nobody writes is empty: to open it would take for ever.
+    """
+    with open(path, "rb", opener=_at_once) as stream:
         content = stream.read(LARGEST + 1)
     if len(content) > LARGEST:
         raise ValueError(f"larger than {LARGEST >> 20} MiB")
     return content
+
+
+def _at_once(path: str, flags: int) -> int:
+    descriptor = os.open(path, flags | os.O_NONBLOCK)
+    os.set_blocking(descriptor, True)
+    return descriptor
 
 
 def text_of(path: Path) -> str:

@@ -4,16 +4,18 @@ One rule for all: into the directory that `--output` names; else into a new one 
 beside it if it is a single file. Nothing that was there before is overwritten then.
 """
 
+import errno
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryFile, gettempdir
 
 from climber_uk.bags.connection import one_line
 from climber_uk.system.command_line import in_words
 
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # a disk, somebody's share of it, or a limit
 UNREADABLE = 2  # exit status: a bag or a parameter file that is not to be read, a wrong argument
 
 
@@ -49,6 +51,11 @@ def output(bag: Path, name: str, given: Path | None) -> Iterator[Path]:
     try:
         check_writable(directory)
         yield directory
+    except OSError as error:
+        if error.errno not in FULL or error.filename is not None:
+            raise
+        # a write does not know its file
+        raise OSError(f"{error.strerror}: in {directory}, or {gettempdir()}") from None
     finally:
         for path in made:
             with suppress(OSError):  # it is not empty

@@ -90,6 +90,8 @@ class NodeParameters:
             self.remarks.append(f"{old} is called {name} now")
         if name not in overrides:
             return None
+        if overrides[name].value is None:  # as rcl has an empty list
+            raise ValueError(f"{field.name} has no value")
         overrides[name] = _as_float(overrides[name], field)
         return overrides[name].value
 

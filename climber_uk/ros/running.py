@@ -36,8 +36,8 @@ from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.leaving import LONGEST_END, leave
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
-from climber_uk.system.command_line import in_words
-from climber_uk.system.signals import on_end
+from climber_uk.system.command_line import in_words, printable
+from climber_uk.system.signals import Interrupted, on_end
 
 # else the first message type would have the generator of message types loaded, and its parser
 sys.modules.setdefault("rosidl_generator_py.generate_py_impl", None)  # type: ignore[arg-type]
@@ -49,6 +49,8 @@ BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 PUBLISH_PERIOD = SECOND // 20  # [ns] of topics that need not be published every time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
+LONGEST_LINE = 1000  # [characters] of what is logged of others
+TYPES_PERIOD = 2.0  # [s] in which topics are looked at for publishers of another type
 LINES, LINES_PERIOD = 6, 10.0  # most lines of the log on one subject, in so many [s]
 EPILOG = (
     "Parameters, which docs/parameters.md lists, come after --ros-args: --params-file FILE, or -p "
@@ -162,7 +164,17 @@ class ClimberNode(Node):
         about = self.summary()
         self.get_logger().info(self.parameters.origin + (about and f"; {about}"))
         for remark in [*self.parameters.remarks, *self._idle_overrides()]:
-            self.get_logger().warning(remark)
+            self.get_logger().warning(clipped(remark))
+        self.create_timer(TYPES_PERIOD, self.check_types, clock=WALL_CLOCK)
+
+    def check_types(self) -> None:
+        """Report topics on which something of another type is published: none of it arrives."""
+        for subscription in self.subscriptions:
+            topic, kind = subscription.topic_name, subscription.msg_type
+            wanted = f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+            found = {of.topic_type for of in self.get_publishers_info_by_topic(topic)} - {wanted}
+            trouble = f"{', '.join(sorted(found))} is published, not {wanted}" if found else ""
+            self.report(f"type of {topic}", trouble, is_fault=False)
 
     def _idle_overrides(self) -> list[str]:
         """Lines about `qos_overrides` that no publisher or subscription of this node has used."""
@@ -203,7 +215,7 @@ class ClimberNode(Node):
             return
         self._troubles[subject] = trouble, is_fault
         _, before = self._unlogged.get(subject, ("", -1))
-        self._unlogged[subject] = detail, before + 1
+        self._unlogged[subject] = clipped(detail), before + 1
         self._log(subject)
 
     def _log(self, subject: str) -> None:
@@ -276,15 +288,20 @@ def run(
     ends in rclpy 7.1, and it sees signals only between callbacks, hence the idle timer.
     """
     nodes: Sequence[ClimberNode] = ()
-    end = Future()
+    end, is_asked = Future(), False
 
     def stop(*_: object) -> None:
-        if nodes:  # else they are being made, which takes a slow machine its time
-            signal.alarm(LONGEST_END)  # by the kernel: a callback may hang in the middleware
+        nonlocal is_asked
+        if is_asked:  # once more, maybe while `end` is locked
+            return
+        is_asked = True
         end.set_result(None)
+        if not nodes:  # they are being made, of which there may be no end
+            raise Interrupted
+        signal.alarm(LONGEST_END)  # by the kernel: a callback may hang in the middleware
 
-    on_end(stop)
     try:
+        on_end(stop)
         ParameterFiles(sys.argv, "")  # raises with the line that is wrong, unlike rcl
         chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})
         use_udp()
@@ -298,6 +315,8 @@ def run(
         gc.freeze()  # to look through all that was imported would halt the loop for 20 ms
         while not end.done():
             executor.spin_until_future_complete(end, timeout_sec=3600.0)
+    except Interrupted:
+        pass
     except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
         if nodes:
             raise
@@ -324,8 +343,14 @@ def parse(
 
 
 def in_a_line(error: Exception) -> str:
-    """Message of an error in one line, without rcl's file names."""
+    """Message of an error in one line that is safe to print, without rcl's file names."""
     if isinstance(error, UnknownROSArgsError):
         return f"not known after --ros-args: {str(error).strip('[]')}"
     said = " ".join(in_words(error).split()) or type(error).__name__
-    return re.sub(r", at /[^, ]*:\d+", "", said)
+    said = re.sub(r", at /[^, ]*:\d+", "", said)
+    return clipped(said)
+
+
+def clipped(text: str) -> str:
+    """Text of a user or a message that is safe to print, and has an end."""
+    return printable(text[:LONGEST_LINE]) + "…" * (len(text) > LONGEST_LINE)

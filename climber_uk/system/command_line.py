@@ -7,7 +7,9 @@ import os
 import re
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from types import TracebackType
 from typing import Any, NoReturn
 
 PACKAGE = "climber_uk"
@@ -37,12 +39,17 @@ class Parser(argparse.ArgumentParser):
         )
 
     def arguments(self, given: Sequence[str] | None = None) -> argparse.Namespace:
-        """Parsed options, with `~` in paths expanded; a closed output (of `head`) is no error."""
+        """Parsed options, with `~` in paths expanded.
+
+        From now on a closed output (of `head`) is no error, nor are characters that it cannot show,
+        and Ctrl-C ends the tool in a line.
+        """
+        sys.excepthook = partial(_in_a_line_if_interrupted, self.prog)
         out = sys.stdout
         if out is sys.__stdout__ and out is not None:
             binary = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
             sys.stdout = io.TextIOWrapper(
-                binary, out.encoding, out.errors, line_buffering=out.line_buffering
+                binary, out.encoding, "backslashreplace", line_buffering=out.line_buffering
             )
         options = self.parse_args(given)
         for name, value in vars(options).items():
@@ -61,6 +68,16 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Exit with one line and status 2."""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _in_a_line_if_interrupted(
+    tool: str, kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """`sys.excepthook` of a tool; Python ends it by the signal then, as shells expect."""
+    if issubclass(kind, KeyboardInterrupt):
+        print(f"{tool}: interrupted", file=sys.stderr)
+    else:
+        sys.__excepthook__(kind, error, trace)
 
 
 def between(least: float, most: float) -> Callable[[str], float]:

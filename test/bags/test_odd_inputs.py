@@ -1,6 +1,8 @@
 """Odd bags and odd words on the command lines: the right result, or a line that says why not."""
 
+import os
 import re
+import resource
 import sqlite3
 import subprocess
 import sys
@@ -453,6 +455,11 @@ def test_a_parameter_file_without_end_is_refused():
         read_sections(Path(f"/dev/fd/{endless.fileno()}"))
 
 
+def test_a_pipe_into_which_nobody_writes_is_an_empty_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert not read_sections(tmp_path / "pipe")
+
+
 def test_an_odd_number_in_a_few_odometries_costs_these_at_most(tmp_path):
     for number, odd in enumerate([np.inf, -np.inf, np.nan, 1e308, 1e9]):
         made = Made(100)
@@ -475,3 +482,15 @@ def test_an_output_that_cannot_be_written_is_said(tmp_path):
         "the output is not written: No space left on device\n",
     )
     assert (bag / "tum" / "odom.tum").exists()
+
+
+def test_a_full_disk_is_said_with_its_place(tmp_path, run):
+    bag = a_whole_run().write(tmp_path / "bag")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        failed, said = run("export_tum", bag, "-o", "tum")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert failed
+    assert said.startswith("export_tum: File too large: in tum, or ")

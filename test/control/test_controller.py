@@ -240,6 +240,11 @@ def test_a_twist_of_zero_while_the_pose_moves_is_a_fault_until_there_is_one():
         assert loop.now < 2 * SECOND
     assert loop.controller.mode is Mode.NO_TWIST
     assert loop.tell() is Mode.NO_TWIST
+    loop.controller.enable(True)
+    assert loop.tell() is Mode.FOLLOWING
+    while loop.tell() is Mode.FOLLOWING:
+        assert loop.now < 3 * SECOND
+    assert loop.controller.mode is Mode.NO_TWIST
     loop.state = real
     assert loop.tell() is Mode.FOLLOWING
 

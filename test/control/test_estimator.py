@@ -62,7 +62,7 @@ def controller(
     return Controller(Settings(law, observer, timing, pacing), safety, **parts)
 
 
-def lap(controlling, climber=CLIMBER, link=IDEAL, duration=7.0):
+def lap(controlling, climber=CLIMBER, link=IDEAL, duration=5.0):
     return simulate(PAPER, START, duration, controlling, climber, link)
 
 
@@ -76,10 +76,8 @@ def test_the_papers_ellipse_is_tracked_to_hundredths_of_a_millimetre(constraints
 def test_prediction_takes_the_error_of_holding_a_torque_away():
     def error(options=LAW, delay=0.0, known=True):
         timing = Timing(transport_delay=delay * known)
-        run = lap(
-            controller(options=options, timing=timing, observer=FIXED_MODEL), link=Link(delay=delay)
-        )
-        return run.rms(after=1.0)
+        ours = controller(options=options, timing=timing, observer=FIXED_MODEL)
+        return lap(ours, link=Link(delay=delay), duration=7.0).rms(after=1.0)
 
     assert error() < error(ControlOptions(predict=False)) / 47
     assert error(delay=0.005) < error(delay=0.005, known=False) / 50
@@ -263,20 +261,20 @@ def off_the_ellipse(run):
 
 def test_with_too_little_torque_it_stays_on_the_path_and_lags_along_it():
     weak = replace(CLIMBER, max_wheel_torque=0.7 * 1.5583)
-    run = too_weak(controller(), weak, until=7.0)
+    run = too_weak(controller(), weak, until=7.0, duration=14.0)
     assert off_the_ellipse(run).max() < 0.05
     assert run.error[:, 0].min() < -3.0  # it really was too weak
     after = run.time > 7.5
     assert run.error[after, 0].max() < 0.1
     assert run.distance[-1] < 1e-2
     alone = controller(pacing=Pacing(catch_up=0.0), approach=ANYWHERE, guard=UNGUARDED)
-    unpaced = too_weak(alone, weak, 7.0, 10.0)
+    unpaced = too_weak(alone, weak, 7.0, 8.0)
     assert off_the_ellipse(unpaced).max() > 0.5  # what pacing is for
 
 
 def test_stalled_it_waits_on_the_path_without_chatter():
     ours = controller(guard=UNGUARDED)
-    run = too_weak(ours, replace(CLIMBER, max_wheel_torque=0.3), 99.0, 11.0)
+    run = too_weak(ours, replace(CLIMBER, max_wheel_torque=0.3), 99.0, 9.0)
     last = run.time > 8.0
     assert np.abs(np.diff(run.torques[last], axis=0)).max() < 1e-3
     assert off_the_ellipse(run).max() < 0.05

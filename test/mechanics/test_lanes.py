@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from climber_uk.mechanics import lanes as lanes_module
 from climber_uk.mechanics.area import Area, read_area
 from climber_uk.mechanics.lanes import Lanes, joined, lanes_of
 from climber_uk.mechanics.shapes import Circle
@@ -211,7 +212,9 @@ def test_every_lane_is_driven_whole_from_end_to_end():
     [
         ("\n\n", {}, "no corners in it"),
         ("0 0\n1 0", {}, r"area='.*': ring 1: 2 corner\(s\), want >= 3"),
-        ("0 0\n1 0\n1 1\n\n0 0\n1 x\n0 1", {}, "ring 2: line 2: 'x' must be a number"),
+        ("0 0\n1 0\n1 1\n\n0 0\n1 x\n0 1", {}, "ring 2: line 6: 'x' must be a number"),
+        ("x,y\n0,0\n1,0\n1,1\n\n\n0,0\n1\n0,1", {}, r"ring 2: line 8: 1 column\(s\), want 2"),
+        ("0 0\n1 0\n1 1\n\nx y\n", {}, r"ring 2: 0 point\(s\), want >= 2"),
         ("0 0\n2 2\n2 0\n0 2", {}, r"ring 1 crosses itself at \(1, 1\) m"),
         ("0 0\n3 0\n3 3\n0 3\n\n2 1\n4 1\n4 2\n2 2", {}, r"ring 1 crosses ring 2 at \(3, 1\) m"),
         ("0 0\n0.3 0\n0.3 0.3\n0 0.3", {}, "m between the clearances"),
@@ -223,6 +226,33 @@ def test_every_lane_is_driven_whole_from_end_to_end():
 def test_what_cannot_be_covered_is_refused_in_words(text, how, why, tmp_path):
     with pytest.raises(ValueError, match=why):
         made(tmp_path, text, **how)
+
+
+def test_what_would_take_for_ever_is_refused(tmp_path, monkeypatch):
+    angles = np.arange(400) * 2 * np.pi / 400
+    circle = "\n".join(f"{3 * np.cos(a)} {3 * np.sin(a)}" for a in angles)
+    with pytest.raises(ValueError, match="400 corners, want <= 300: leave some out"):
+        made(tmp_path, circle)
+    monkeypatch.setattr(lanes_module, "MOST_LOOKS", 1000)
+    with pytest.raises(ValueError, match="11 lanes and 4 corners are too many to find a way"):
+        made(tmp_path, "0 0\n2 0\n2 2\n0 2\n")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "y,x\n0,0\n0,3\n2,3\n2,0\n\n0.6,1\n0.6,2\n1.4,2\n",
+        "# roof\n\nn,y,x\n\na,0,0\nb,0,3\nc,2,3\nd,2,0\n\n# a\n\ne,0.6,1\nf,0.6,2\ng,1.4,2\n# end",
+        "# y x\n0 0\n0 3\n2 3\n2 0\n \n# hole\n0.6 1\n0.6 2\n1.4 2\n\n# end\n",
+        "y x\n0 0\n0 3\n2 3\n2 0\n\nx;y\n1;0,6\n2;0,6\n2;1,4\n",
+    ],
+    ids=["a header", "one by itself", "in a comment", "one each"],
+)
+def test_a_header_holds_for_all_rings_below_it(text, tmp_path):
+    (tmp_path / "area").write_text(text)
+    ring, hole = read_area(str(tmp_path / "area"), 0.1).rings
+    np.testing.assert_array_equal(ring, [[0, 0], [3, 0], [3, 2], [0, 2]])
+    np.testing.assert_array_equal(hole, [[1, 0.6], [2, 0.6], [2, 1.4]])
 
 
 def test_shapes_of_one_ring_are_like_any_other_file_of_points(tmp_path):

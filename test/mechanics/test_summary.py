@@ -7,6 +7,7 @@ from climber_uk.mechanics.shapes import SHAPES, Circle, Ellipse, Lemniscate, Lin
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.waypoints import Waypoints
 
 BEND = 0.2 * (2 * math.pi) ** 2  # [1/m] of the sine wave at its crests
 SIZES = {  # length, fastest speed and yaw rate at a rate of 1, smallest radius
@@ -100,3 +101,10 @@ def test_what_looks_like_a_mistake_is_remarked():
     assert "mm" in remark
     (remark,) = summary(Trajectory(Line(1.0), replace(LAW, laps=3))).remarks
     assert "laps=3" in remark
+
+
+def test_a_column_that_nothing_is_done_by_is_told(tmp_path):
+    file = tmp_path / "points.csv"
+    file.write_text("x,velocity,y,,speed\n0,0.1,0,,\n1,0.1,0,,0.1\n")
+    (remark,) = summary(Trajectory(Waypoints(file=str(file)), LAW)).remarks
+    assert remark == "of the waypoints' columns, not used: velocity"

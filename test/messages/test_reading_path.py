@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 pytest.importorskip("rclpy")
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Path
 from rclpy.serialization import serialize_message
 
@@ -20,10 +20,10 @@ PLACES = st.lists(st.tuples(*[st.floats(-1e5, 1e5)] * 2), min_size=2, max_size=9
 def message(places, frame="odom", frames=None):
     path = Path()
     path.header.frame_id = frame
-    for number, (x, y) in enumerate(places):
+    for number, (x, y, *z) in enumerate(places):
         pose = PoseStamped()
         pose.header.frame_id = frames[number % len(frames)] if frames else frame
-        pose.pose.position.x, pose.pose.position.y = float(x), float(y)
+        pose.pose.position = Point(x=float(x), y=float(y), z=float(*z))
         path.poses.append(pose)
     return path
 
@@ -40,8 +40,10 @@ def test_it_reads_what_was_written_whatever_the_frames_length(places, frame, mix
     [
         (message([(0, 0), (1, 1)], "map"), "frame_id='map' must be 'odom'"),
         (message([(0, 0), (1, 1)], "odom", ["odom", "map"]), "pose 2: frame_id='map' must be"),
-        (message([(0, 0), (1, math.nan)]), r"pose 2 at \(1, nan\) is not finite"),
-        (message([(0, 0), (1, 1), (math.inf, 0)]), r"pose 3 at \(inf, 0\) is not finite"),
+        (message([(0, 0), (1, math.nan)]), r"pose 2 at \(1, nan, 0\) is not finite"),
+        (message([(0, 0), (1, 1), (math.inf, 0)]), r"pose 3 at \(inf, 0, 0\) is not finite"),
+        (message([(0, 0), (1, 1, math.nan)]), r"pose 2 at \(1, 1, nan\) is not finite"),
+        (message([(0, 0, 2), (1, 0, 2), (1, 0, 1)]), "pose 3 has z=1, pose 1 z=2 m: a path is"),
         (message([(0, 0), (2e6, 0)]), r"pose 2 at \(2e\+06, 0\) must be within 1e\+06 m"),
         (message([]), r"0 pose\(s\), want 2 to 50000"),
         (message([(0, 0)]), r"1 pose\(s\), want 2 to 50000"),

@@ -1,8 +1,9 @@
 """Programs of the package in processes of their own that need not import everything again.
 
 A node spends half a second of the processor on importing rclpy, its messages, and the package, and
-tests of nodes would spend most of theirs on that. Here a server imports them once, and forks; what
-runs in the forked process is what the installed script calls, with its words and its domain.
+tests of nodes would spend most of theirs on that. Here a server does that once (`preloaded`), and
+forks; what runs in the forked process is what the installed script calls, with its words and its
+domain.
 """
 
 import multiprocessing
@@ -10,6 +11,8 @@ import os
 import subprocess
 import sys
 from importlib.metadata import entry_points
+from pathlib import Path
+from unittest.mock import patch
 
 PARTS = "nodes", "recording", "operating", "driver_check"
 PROGRAMS = {
@@ -18,7 +21,7 @@ PROGRAMS = {
     if script.module.startswith(tuple(f"climber_uk.{part}." for part in PARTS))
 }
 SERVER = multiprocessing.get_context("forkserver")
-SERVER.set_forkserver_preload([script.module for script in PROGRAMS.values()])
+SERVER.set_forkserver_preload(["preloaded"])
 
 
 def main(name, words, log, domain, directory):
@@ -38,7 +41,8 @@ class Forked:
     def __init__(self, name, words, log, domain):
         arguments = name, [str(word) for word in words], str(log), str(domain), os.getcwd()
         self.process = SERVER.Process(target=main, args=arguments, daemon=True)
-        self.process.start()
+        with patch.dict(os.environ, PYTHONPATH=str(Path(__file__).parent)):
+            self.process.start()  # and the server, if it is the first: it heeds that
         self.pid = self.process.pid
         self.terminate, self.kill = self.process.terminate, self.process.kill
 

@@ -36,6 +36,8 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
             ["use_sim_time:=1"],
             "'use_sim_time' to '1' of type 'INTEGER', exp",
         ),
+        ("uk_torque_controller", ["mass:=[]"], "mass has no value"),
+        ("uk_torque_controller", ["ma\x1b[31ms:=5.0"], r"ma\x1b[31ms"),
         ("uk_torque_controller", ["maas:=5.0"], "maas is not a parameter"),
         ("uk_torque_controller", ["half_trak:=0.3"], "(did you mean half_track?)"),
         ("uk_torque_controller", ["guidance.turnrate:=3.0"], "(did you mean guidance.turn_rate?)"),

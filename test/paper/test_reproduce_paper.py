@@ -278,10 +278,12 @@ def test_every_job_of_the_full_extent_has_a_key_of_its_own_and_is_complete():
     assert ("nodes",) not in study.jobs(quick)
 
 
-QUICKER = """
+DRAWN = 2, 5, 6, 13  # one of each kind
+QUICKER = f"""
 from dataclasses import replace
-from climber_uk.paper import reproduce_paper as it
+from climber_uk.paper import figures, reproduce_paper as it
 it.QUICK = replace(it.QUICK, tolerance=(1e-4, 1e-7), drift_time=5.0, drift_steps=(0.01,))
+figures.FIGURES = {{number: figures.FIGURES[number] for number in {DRAWN}}}
 it.main()
 """
 
@@ -294,7 +296,7 @@ def test_quick_writes_every_figure_and_table(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "[  1/" in done.stdout  # progress
     for name in ("as_printed", "as_printed_euler", "consistent"):
-        for number in range(2, 14):
+        for number in DRAWN:
             figure = tmp_path / f"figure_{number:02}_{name}.png"
             assert figure.read_bytes().startswith(b"\x89PNG")
     assert {"drift.png", "off_constraint.png"} <= {file.name for file in tmp_path.iterdir()}

@@ -63,6 +63,11 @@ def test_namespaces_may_be_nested_and_later_entries_win(file):
         "x:\n  ros__parameters: " + "{a: " * 101 + "1" + "}" * 101,
         "x:\n  ros__parameters: {mass: [[1.0]]}",
         "x:\n  ros__parameters: {? [mass] : 5.0}",
+        "x:\n  ros__parameters: {mass: [5, 5.0]}",
+        "x:\n  ros__parameters:\n    mass:5.0",
+        "x:\n  ros__parameters:\n    mass：5.0",
+        "ros__parameters:\n  mass: 5.0",
+        "x:\n  ros__parameters:\n" + "".join(f"    p{i}: 1\n" for i in range(10_001)),
     ],
 )
 def test_what_is_no_parameter_file_is_said_in_one_line(file, text):
@@ -99,10 +104,10 @@ def test_two_sections_of_one_node_are_one(file):
 def test_a_changed_file_has_the_same_values(file, tmp_path):
     values = {"text": "5e0", "yes": "n", "octal": "010", "number": 1e-5, "on": True, "plain": "a"}
     write_changed(
-        file("x:\n  ros__parameters: {a: '8e3', b: [y, 1]}"), {"node": values}, tmp_path / "b"
+        file("x:\n  ros__parameters: {a: '8e3', b: [y, n]}"), {"node": values}, tmp_path / "b"
     )
     assert read_file(tmp_path / "b", "/node") == values
-    assert read_file(tmp_path / "b", "/x") == {"a": "8e3", "b": [True, 1]}
+    assert read_file(tmp_path / "b", "/x") == {"a": "8e3", "b": [True, False]}
 
 
 def test_values_fill_dataclasses_and_are_checked_by_name():
