@@ -118,7 +118,7 @@ def test_a_path_from_outside_is_taken_up_in_mid_course_or_refused_in_words(world
     given.publish(path([(1.0, 1.0), (1.0, 1.0)]))
     for why in (
         "path: refused: frame_id='map' must be 'odom'",
-        "path: refused: pose 2 at (nan, 1) is not finite",
+        "path: refused: pose 2 at (nan, 1, 0) is not finite",
         "path: refused: path: all points are within 0.00333 m",
     ):
         world.wait(lambda why=why: why in world.log(PLANNER), why)

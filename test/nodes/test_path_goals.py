@@ -114,7 +114,7 @@ def test_goals_are_refused_driven_replaced_cancelled_and_reached(definition, wor
     for places, frame, why in (
         (UP[:1], "odom", "1 pose(s), want 2"),
         (UP, "map", "frame_id='map' must be 'odom'"),
-        ([(0, 3), (float("nan"), 3)], "odom", "pose 2 at (nan, 3) is not finite"),
+        ([(0, 3), (float("nan"), 3)], "odom", "pose 2 at (nan, 3, 0) is not finite"),
         ([(0, 3), (0, 3)], "odom", "refused"),
     ):
         status, code, said = goals.send(*places, frame=frame).end()
