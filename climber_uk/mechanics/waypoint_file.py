@@ -68,7 +68,7 @@ def read_text(file: str) -> str:
     except OSError as error:
         raise ValueError(error.strerror or str(error)) from None
     except UnicodeDecodeError:
-        raise ValueError("is not a text file") from None
+        raise ValueError("is not a text file of UTF-8 or UTF-16") from None
     if "\0" in text:
         raise ValueError("is not a text file")
     return LINE_END.sub("\n", text)

@@ -6,6 +6,7 @@ controller publishes it, the clock leads. What an operator asks for, to pause, t
 back, changes the points ahead of the climber: see `planning.course`.
 """
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry, Path
 from rclpy.parameter import Parameter
@@ -15,7 +16,8 @@ from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from climber_uk.mechanics import SECOND
+from climber_uk.mechanics import SECOND, Array
+from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
 from climber_uk.messages import reading, writing
@@ -36,8 +38,16 @@ from climber_uk.planning.by_hand import HandOptions
 from climber_uk.planning.course import CourseOptions
 from climber_uk.planning.events import Events
 from climber_uk.planning.given_path import Manner
-from climber_uk.planning.journey import BACK, HAND, PATH, Journey, Said
-from climber_uk.planning.progress import BY_HAND, FOLLOWING, WAITING, Odometer, Progress, progress
+from climber_uk.planning.journey import HAND, PATH, Journey, Said
+from climber_uk.planning.progress import (
+    APPROACHING,
+    BY_HAND,
+    FOLLOWING,
+    WAITING,
+    Odometer,
+    Progress,
+    progress,
+)
 from climber_uk.ros.path_goals import path_goals
 from climber_uk.ros.path_intake import PathIntake
 from climber_uk.ros.running import (
@@ -54,6 +64,7 @@ from climber_uk.ros.stick import listen_to_stick
 STANDSTILL = 0.2  # [s] of wall-clock time without a change, after which a clock stands still
 ODOMETRY_AGE = 1.0  # [s] of an odometry, above which it does not start a trajectory
 PROGRESS_PERIOD = SECOND // 10  # [ns]
+COASTS = 0.4  # [s] at its speed, for which a climber goes on that brakes on its way to a path
 CLOCK_STEP = SECOND // 5  # [ns] back, from which on a clock was reset
 
 
@@ -123,7 +134,7 @@ class TrajectoryPublisher(ClimberNode):
         self.odometry: Subscription | None = None  # only while a start is waited for
         self.publish_path(self.get_clock().now().nanoseconds)
         if self.parameters.read(PublisherOptions).autostart:
-            self.wait_for_odometry()
+            self.begin(PATH)
 
     def summary(self) -> str:
         """Extremes of the trajectory, for the log."""
@@ -144,35 +155,38 @@ class TrajectoryPublisher(ClimberNode):
         return response
 
     def on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Service ~/stop: come to rest on the path, as ~/pause does."""
-        response.success, response.message = self.said(self.journey.pause(self.position))
+        """Service ~/stop: come to rest, as ~/pause does."""
+        response.success, response.message = self.said(self.pause())
         return response
 
     def on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """Service ~/pause: come to rest on the path (true), or go on along it (false)."""
-        if request.data:
-            said = self.journey.pause(self.position)
-        elif self.journey.hand is not None:
-            self.journey.is_paused = False
-            said = True, f"back to the path: {self.begin(BACK)}"
-        else:
-            said = self.journey.go_on(self.position)
+        """Service ~/pause: come to rest (true), or go on along the path (false)."""
+        said = self.pause() if request.data else self.journey.go_on(self.position, self.is_driven)
         response.success, response.message = self.said(said)
+        self.wait_for_odometry()
         return response
+
+    def pause(self) -> Said:
+        """Come to rest on the path if it is driven, else where the climber is."""
+        return self.journey.pause(self.position, self.is_driven)
 
     def on_retreat(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Service ~/retreat: go back along the path as it was driven, the heading kept."""
-        response.success, response.message = self.said(self.journey.retreat(self.position))
+        response.success, response.message = self.said(
+            self.journey.retreat(self.position, self.is_driven)
+        )
         return response
 
     def on_speed(self, message: Float64) -> None:
         """Topic ~/speed: as the parameter `speed`."""
         result = self.set_parameters([Parameter("speed", value=float(message.data))])[0]
-        self.report("speed", "" if result.successful else "refused", result.reason, False)
+        refused = "" if result.successful else f"refused: {result.reason}"
+        self.report("speed", refused, is_fault=False)
 
     def on_parameters(self) -> None:
         """Take up another speed."""
-        self.journey.set_speed(self.parameters.read(PublisherOptions).speed, self.position)
+        speed = self.parameters.read(PublisherOptions).speed
+        self.journey.set_speed(speed, self.position, self.is_driven)
 
     def on_stick(self, speed: float, yaw_rate: float) -> None:
         """Drive by hand: at once if it is already, else once the climber rests."""
@@ -195,24 +209,23 @@ class TrajectoryPublisher(ClimberNode):
 
     def begin(self, what: str) -> str:
         """Begin something at the next odometry, once the climber rests; say so."""
-        is_now, said = self.journey.begin(what, self.position, self.is_driven)
-        if is_now:
-            self.wait_for_odometry()
+        _, said = self.journey.begin(what, self.position, self.is_driven)
+        self.wait_for_odometry()
         return said
 
     @property
     def is_driven(self) -> bool:
         """Whether the course is followed, as far as is known."""
-        return self.mode in ("", FOLLOWING)
+        return self.mode == FOLLOWING or not (self.mode or self.count_publishers(REFERENCE_TIME))
 
     def wait_for_odometry(self) -> None:
-        """Subscribe the odometry, to start at the next one."""
-        if self.odometry is None:
+        """Subscribe the odometry, if something starts at the next one."""
+        if self.odometry is None and self.journey.is_due:
             self.odometry = self.subscription(Odometry, ODOMETRY, self.on_odometry, BEST_EFFORT)
 
     def on_odometry(self, message: Odometry) -> None:
-        """Start the trajectory `start_delay` after the stamp of `message`."""
-        if self.odometry is None or self.journey.is_halted:
+        """Start what is next at the stamp of `message`, a path `start_delay` after it."""
+        if self.odometry is None or not self.journey.is_due:
             return
         now, stamp = self.get_clock().now().nanoseconds, reading.nanoseconds(message.header.stamp)
         try:
@@ -222,7 +235,8 @@ class TrajectoryPublisher(ClimberNode):
                 return
             if now > 0 and abs(now - stamp) > ODOMETRY_AGE * SECOND:
                 raise ValueError("stamp is too far from the clock")
-            start = stamp + round(self.parameters.read(PublisherOptions).start_delay * SECOND)
+            delay = self.parameters.read(PublisherOptions).start_delay
+            start = stamp + round(delay * SECOND) * (self.journey.next == PATH)
             reading.check_stamp(start)
         except ValueError as error:
             self.report("start", "odometry refused", str(error))
@@ -231,14 +245,19 @@ class TrajectoryPublisher(ClimberNode):
         self.destroy_subscription(self.odometry)
         self.odometry = None
         what = self.shape if self.journey.next == PATH else self.journey.next
-        goes_on = self.journey.next == BACK
-        self.journey.start(start, state.pose, self.position)
+        goes_on = self.journey.next != PATH
+        self.journey.start(start, self.resting_pose(state), self.position)
         self.begin_events(goes_on)
         self.followed, self.mode, self.has_told_done = None, "", False
         self.last_look = now or stamp  # the odometry may have come before the first clock
         self.publish_around(start)
         self.get_logger().info(f"{what} starts at {start / SECOND:.3f} s")
         self.publish_path(start)
+
+    def resting_pose(self, state: State) -> Array:
+        """Pose (3,) at which a climber in a state is once it rests: on its way it brakes first."""
+        goes_on = COASTS if self.mode == APPROACHING else 0.0
+        return np.asarray(state.pose + goes_on * state.velocity)
 
     def on_reference_time(self, message: TimeReference) -> None:
         """Keep how far a controller has come, unless that is of another trajectory."""
@@ -275,7 +294,6 @@ class TrajectoryPublisher(ClimberNode):
         if 0 < now < self.last_look - CLOCK_STEP and self.journey.under_way is not None:
             self.get_logger().warning("the clock went back: starts again at the next odometry")
             self.journey.forget()
-            self.wait_for_odometry()
         self.last_look = now
         given = self.given.ready()
         if given is not None:
@@ -289,13 +307,13 @@ class TrajectoryPublisher(ClimberNode):
             position = self.position
             self.publish_around(position)
             self.tell_done(position)
-            if not self.mode and not self.count_publishers(REFERENCE_TIME):
+            if not self.mode and self.is_driven:
                 self.tell_events(now)
-            if self.journey.waits_for_rest:
+            if self.journey.waits_for_rest and self.journey.next is not None:
                 self.begin(self.journey.next)
         if self.goals is not None:
-            is_starting = self.odometry is not None or self.journey.waits_for_rest
-            self.goals.look(now, self.position, is_starting)
+            self.goals.look(now, self.position, self.is_driven)
+        self.wait_for_odometry()
         if self.is_progress_due(now) and self.progress.get_subscription_count():
             self.publish_progress(now)
 
@@ -332,7 +350,8 @@ class TrajectoryPublisher(ClimberNode):
 
     def publish_progress(self, now: int) -> None:
         """Publish how far the course is."""
-        course, by_hand = self.journey.course, self.journey.hand is not None
+        course = self.journey.course
+        by_hand = self.journey.hand is not None and not self.journey.is_held
         how_far = Progress(BY_HAND if by_hand else WAITING)
         if course is not None and not by_hand:
             if self.odometer is None or self.odometer.trajectory is not course.trajectory:

@@ -65,8 +65,9 @@ class CourseOptions:
 class Course(Generic[Row]):
     """A trajectory that started at `start` [ns], at rest if it `is_paused`.
 
-    It begins at its own time `begin` [s], from rest there if that is later than 0. `make` makes of
-    a reference, and its time [s] since the start, what is published of it.
+    It begins at its own time `begin` [s], from rest there if that is later than 0, and goes back
+    from there if `direction` is -1. `make` makes of a reference, and its time [s] since the start,
+    what is published of it.
     """
 
     def __init__(
@@ -78,11 +79,12 @@ class Course(Generic[Row]):
         is_paused: bool = False,
         speed: float = 1.0,
         begin: float = 0.0,
+        direction: int = 1,
     ) -> None:
         self.trajectory, self.start, self.options = trajectory, start, options
         self.is_paused, self.speed = is_paused, speed  # as a share of the planned one
         self.begin = begin
-        self.direction = 1  # -1: back along the path
+        self.direction = direction  # -1: back along the path
         self.clock: PathClock | None = None  # None: as planned
         self._make = make
         self._points: deque[tuple[float, Row]] = deque()  # with their times [s]
@@ -90,7 +92,7 @@ class Course(Generic[Row]):
         if begin > 0:
             rest = PathClock(self.ramp_time, begin=begin, rate=0.0)
             self.clock = rest.changed(0.0, self.asked, 0.0)
-        elif is_paused or speed != 1.0:
+        elif self.asked != 1.0:
             self.clock = PathClock(self.ramp_time, rate=self.asked)
 
     @cached_property

@@ -23,17 +23,14 @@ class Fate(Enum):
         return self in (Fate.REPLACED, Fate.BY_HAND, Fate.BACK)
 
 
-def fate(journey: Journey[Row], trajectory: Trajectory, position: int, is_starting: bool) -> Fate:
-    """Fate of a trajectory, of a journey that has come to `position` [ns].
-
-    `is_starting`: it is about to start what is next.
-    """
+def fate(journey: Journey[Row], trajectory: Trajectory, position: int) -> Fate:
+    """Fate of a trajectory, of a journey that has come to `position` [ns]."""
     course = journey.course
     if journey.planned is not trajectory:
         return Fate.REPLACED
-    if is_starting:
+    if journey.next is not None:
         return Fate.BEGINS
-    if journey.hand is not None:
+    if journey.hand is not None and not journey.is_held:
         return Fate.BY_HAND
     if course is None or course.trajectory is not trajectory:
         return Fate.REPLACED

@@ -42,7 +42,7 @@ class PathGoals:
     """Plans and drives the paths of goals, and tells what has become of them.
 
     A goal fails that begins or is followed `patience` [s] later than it should be; then, as when it
-    is cancelled, the climber comes to rest on its path.
+    is cancelled, the climber comes to rest.
     """
 
     def __init__(
@@ -114,8 +114,11 @@ class PathGoals:
         if mode in (FOLLOWING, APPROACHING):
             self._followed_at = now
 
-    def look(self, now: int, position: int, is_starting: bool) -> None:
-        """Tell how goals do, of a journey that has come to `position` [ns], as `fate` takes it."""
+    def look(self, now: int, position: int, is_driven: bool) -> None:
+        """Tell how goals do, of a journey that has come to `position` [ns].
+
+        `is_driven`: what is under way is followed, as far as is known.
+        """
         if self._planned is not None and self._planned.handle.is_cancel_requested:
             cancelled, self._planned = self._planned, None
             self._intake.drop()
@@ -123,32 +126,35 @@ class PathGoals:
         goal = self._driven
         if goal is None or goal.odometer is None:
             return
-        what = fate(self._journey, goal.odometer.trajectory, position, is_starting)
+        what = fate(self._journey, goal.odometer.trajectory, position)
         if what is Fate.DONE:
             self._end(goal, "succeed", "NONE", what.value)
+        elif goal.handle.is_cancel_requested:
+            self._journey.halt(position, is_driven)
+            if self._rests(position):
+                where = "where it was" if self._journey.is_held else "on the path"
+                self._end(goal, "canceled", "NONE", f"cancelled: at rest {where}")
         elif what.is_left:
             self._end(goal, "abort", "UNKNOWN", what.value)
-        elif goal.handle.is_cancel_requested:
-            self._journey.halt(position)
-            if self._rests(position):
-                self._end(goal, "canceled", "NONE", "cancelled: at rest on the path")
         elif trouble := self._trouble(now, what):
-            self._journey.halt(position)
+            self._journey.halt(position, is_driven)
             self._end(goal, "abort", *trouble)
         else:
-            self._tell(goal, goal.odometer, position if what is Fate.DRIVEN else None)
+            self._tell(goal, goal.odometer, position if what is Fate.DRIVEN else None, is_driven)
 
     def _rests(self, position: int) -> bool:
         """Whether the climber rests, as far as is known: one that is not to move does."""
         under_way = self._journey.under_way
         if under_way is None or self._mode not in ("", FOLLOWING, APPROACHING):
             return True
-        return self._mode != APPROACHING and under_way.rests(position)
+        is_braking = self._mode == APPROACHING or self._journey.next is not None
+        return not is_braking and under_way.rests(position)
 
     def _trouble(self, now: int, what: Fate) -> tuple[str, str] | None:
         """Error code, and in words why a goal fails, if it does."""
         is_alone = not self._mode and not self._node.count_publishers(REFERENCE_TIME)
-        if is_alone and (self._journey.waits_for_rest or what is Fate.DRIVEN):
+        is_paused = self._journey.is_paused and not self._journey.is_halted
+        if is_paused or (is_alone and (self._journey.waits_for_rest or what is Fate.DRIVEN)):
             self._heard_at = self._followed_at = now  # by the clock
         if now - self._followed_at <= self._patience:
             return None
@@ -161,13 +167,12 @@ class PathGoals:
 
     # What is told
 
-    def _tell(self, goal: Goal, odometer: Odometer, position: int | None) -> None:
+    def _tell(self, goal: Goal, odometer: Odometer, position: int | None, is_driven: bool) -> None:
         """Publish the distance that is left, and the speed, as planned."""
         own_time = speed = 0.0
         course = self._journey.course
         if position is not None and course is not None:
             own_time, rate = course.own_time(position)
-            is_driven = self._mode in ("", FOLLOWING)
             speed = abs(float(course.trajectory.at(own_time).speed) * rate) * is_driven
         left = odometer.whole - odometer.at(own_time)
         goal.handle.publish_feedback(_of(FollowPath.Feedback, distance_to_goal=left, speed=speed))

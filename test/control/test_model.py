@@ -329,4 +329,4 @@ def test_friction_that_holds_at_rest_is_overcome_and_taken_back_without_a_jump()
         learnt = learnt.asked(-0.01, False, 0.005)
         shares.append(np.tanh(learnt.stiction))
     assert shares[-1] == 0.0
-    assert np.abs(np.diff(shares)).max() <= 24.0 * 0.005
+    assert np.abs(np.diff(shares)).max() <= 20.0 * 0.005

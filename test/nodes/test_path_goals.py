@@ -167,9 +167,10 @@ def test_a_goal_fails_that_is_not_followed_and_another_is_driven_then(definition
     cancelled = goals.send(begin, begin + RIGHT)
     world.wait(lambda: goals.speed > 0.02, "its way to the beginning")
     world.wait(cancelled.handle.cancel_goal_async().done, "word of it")
-    assert cancelled.end()[0] == CANCELED
+    status, _, said = cancelled.end()
+    assert (status, said) == (CANCELED, "cancelled: at rest where it was")
     assert goals.speed < 0.01
-    assert np.hypot(*(goals.here - begin)) < 0.15
+    assert np.hypot(*(goals.here - begin)) > 0.05
 
 
 @pytest.mark.soak

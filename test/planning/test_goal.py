@@ -33,36 +33,36 @@ def rest(journey, since=MIDDLE):
 
 def test_a_path_is_done_where_it_ends():
     journey = under_way()
-    assert fate(journey, ONE, MIDDLE, False) is Fate.DRIVEN
-    assert fate(journey, ONE, END - SECOND // 10, False) is Fate.DRIVEN
-    assert fate(journey, ONE, END, False) is Fate.DONE
+    assert fate(journey, ONE, MIDDLE) is Fate.DRIVEN
+    assert fate(journey, ONE, END - SECOND // 10) is Fate.DRIVEN
+    assert fate(journey, ONE, END) is Fate.DONE
 
 
 def test_a_path_waits_for_what_is_driven_to_rest_and_begins_then():
     journey = under_way(OTHER)
     journey.planned = ONE
-    assert fate(journey, OTHER, MIDDLE, False) is Fate.REPLACED
+    assert fate(journey, OTHER, MIDDLE) is Fate.REPLACED
     assert not journey.begin(PATH, MIDDLE, True)[0]
-    assert fate(journey, ONE, MIDDLE, journey.waits_for_rest) is Fate.BEGINS
+    assert fate(journey, ONE, MIDDLE) is Fate.BEGINS
     at_rest = rest(journey)
     assert journey.begin(PATH, at_rest, True)[0]
-    assert fate(journey, ONE, at_rest, True) is Fate.BEGINS
+    assert fate(journey, ONE, at_rest) is Fate.BEGINS
     journey.start(at_rest, POSE, at_rest)
-    assert fate(journey, ONE, at_rest, False) is Fate.DRIVEN
+    assert fate(journey, ONE, at_rest) is Fate.DRIVEN
 
 
 def test_it_is_left_for_a_stick_for_the_way_back_and_for_good_if_another_is_gone_back_to():
     journey = under_way()
     journey.retreat(MIDDLE)
-    assert fate(journey, ONE, MIDDLE, False) is Fate.BACK
+    assert fate(journey, ONE, MIDDLE) is Fate.BACK
     journey = under_way()
     journey.begin(HAND, END, True)
     journey.start(END, POSE, END)
-    assert fate(journey, ONE, END, False) is Fate.BY_HAND
+    assert fate(journey, ONE, END) is Fate.BY_HAND
     journey.planned = OTHER
     journey.begin(BACK, END, False)
     journey.start(END, POSE, END)
-    assert fate(journey, OTHER, END, False) is Fate.REPLACED
+    assert fate(journey, OTHER, END) is Fate.REPLACED
     assert all(what.is_left for what in (Fate.BACK, Fate.BY_HAND, Fate.REPLACED))
 
 

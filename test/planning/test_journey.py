@@ -27,12 +27,11 @@ def some_path(random, place=None):
 def travel(random, number):
     """Have an operator ask for `number` things; return the largest jump of a torque [N m]."""
     climber = Travelling(some_path(random)).run(5.0)
-    journey = climber.journey
     asked = {
-        "pause": lambda: journey.pause(climber.position),
+        "pause": climber.pause,
         "go on": climber.go_on,
-        "speed": lambda: journey.set_speed(random.uniform(0.2, 1.0), climber.position),
-        "back": lambda: journey.retreat(climber.position),
+        "speed": lambda: climber.set_speed(random.uniform(0.2, 1.0)),
+        "back": climber.retreat,
         "another path": lambda: climber.replace(some_path(random, climber.places[-1])),
         "start": climber.start,
         "stick": lambda: [

@@ -12,7 +12,7 @@ from climber_uk.mechanics.quantities import State
 from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.planning.by_hand import HandOptions
 from climber_uk.planning.course import Course, CourseOptions
-from climber_uk.planning.journey import BACK, HAND, PATH, Journey
+from climber_uk.planning.journey import HAND, PATH, Journey
 from climber_uk.simulation.plant import Plant
 
 CONFIG = Path(__file__).parents[2] / "config" / "climber.yaml"
@@ -119,8 +119,11 @@ class Travelling(UnderWay):
     # what an operator asks for
 
     def ask(self, what):
-        is_driven = self.modes[-1:] in ([], [Mode.FOLLOWING])
-        self.is_due, _ = self.journey.begin(what, self.position, is_driven)
+        self.journey.begin(what, self.position, self.is_driven)
+
+    @property
+    def is_driven(self):
+        return self.modes[-1:] in ([], [Mode.FOLLOWING])
 
     def replace(self, trajectory):
         self.journey.planned = trajectory
@@ -131,11 +134,16 @@ class Travelling(UnderWay):
         self.ask(PATH)
 
     def go_on(self):
-        if self.journey.hand is None:
-            self.journey.go_on(self.position)
-        else:
-            self.journey.is_paused = False
-            self.ask(BACK)
+        self.journey.go_on(self.position, self.is_driven)
+
+    def pause(self):
+        self.journey.pause(self.position, self.is_driven)
+
+    def retreat(self):
+        self.journey.retreat(self.position, self.is_driven)
+
+    def set_speed(self, speed):
+        self.journey.set_speed(speed, self.position, self.is_driven)
 
     def stick(self, speed, yaw_rate):
         if self.journey.takes_over(speed, yaw_rate, self.now):
@@ -147,9 +155,10 @@ class Travelling(UnderWay):
         for _ in range(round(seconds / PERIOD)):
             if journey.waits_for_rest and self.period % PUBLISHED_EVERY == 0:
                 self.ask(journey.next)
-            if self.is_due:
-                journey.start(self.now, self.state.pose, self.position)
-                self.is_due = False
+            if journey.is_due:
+                coasts = 0.4 if self.modes[-1:] == [Mode.APPROACHING] else 0.0  # as the node has it
+                pose = self.state.pose + coasts * self.state.velocity
+                journey.start(self.now, pose, self.position)
             self.position = max(self.position, journey.under_way.start)
             super().run(PERIOD)
             if until():
