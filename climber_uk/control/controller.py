@@ -420,7 +420,7 @@ class Controller:
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
-        if self.guard.budget.listens:
+        if self.guard.budget.paused is not None:
             active.wait(target)
         else:
             active.go_on(target)

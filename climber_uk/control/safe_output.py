@@ -19,6 +19,7 @@ GENTLER, CALM = 0.5, SECOND  # times as fast it is braked after that, for [ns] w
 COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
 NOTHING = 0.05  # of the weight: a drive that is let go
 FALLS = 0.1  # [m/s] by which it may get faster without a torque, if its seal holds it
+LATEST = 0.6  # [s] that a torque may act after it was sent: none acts this long after the last
 LETS_GO = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
 # what moves, but in doubt and with a polarity that nobody knows, is shaken a little to find it out
 SHAKEN = 0.02  # [m/s] of a rim, above which it is
@@ -51,8 +52,9 @@ class SafeOutput:
         self._is_carried = True  # the weight, as it coasts
         self._gently = 1.0  # share of its rate that it brakes with, less each time it is pushed
         self._begins, self._left_until = True, 0  # with the next torques; [ns]
-        # [m/s] the lowest while nothing drives it; whether it has got faster, though its seal holds
-        self._slowest, self._is_falling = math.inf, False
+        # [m/s] the lowest while nothing drives it, [s] for how long nothing is sent; and whether it
+        # has got faster by then
+        self._slowest, self._left_for, self._is_falling = math.inf, 0.0, False
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -64,7 +66,9 @@ class SafeOutput:
             is_against = force * observed.after.speed < 0
             self._is_driven = is_against and gained > GRAVITY * observed.time
             if not self._begins:
-                self._watch_seal(force / (climber.mass * GRAVITY), abs(observed.after.speed))
+                is_left = abs(force) < NOTHING * climber.mass * GRAVITY
+                self._left_for = self._left_for + observed.time if is_left else 0.0
+                self._watch_seal(abs(observed.after.speed))
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
             self._way = self.polarities.drive.sign or self._way
@@ -76,9 +80,9 @@ class SafeOutput:
         if self.safety.has_jumped(seen, pose, climber.half_track):
             self.by_pose.restart()
 
-    def _watch_seal(self, share: float, speed: float) -> None:
-        """Look if it holds a climber of a speed [m/s], that a share of its weight drives."""
-        self._slowest = min(self._slowest, speed) if abs(share) < NOTHING else math.inf
+    def _watch_seal(self, speed: float) -> None:
+        """Look if it holds a climber of a speed [m/s], once no torque can act, however late."""
+        self._slowest = min(self._slowest, speed) if self._left_for > LATEST else math.inf
         self._is_falling = self._is_falling or speed > self._slowest + FALLS
 
     def send(
