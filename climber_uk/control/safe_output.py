@@ -28,6 +28,20 @@ HALF_SHAKE = SECOND // 10  # [ns]
 SHAKES = 2 * SECOND  # [ns] of it, at most
 
 
+class SealCheck:
+    """Whether a seal gives way: who is not driven gets faster, once no late torque can act."""
+
+    def __init__(self) -> None:
+        self.gives_way = False
+        self._left_for, self._slowest = 0.0, math.inf  # [s] without a torque, [m/s] since then
+
+    def add(self, is_driven: bool, speed: float, time: float) -> None:
+        """Take a speed [m/s], after a `time` [s] in which torques drove it or not."""
+        self._left_for = 0.0 if is_driven else self._left_for + time
+        self._slowest = min(self._slowest, speed) if self._left_for > LATEST else math.inf
+        self.gives_way = self.gives_way or speed > self._slowest + FALLS
+
+
 class SafeOutput:
     """Torques for the last odometry while nothing is followed."""
 
@@ -52,9 +66,7 @@ class SafeOutput:
         self._is_carried = True  # the weight, as it coasts
         self._gently = 1.0  # share of its rate that it brakes with, less each time it is pushed
         self._begins, self._left_until = True, 0  # with the next torques; [ns]
-        # [m/s] the lowest while nothing drives it, [s] for how long nothing is sent; and whether it
-        # has got faster by then
-        self._slowest, self._left_for, self._is_falling = math.inf, 0.0, False
+        self._seal = SealCheck()
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -66,9 +78,8 @@ class SafeOutput:
             is_against = force * observed.after.speed < 0
             self._is_driven = is_against and gained > GRAVITY * observed.time
             if not self._begins:
-                is_left = abs(force) < NOTHING * climber.mass * GRAVITY
-                self._left_for = self._left_for + observed.time if is_left else 0.0
-                self._watch_seal(abs(observed.after.speed))
+                is_driven = abs(force) >= NOTHING * climber.mass * GRAVITY
+                self._seal.add(is_driven, abs(observed.after.speed), observed.time)
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
             self._way = self.polarities.drive.sign or self._way
@@ -80,11 +91,6 @@ class SafeOutput:
         if self.safety.has_jumped(seen, pose, climber.half_track):
             self.by_pose.restart()
 
-    def _watch_seal(self, speed: float) -> None:
-        """Look if it holds a climber of a speed [m/s], once no torque can act, however late."""
-        self._slowest = min(self._slowest, speed) if self._left_for > LATEST else math.inf
-        self._is_falling = self._is_falling or speed > self._slowest + FALLS
-
     def send(
         self, mode: Mode, stamp: int, age: float, estimator: Estimator, law: ControlLaw
     ) -> Torques:
@@ -92,7 +98,7 @@ class SafeOutput:
         motion, climber, safety = estimator.motion, law.climber, self.safety
         if motion is None or safety.safe_output != "hold":
             return _let_go(estimator, age)
-        falls = law.falls or self._is_falling
+        falls = self._falls(law)
         if mode is Mode.NO_ODOMETRY and age < safety.odometry_timeout and not falls:
             return self._coast(mode, estimator, law, age)  # it comes again, and may be old
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
@@ -112,6 +118,10 @@ class SafeOutput:
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
+
+    def _falls(self, law: ControlLaw) -> bool:
+        """Whether its weight may be more than its seal holds, as is believed or has shown."""
+        return law.falls or self._seal.gives_way
 
     def _stop(
         self, mode: Mode, stamp: int, age: float, estimator: Estimator, law: ControlLaw
@@ -162,8 +172,7 @@ class SafeOutput:
         """
         knows = mode.is_fault and not mode.doubts_odometry and mode is not Mode.NO_ODOMETRY
         way = self._way if knows else 1
-        falls = law.falls or self._is_falling
-        if not falls and (mode.doubts_odometry or not self._is_carried or way < 0):
+        if not self._falls(law) and (mode.doubts_odometry or not self._is_carried or way < 0):
             return _let_go(estimator, age)
         return _brake(estimator, law, age, Braking(0.0, 0.0, way), None)
 
@@ -191,7 +200,7 @@ class SafeOutput:
         doubted: int | None,
     ) -> Braking:
         """How to brake; `doubted` is for how long [ns] speeds are in doubt, None: they are not."""
-        rate, falls = self._gently * self.safety.braking_rate, law.falls or self._is_falling
+        rate, falls = self._gently * self.safety.braking_rate, self._falls(law)
         if doubtful is None or doubted is None:
             way = self._way if mode.is_fault else 1
             sign, yaw_sign = self.polarities.signs
