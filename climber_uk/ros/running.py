@@ -37,7 +37,7 @@ from climber_uk.ros.leaving import LONGEST_END, leave
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import in_words, printable
-from climber_uk.system.signals import Interrupted, on_end
+from climber_uk.system.signals import on_end
 
 # else the first message type would have the generator of message types loaded, and its parser
 sys.modules.setdefault("rosidl_generator_py.generate_py_impl", None)  # type: ignore[arg-type]
@@ -49,6 +49,7 @@ BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SIGNAL_PERIOD = 0.1  # [s]
 PUBLISH_PERIOD = SECOND // 20  # [ns] of topics that need not be published every time
 WALL_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
+LONGEST_START = 10  # [s] from a signal to end, for a node that is starting
 LONGEST_LINE = 1000  # [characters] of what is logged of others
 TYPES_PERIOD = 2.0  # [s] in which topics are looked at for publishers of another type
 LINES, LINES_PERIOD = 6, 10.0  # most lines of the log on one subject, in so many [s]
@@ -295,13 +296,12 @@ def run(
         if is_asked:  # once more, maybe while `end` is locked
             return
         is_asked = True
+        # by the kernel: a callback may hang in the middleware, and a start may have no end
+        signal.alarm(LONGEST_END if nodes else LONGEST_START)
         end.set_result(None)
-        if not nodes:  # they are being made, of which there may be no end
-            raise Interrupted
-        signal.alarm(LONGEST_END)  # by the kernel: a callback may hang in the middleware
 
+    on_end(stop)
     try:
-        on_end(stop)
         ParameterFiles(sys.argv, "")  # raises with the line that is wrong, unlike rcl
         chosen = parse(remove_ros_args(sys.argv)[1:], about, options or {})
         use_udp()
@@ -315,8 +315,6 @@ def run(
         gc.freeze()  # to look through all that was imported would halt the loop for 20 ms
         while not end.done():
             executor.spin_until_future_complete(end, timeout_sec=3600.0)
-    except Interrupted:
-        pass
     except (ValueError, OSError, ParameterException, RCLError, UnknownROSArgsError) as error:
         if nodes:
             raise
