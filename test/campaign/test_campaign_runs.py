@@ -170,7 +170,7 @@ def is_running(pid):
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_a_dask_cluster_that_loses_a_worker_loses_nothing(many, tmp_path):
     distributed = pytest.importorskip("distributed")
-    local = distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None)
+    local = distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=":0")
     store = Store(tmp_path / "out", many)
     with local, running.cluster(local.scheduler_address) as (executor, at_once):
         killed = []

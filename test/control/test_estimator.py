@@ -232,10 +232,11 @@ def test_it_stops_where_it_shall_and_reverses_there(share, most):
     ours = controller(BUILT, BUILT_GAINS)
     ours.guard.budget.is_new = False  # else it would begin later: friction holds at first
     run = simulate(line, start, 16.0, ours, true)
-    for rests in (run.time > 6.5) & (run.time < 7.9), run.time > 14.5:
+    for rests in (run.time > 6.75) & (run.time < 7.9), run.time > 14.75:
         assert run.distance[rests].max() < 0.05e-3
         assert np.abs(run.velocity[rests]).max() < 0.1e-3  # it creeps home
-    assert run.distance.max() < most
+    assert ours.active.waited < 0.3  # while friction is learnt
+    assert np.abs(run.error[:, 1]).max() < most
     assert np.abs(run.error[:, 2]).max() < 1e-2
 
 

@@ -34,8 +34,8 @@ CIRCLE = Trajectory(Circle(), ConstantRate(rate=0.5))
 class Loop:
     """What a robot and a planner would say, a step at a time, and what the controller answers."""
 
-    def __init__(self, world, *parameters):
-        self.world = world
+    def __init__(self, world, *parameters, trajectory=CIRCLE):
+        self.world, self.trajectory = world, trajectory
         if NAME not in world.processes:
             world.start_node(NAME, *UNGUARDED, *parameters)
         self.torques = world.listen(JointState, "wheel_torques")
@@ -48,12 +48,12 @@ class Loop:
 
     def plan(self, seconds=60.0):
         times = np.arange(0.0, seconds, 0.25)
-        points = [reference_point(CIRCLE.at(time), time) for time in times]
+        points = [reference_point(self.trajectory.at(time), time) for time in times]
         self.reference.publish(writing.reference(points, self.begin, "odom", "base_link"))
 
     def tell(self, spoil=lambda message: None, age=0, at=None):
         stamp = at or self.now() - age
-        here = CIRCLE.at((stamp - self.begin) * 1e-9)
+        here = self.trajectory.at((stamp - self.begin) * 1e-9)
         message = writing.odometry(State(here.pose, here.velocity), stamp, "odom", "base_link")
         spoil(message)
         self.odometry.publish(message)
@@ -128,7 +128,9 @@ def test_odometry_that_stops_is_noticed_and_followed_when_it_comes_back(world):
 
 
 def test_a_reference_that_is_missing_or_ends_gets_the_safe_output(world):
-    loop = Loop(world, "odometry_timeout:=1.0")
+    # of a slow one, that it does not wait for who is held up and then ahead of it
+    slow = Trajectory(Circle(), ConstantRate(rate=1e-3))
+    loop = Loop(world, "odometry_timeout:=1.0", trajectory=slow)
     loop.is_safe()
     no_reference = "safe output: no reference"
     world.wait(lambda: no_reference in world.log(NAME), "word of it")
