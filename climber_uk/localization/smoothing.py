@@ -13,9 +13,7 @@ import numpy as np
 from climber_uk.localization.options import LocalizationOptions
 from climber_uk.mechanics import Array
 
-SHARE = (
-    0.3  # of what is driven and turned, that corrections add to it at most: less than a slip may
-)
+SHARE = 0.3  # of what is driven and turned: corrections add no more to it than a slip may
 BEND = 0.05  # [rad/m] that they add, too: a heading has to be corrected on a straight as well
 
 
