@@ -14,6 +14,7 @@ from climber_uk.control.model import SLOW
 from climber_uk.control.observed import Acting, Observed
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.quantities import Torques, Wrench
 
 FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
@@ -160,7 +161,10 @@ class ForceBudget:
         told = climber.half_track * after.yaw_rate
         rolled = _rolled(self.turn, moment, holds, time * _rims(climber))
         self.turn = told if self._turns else rolled
-        self._astray += 0.0 if self._turns else abs(self.turn) / climber.half_track * time
+        # a slow turn that is told is none that its heading does not know of
+        turned = abs(self.turn) / climber.half_track * time
+        shown = abs(wrapped(after.heading - before.heading))
+        self._astray = max(self._astray + turned - shown, 0.0)
         if self.paused is not None:
             self.paused += time
             pause = FIRST_PAUSE if self.pushes == 1 else PAUSE

@@ -181,3 +181,17 @@ def test_what_creeps_as_pose_and_twist_tell_alike_is_not_held():
     for before, after in pairwise(places):
         budget.see(law.climber, acted_on(law.climber, before, after, 40.0), 0.1, 0.2)
         assert given(budget, law, 74.0, 22.0) == pytest.approx((74.0, 22.0))
+
+
+def test_a_slow_turn_that_its_heading_tells_of_leaves_a_creeping_drive_its_friction():
+    law, budget, angle = Climb().controller._law, ForceBudget(), 0.02  # [rad/s²]
+    climber = law.climber
+    friction, moment = climber.seal_friction, climber.driven_inertia * angle
+    times = PERIOD * np.arange(300)
+    bend = [RESTS._replace(heading=angle * t**2 / 2, yaw_rate=angle * t, speed=1e-5) for t in times]
+    acted = [(climber.torques(friction, moment), PERIOD)]
+    for before, after in pairwise(bend):
+        observed = Observed(before, after, PERIOD, acted, Wrench(0.0, 0.0), 0.01)
+        observed = observed._replace(pull=climber.weight_along_wall * after.sine)
+        assert budget.see(climber, observed, 1e-5, 0.5) is None
+        assert given(budget, law, friction, moment) == pytest.approx((friction, moment))
