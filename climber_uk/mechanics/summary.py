@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from climber_uk.mechanics import Array
+from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.mechanics.trajectory import Trajectory
 
@@ -48,28 +49,31 @@ def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
         _, p_1, p_2, _ = path.derivatives(s)
         return np.abs(_cross(p_1, p_2)) / _size(p_1) ** 3
 
-    def speed(time: Array) -> Array:
-        return np.abs(trajectory.at(time).speed)
+    def speed(reference: Reference) -> Array:
+        return np.abs(reference.speed)
 
-    def yaw_rate(time: Array) -> Array:
-        return np.abs(trajectory.at(time).yaw_rate)
+    def yaw_rate(reference: Reference) -> Array:
+        return np.abs(reference.yaw_rate)
 
-    def wheel_speed(time: Array) -> Array:
-        reference = trajectory.at(time)
-        return np.abs(reference.speed) + (half_track or 0.0) * np.abs(reference.yaw_rate)
+    def wheel_speed(reference: Reference) -> Array:
+        return speed(reference) + (half_track or 0.0) * yaw_rate(reference)
+
+    def fastest(rate: Callable[[Reference], Array]) -> float:
+        return _highest(lambda time: rate(trajectory.at(time)), times, rate(reference))[1]
 
     path, times = trajectory.course, _times(trajectory)
+    reference = trajectory.at(times)
     length = _length(path)
-    tightest, bend = _highest(curvature, path.stations)
+    tightest, bend = _highest(curvature, path.stations, curvature(path.stations))
     x, y = path.derivatives(np.array(tightest))[0] + trajectory.origin
     return Summary(
         length=length,
         duration=trajectory.duration,
-        fastest_speed=_highest(speed, times)[1],
-        fastest_yaw_rate=_highest(yaw_rate, times)[1],
+        fastest_speed=fastest(speed),
+        fastest_yaw_rate=fastest(yaw_rate),
         smallest_radius=1 / bend if bend * length > 1e-9 else math.inf,
         tightest_place=(float(x), float(y)),
-        fastest_wheel_speed=None if half_track is None else _highest(wheel_speed, times)[1],
+        fastest_wheel_speed=None if half_track is None else fastest(wheel_speed),
         closed=path.closed,
         remarks=_remarks(trajectory, length),
     )
@@ -110,13 +114,13 @@ def _length(path: Shape) -> float:
     return float(((ends[:-1] + 4 * halfway + ends[1:]) * step).sum() / 6)
 
 
-def _highest(f: Callable[[Array], Array], x: Array) -> tuple[float, float]:
+def _highest(f: Callable[[Array], Array], x: Array, values: Array) -> tuple[float, float]:
     """Place and value of the maximum of `f`, whose peaks are wider than the steps of `x`.
 
-    Of maxima that are equal but for rounding the first.
+    `values` are those at `x`. Of maxima that are equal but for rounding the first.
     """
-    for _ in range(4):
-        values = f(x)
+    for refined in range(4):
+        values = f(x) if refined else values
         best = int(np.argmax(values >= values.max() * (1 - 1e-9)))
         place, value = float(x[best]), float(values[best])
         x = np.linspace(x[max(best - 1, 0)], x[min(best + 1, len(x) - 1)], 101)

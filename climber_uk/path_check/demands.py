@@ -84,8 +84,8 @@ class Reserves(NamedTuple):
     normal: Any  # (..., n) force onto the wall [N]
 
 
-def times(trajectory: Trajectory) -> tuple[Array, bool]:
-    """Times (n,) [s] to look at, and whether they are all of it, or a round or two.
+def looked_at(trajectory: Trajectory) -> tuple[Array, Reference, bool]:
+    """Times (n,) [s] to look at, the reference then, and whether they are all, or a round or two.
 
     They are as near to each other as its speed and its heading change fast. Raises `ValueError`
     where that is not near enough: it turns, or starts, at once.
@@ -98,7 +98,7 @@ def times(trajectory: Trajectory) -> tuple[Array, bool]:
     for _ in range(HALVINGS):
         abrupt = np.flatnonzero(_is_abrupt(time, at))
         if not len(abrupt):
-            return time, bool(last >= duration)
+            return time, at, bool(last >= duration)
         if len(time) + len(abrupt) > 2 * MOST_TIMES:
             break
         time = np.insert(time, abrupt + 1, (time[abrupt] + time[abrupt + 1]) / 2)
@@ -167,8 +167,7 @@ def demands(
     Raises `ValueError` where what is asked for is beyond what can be computed with.
     """
     with np.errstate(all="ignore"):
-        time, is_whole = times(trajectory)
-        reference = trajectory.at(time)
+        time, reference, is_whole = looked_at(trajectory)
         left = reserves(reference, climber, contact, wall=wall)
     power = sum(
         np.maximum(torque * rate, 0.0)

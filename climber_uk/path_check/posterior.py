@@ -20,7 +20,7 @@ from climber_uk.mechanics.contact import Contact, is_pulled_off
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import PLANE, Wall
 from climber_uk.parameters.text_file import text_of
-from climber_uk.path_check.demands import Resistance, reserves, times
+from climber_uk.path_check.demands import Resistance, looked_at, reserves
 from climber_uk.report.proportion import wilson
 
 HALF_WIDTH = 1.959963984540054  # standard deviations, of a 95 % interval
@@ -129,8 +129,7 @@ def chances(
     """By event, in how many of `runs` climbers it happens somewhere on the path."""
     random = np.random.default_rng(seed)
     own = {name: of.drawn(random, runs) for name, of in posterior.items() if of}
-    time, _ = times(trajectory)
-    reference = trajectory.at(time)
+    time, reference, _ = looked_at(trajectory)
     counts = {"falls": 0, "slips": 0, "asks for more torque than there is": 0}
     block = max(AT_ONCE // len(time), 1)
     for first in range(0, runs, block):

@@ -24,6 +24,7 @@ def message(places, frame="odom", frames=None):
         pose = PoseStamped()
         pose.header.frame_id = frames[number % len(frames)] if frames else frame
         pose.pose.position = Point(x=float(x), y=float(y), z=float(*z))
+        pose.pose.orientation.w = math.nan  # it is not read
         path.poses.append(pose)
     return path
 

@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
-from random_paths import random_path
+from random_paths import ODD, random_path
 from under_way import UnderWay
 
 from climber_uk.control.safety import Mode
+from climber_uk.mechanics.quantities import across
 from climber_uk.mechanics.time_laws import ConstantRate, RestToRest
 from climber_uk.mechanics.waypoints import Rounding
 from climber_uk.parameters.parameter_file import Values
+from climber_uk.planning.course import PEAK_RATE
 from climber_uk.planning.given_path import Manner, planned
 
 RATE, TOLERANCE, LIMIT = 0.2, 0.02, 4.0
@@ -95,6 +97,30 @@ def test_random_paths_are_driven_or_refused_in_words():
 @pytest.mark.timeout(3600)
 def test_a_hundred_random_paths():
     assert drive_at_random(np.random.default_rng(4), 100) > 0
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_odd_paths_are_planned_within_their_tolerance_and_limits(kind):
+    places = kind(np.random.default_rng(1))
+    trajectory, _ = planned(places, MANNER)
+    reference = trajectory.at(np.linspace(0, trajectory.duration, 2001))
+    assert distance(reference.pose[:, :2], places).max() <= TOLERANCE
+    assert np.abs(reference.speed).max() <= RATE * (1 + 1e-9)
+    assert np.abs(reference.yaw_rate).max() <= MANNER.rounding.max_yaw_rate
+    ramp = PEAK_RATE * RATE / MANNER.law.ramp_time
+    hardest = np.hypot(*reference.acceleration[:, :2].T).max()
+    assert hardest <= 1.15 * MANNER.rounding.max_acceleration + ramp
+    assert np.abs(across(reference.heading, reference.velocity)).max() <= 1e-9
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(1, 3))
+@pytest.mark.parametrize("kind", ODD)
+def test_odd_paths_are_driven(kind, seed):
+    places = kind(np.random.default_rng(seed))
+    climber = Sent(planned(places, MANNER)[0])
+    climber.drive(25)
+    climber.check(0, places)
 
 
 @pytest.mark.parametrize(
