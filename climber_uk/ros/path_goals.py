@@ -159,10 +159,12 @@ class PathGoals:
         if now - self._followed_at <= self._patience:
             return None
         seconds = f"for {self._patience / SECOND:g} s"
-        if what is Fate.BEGINS:
-            return "FAILED_TO_MAKE_PROGRESS", f"it does not begin, {seconds}: see the log"
-        if now - self._heard_at > self._patience:
+        begins = what is Fate.BEGINS
+        # whether it is known that the one before still moves does not change what is wrong
+        if now - self._heard_at > self._patience and (self._mode or not begins):
             return "CONTROLLER_TIMED_OUT", f"the controller is not heard {seconds}"
+        if begins:
+            return "FAILED_TO_MAKE_PROGRESS", f"it does not begin, {seconds}: see the log"
         return "FAILED_TO_MAKE_PROGRESS", f"the controller does not follow {seconds}: {self._mode}"
 
     # What is told

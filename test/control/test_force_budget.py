@@ -1,5 +1,6 @@
 """Torque is given and no motion is told: a seal sticks, or odometry is stuck, or late."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -183,15 +184,20 @@ def test_what_creeps_as_pose_and_twist_tell_alike_is_not_held():
         assert given(budget, law, 74.0, 22.0) == pytest.approx((74.0, 22.0))
 
 
-def test_a_slow_turn_that_its_heading_tells_of_leaves_a_creeping_drive_its_friction():
-    law, budget, angle = Climb().controller._law, ForceBudget(), 0.02  # [rad/s²]
-    climber = law.climber
+@pytest.mark.parametrize(("rate", "angle"), [(0.0, 0.02), (0.8, 0.0), (-0.8, 0.0)])
+def test_a_turn_that_its_heading_tells_of_leaves_a_creeping_drive_its_friction(rate, angle):
+    """It turns at a rate [rad/s], or ever faster by [rad/s²], and its torques carry its weight."""
+    law, budget = Climb().controller._law, ForceBudget()
+    climber, times = law.climber, PERIOD * np.arange(800)
     friction, moment = climber.seal_friction, climber.driven_inertia * angle
-    times = PERIOD * np.arange(300)
-    bend = [RESTS._replace(heading=angle * t**2 / 2, yaw_rate=angle * t, speed=1e-5) for t in times]
-    acted = [(climber.torques(friction, moment), PERIOD)]
+    begin = -math.copysign(math.pi / 2, rate)
+    bend = [
+        Motion(0.0, 0.0, at, math.cos(at), math.sin(at), 1e-5, rate + angle * time)
+        for time, at in zip(times, begin + rate * times + angle * times**2 / 2, strict=True)
+    ]
     for before, after in pairwise(bend):
+        weight = climber.weight_along_wall * math.sin((before.heading + after.heading) / 2)
+        acted = [(climber.torques(friction + weight, moment), PERIOD)]
         observed = Observed(before, after, PERIOD, acted, Wrench(0.0, 0.0), 0.01)
-        observed = observed._replace(pull=climber.weight_along_wall * after.sine)
         assert budget.see(climber, observed, 1e-5, 0.5) is None
         assert given(budget, law, friction, moment) == pytest.approx((friction, moment))

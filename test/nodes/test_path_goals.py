@@ -184,12 +184,9 @@ def test_a_goal_fails_whose_controller_is_lost_and_another_is_driven_by_the_next
     first = goals.send(*UP)
     first.drives(0.05)
     world.end(CONTROLLER, signal.SIGKILL)
-    status, code, said = first.end()
-    assert (status, code) == (ABORTED, codes.CONTROLLER_TIMED_OUT)
-    assert said == "the controller is not heard for 6 s"
-    status, code, said = goals.send(*UP).end()
-    assert (status, code) == (ABORTED, codes.FAILED_TO_MAKE_PROGRESS)
-    assert "it does not begin" in said
+    lost = ABORTED, codes.CONTROLLER_TIMED_OUT, "the controller is not heard for 6 s"
+    assert first.end() == lost
+    assert goals.send(*UP).end() == lost
     followed = world.hear(TimeReference, "reference_time")
     world.start_node(CONTROLLER, config="climber.yaml")
     world.wait(lambda: "following" in [message.source for message in followed], "the next one")
