@@ -19,6 +19,7 @@ LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
 LACKS_IN_A_ROW = 3  # odometry messages
 WENT, GOES, STANDS = 0.05, 0.01, 1e-3  # [m/s] of a rim: before, of the other one, of this one
 ASKED = 0.02  # [m/s] of a rim that is not to stand: of one that turns back all tell a little else
+ASKED_SHARE = 0.5  # of the speed at which the other one goes, which is enough where that is less
 # odometry messages for which a rim stands that went before; that is asked to go, and never did
 STANDS_AT_ONCE, STANDS_ON = 3, 10
 NEITHER = "neither"  # name of both wheels, where
@@ -106,7 +107,8 @@ class RimStop:
             if self._stands == 0:
                 self._at_once = max(map(abs, self._seen)) > WENT
             self._stands += 1
-            self._unheeded = self._unheeded + 1 if asked > ASKED else 0
+            is_asked = asked > min(ASKED, ASKED_SHARE * abs(other))
+            self._unheeded = self._unheeded + 1 if is_asked else 0
         self._seen = self._seen[1], rim
         long_since = self._unheeded >= STANDS_ON
         self.is_stuck = long_since or (self._at_once and self._stands >= STANDS_AT_ONCE)

@@ -23,6 +23,7 @@ from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import DisturbanceEstimate, Observer
 from climber_uk.control.observed import Observed
+from climber_uk.control.repeat_check import RepeatCheck
 from climber_uk.control.safe_output import SafeOutput
 from climber_uk.control.safety import Calm, Mode, Safety, Trouble
 from climber_uk.control.speed_command import STANDING, MotorBoard
@@ -107,7 +108,7 @@ class Controller:
         self._now = 0  # [ns] of the last look at the clock
         self._resumes = 0  # [ns] stamp from which on odometry that was silent is believed
         self._unsettled = 0  # odometry messages until a jump is forgiven
-        self._twist, self.encoders = TwistCheck(), EncoderCheck()
+        self._twist, self.encoders, self._repeats = TwistCheck(), EncoderCheck(), RepeatCheck()
         self._without_twist = ""  # field of the twist that is zero while the pose goes
         self._waiting_since: int | None = None  # [ns] stamp of the first one not answered
         self._calm, self._safe_output = Calm(), SafeOutput(self.safety)
@@ -181,15 +182,21 @@ class Controller:
             return self.on_bad_odometry(now, f"stamp is {off:.2f} s from the clock, too far")
         if 0 < self._stamp - stamp <= round(timeout * SECOND):
             return None
+        was_older = self._repeats.older
+        self._repeats.add(stamp, motion, self._law.climber.half_track)
+        if older := self._repeats.older:
+            return self.on_bad_odometry(now, f"it told the same {older:.2f} s ago")
         self._heard = stamp
         if now > 0:
             self.ages.add(now, off)
         if stamp != self._stamp:
             silent = abs(stamp - self._stamp)
-            if self._stamp and silent > round(timeout * SECOND):
+            if self._stamp and (was_older or silent > round(timeout * SECOND)):
                 self.estimator.reset()
                 self._watch_anew()
                 self._resumes = stamp + min(silent, LONGEST_SILENCE)
+                if was_older:  # and the rest of it comes as late
+                    self.estimator.acts_later(was_older)
             self._trouble = self._see(stamp, motion)
             self._stamp = stamp
         return self._answer(now)
@@ -224,6 +231,7 @@ class Controller:
             self._heard = min(self._heard, now)
         # stamps of before the step are no newer ones
         self._stamp, self._resumes, self._waiting_since = 0, 0, None
+        self._repeats.restart()
         self._forget_when()
         self.estimator.restart()
         if back > CLOCK_STEP:

@@ -23,6 +23,7 @@ BREAKS_AWAY = 0.08  # [m/s] of γ, from which on gravity is not told from what w
 MEMORY = 0.2  # and for as long [s] after that: the force goes through a low-pass
 LONGEST = 1.0  # [s] for which wheels may slip
 TURNING = 0.05  # [s] of the low-pass of a turn: of noise, its size would be a turn, too
+ENDS = 0.015  # [s] of the low-pass in which the sides stop to slip, as the turn ends
 DRAGGED = 0.1  # [m/s] about which it changes its sign what drags
 
 
@@ -59,6 +60,7 @@ class Scrubbing:
         self._by_slips = np.zeros(2)  # [m/s] of that, T and D by their time
         self._slipped = self._broken = 0.0  # [s]
         self._turning, self._sides, self._rolling = Mean(TURNING), Mean(TURNING), Mean(TURNING)
+        self._slips = Mean(ENDS)  # [m/s] the sides, against each other
 
     @property
     def breaks_away(self) -> bool:
@@ -73,7 +75,11 @@ class Scrubbing:
         self._rolling.add(rolled.speed, duration)
         sides, speed = self._sides.value, self._rolling.value
         slipping = sides - options.half_track * self._turning.value
-        slipped = math.copysign(slipping * duration, slipping * sides)
+        now = rolled.yaw_rate * options.turning_lever - options.half_track * yaw_rate
+        self._slips.add(now, duration)
+        # wheels that roll again tell the climber's speed at once
+        still = max(self._slips.value * math.copysign(1.0, slipping), 0.0)
+        slipped = math.copysign(min(abs(slipping), still) * duration, slipping * sides)
         dragged = slipped * speed / math.hypot(speed, DRAGGED)
         return Turned(abs(self._turning.value) * duration, slipped, dragged)
 

@@ -22,6 +22,14 @@ def test_a_rim_that_turns_back_is_not_stuck_and_one_that_does_not_heed_is():
     assert rim.is_stuck
 
 
+def test_a_rim_that_begins_as_slowly_as_the_other_one_is_stuck_if_it_does_not_heed():
+    for asked, is_stuck in ((0.009, True), (0.006, False)):
+        rim = RimStop()
+        for _ in range(STANDS_ON):
+            rim.add(0.0, 0.014, asked)
+        assert rim.is_stuck == is_stuck
+
+
 def test_a_rim_that_stops_at_once_is_stuck_whatever_is_asked():
     rim = RimStop()
     for speed in [0.1] * 5 + [0.0] * STANDS_AT_ONCE:

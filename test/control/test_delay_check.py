@@ -239,6 +239,21 @@ def test_odometry_in_bursts_drives_nothing_however_patient_its_timeout(gap, numb
     assert_never_runs_away(climb, 2.0)
 
 
+@pytest.mark.parametrize(("planner", "number"), WAYS)
+@pytest.mark.parametrize("span", [*(pytest.param(it, marks=soak) for it in (0.1, 0.3, 0.4)), 0.2])
+@pytest.mark.parametrize("goes_on_late", [True, pytest.param(False, marks=soak)])
+def test_odometry_that_repeats_itself_without_a_gap_drives_nothing(
+    goes_on_late, span, number, planner
+):
+    """As of a buffer that is sent once more, with new stamps; what follows is as late, or not."""
+    climb = deepcopy(healthy(planner, number))
+    late = Late(lambda time: span if goes_on_late or time < 4.0 + span - 1e-9 else 0.0, climb.state)
+    late.past += climb.states[-200:]
+    climb.run(2.5, odometry=every(number, late))
+    assert climb.faulty_after(4.0) < 0.1
+    assert_never_runs_away(climb, 4.0)
+
+
 def growing(rate):
     return lambda time: rate * (time - 4.0)
 

@@ -91,6 +91,22 @@ def test_a_dead_motor_is_noticed_and_the_climber_comes_to_rest(side, scrubs, sin
         assert climb.fastest_turn(climb.time - 0.5) < 0.01
 
 
+@soak
+@pytest.mark.parametrize("since", [1.0, 7.0, 13.0])
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+@pytest.mark.parametrize("side", [0, 1], ids=["right", "left"])
+@pytest.mark.parametrize("scrubs", [False, True], ids=["wheels", "tracks"])
+def test_a_motor_with_part_of_its_torque_lets_nothing_run_away(scrubs, side, share, since):
+    """It is a disturbance that is learnt, or a fault."""
+    climb, shares = deepcopy(healthy(scrubs, since)), np.ones(2)
+    shares[side] = share
+    climb.run(8.0, motors=lambda _, torques: torques * shares)
+    faults = dict.fromkeys(mode.name for mode in climb.since(since, climb.modes) if mode.is_fault)
+    print(f"{climb.fastest(since):.2f} m/s, {climb.off_the_path(since):.3f} m, {', '.join(faults)}")
+    assert climb.fastest(since) < 1.5 * climb.reference_speed + 0.1
+    assert climb.off_the_path(since) < 0.05
+
+
 def test_a_dead_wheel_is_named_and_waits_for_somebody():
     climb = deepcopy(healthy(False, 13.0))
     for _ in range(12):

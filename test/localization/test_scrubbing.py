@@ -10,7 +10,7 @@ from climber_uk.localization.gate import Fix
 from climber_uk.localization.localizer import Localizer
 from climber_uk.localization.models import DRAG_SLIP, PIVOT, SCRUB, WEIGHT_SLIP
 from climber_uk.localization.options import LocalizationOptions
-from climber_uk.localization.scrubbing import LONGEST, SOON, Push, Scrubbing, Turned
+from climber_uk.localization.scrubbing import LONGEST, SOON, TURNING, Push, Scrubbing, Turned
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import GRAVITY
 
@@ -128,6 +128,22 @@ def test_wheels_that_break_away_for_a_moment_are_not_believed_to_move_the_climbe
     assert circles.off < 0.02
     plain = Circles().go_on(2, 0.0).go_on(1, YAW_RATE, fixes=False, spin=0.3)
     assert plain.too_fast > 0.25
+
+
+def test_wheels_that_roll_again_as_a_turn_ends_slip_no_more_at_once_and_noise_is_no_slip():
+    options, scrubbing = LocalizationOptions(effective_half_track=0.5), Scrubbing()
+    random, (sides, noise) = np.random.default_rng(0), (0.3, 0.005)  # [m/s]
+
+    def slips(times, rolled_rate, rate):
+        """T by its time [m/s]."""
+        told = rolled_rate + noise / 0.5 * random.normal(size=times)
+        rows = [Rolled(PERIOD, SPEED * PERIOD, SPEED * PERIOD, it, False) for it in told]
+        return [scrubbing.turned(it, rate, options).slipped / PERIOD for it in rows]
+
+    begun = slips(500, sides / 0.5, 0.6)
+    assert np.mean(begun[50:]) == pytest.approx(sides - 0.3 * 0.6, rel=0.02)
+    late = math.exp(-4 * PERIOD / TURNING)  # by the turn's own low-pass
+    assert slips(4, 0.0, 0.0)[-1] < late / 2 * begun[-1]
 
 
 @pytest.mark.parametrize("wrong", [-0.5, -0.1, 0.05, 0.3])  # [m/s²]
