@@ -67,6 +67,15 @@ def test_ctrl_c_ends_a_tool_in_a_line_and_an_error_of_ours_in_a_traceback():
     assert "ZeroDivisionError" in spoken("1 / 0")[2]
 
 
+@pytest.mark.parametrize(("program", "is_ours"), [("bin/tool", True), ("mine.py", False)])
+def test_ctrl_c_while_an_executable_imports_is_a_line_and_in_a_script_a_traceback(program, is_ours):
+    code = f"import sys; sys.argv = ['{program}']; import climber_uk; raise KeyboardInterrupt"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert ran.returncode == -signal.SIGINT
+    assert (ran.stderr == "tool: interrupted\n") == is_ours
+    assert ("Traceback" in ran.stderr) != is_ours
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 def test_what_a_terminal_cannot_show_is_written_otherwise(encoding):
     status, out, _ = spoken("print('σ \\udcff')", PYTHONIOENCODING=encoding)

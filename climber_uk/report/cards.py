@@ -81,11 +81,11 @@ def verdict(column: Column) -> str:
     far = f"at most {shown(f'{of}max_distance')} off"
     stops = values["safety_stops"]
     if math.isnan(values["max_distance"]) and not stops > 0:
-        said = "There is no reference in it, so that nothing can be said of its path"
+        said = f"There is no reference in it, only that it drove {shown('travelled')}"
+    elif values["following"] == 0:
+        said = "It did not follow its reference at all"
     elif stops > 0:
         said = f"It stopped for safety ({STOPS.get(stops, f'{stops:.0f} stops')})"
-    elif values["following"] == 0:
-        said = "It did not follow its reference"
     elif math.isfinite(values["settling_time"]):
         said = f"It followed its path, {far}"
     else:

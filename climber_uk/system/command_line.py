@@ -7,10 +7,10 @@ import os
 import re
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NoReturn
+
+from climber_uk.system.signals import interrupted_in_a_line
 
 PACKAGE = "climber_uk"
 
@@ -44,7 +44,7 @@ class Parser(argparse.ArgumentParser):
         From now on a closed output (of `head`) is no error, nor are characters that it cannot show,
         and Ctrl-C ends the tool in a line.
         """
-        sys.excepthook = partial(_in_a_line_if_interrupted, self.prog)
+        interrupted_in_a_line(self.prog)
         out = sys.stdout
         if out is sys.__stdout__ and out is not None:
             binary = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
@@ -68,16 +68,6 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Exit with one line and status 2."""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
-
-
-def _in_a_line_if_interrupted(
-    tool: str, kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
-    """`sys.excepthook` of a tool; Python ends it by the signal then, as shells expect."""
-    if issubclass(kind, KeyboardInterrupt):
-        print(f"{tool}: interrupted", file=sys.stderr)
-    else:
-        sys.__excepthook__(kind, error, trace)
 
 
 def between(least: float, most: float) -> Callable[[str], float]:

@@ -146,3 +146,16 @@ def test_any_scalar_is_what_rcl_takes_it_for(tmp_path):
         draw.choice(first) + "".join(draw.choices(later, k=draw.randrange(7))) for _ in range(5000)
     }
     assert not wrong(sorted(texts), tmp_path)
+
+
+def test_a_list_has_an_end_and_so_has_what_is_said_of_it(tmp_path):
+    @parameters
+    class Load:
+        mass: float = parameter(1.0, "kg", "mass", above=0)
+
+    for count, said in ((10_001, "line 3: mass has more than 10000 values"), (999, "finite")):
+        file = tmp_path / "long.yaml"
+        file.write_text(f"x:\n  ros__parameters:\n    mass: [{', '.join(['5.0'] * count)}]\n")
+        with pytest.raises(ValueError, match=said) as refused:
+            Values(read_file(file, "/x")).read(Load)
+        assert len(str(refused.value)) < 300

@@ -129,6 +129,27 @@ def test_what_looks_like_a_mistake_is_said(monkeypatch, capsys):
     assert capsys.readouterr().err == "check_path: laps=3 has no effect: the path is open\n"
 
 
+@pytest.mark.parametrize(
+    ("height", "said"),
+    [
+        ("3.0", ""),
+        ("2.5", "0.50 m and 0.00 rad off where the path begins: "),
+        ("0.0", "3.00 m and 0.00 rad off where the path begins, beyond max_start_distance (2 m): "),
+    ],
+)
+def test_a_simulated_climber_that_starts_elsewhere_is_said(
+    monkeypatch, capsys, tmp_path, height, said
+):
+    text = (CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", f"initial_y: {height}")
+    (tmp_path / "mine.yaml").write_text(text)
+    monkeypatch.setattr("sys.argv", ["check_path", "--params", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit):
+        check_path.main()
+    there = "there its initial_x is 0.0, initial_y 3.0, initial_heading 0.7854\n"
+    line = f"check_path: {tmp_path / 'mine.yaml'}: plant_simulator starts {said}{there}"
+    assert capsys.readouterr().err == (line if said else "")
+
+
 def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatch, capsys):
     fast = "-p", "rest_to_rest.rate:=2.0", "-p", "rest_to_rest.ramp_time:=0.05"
     words = "--params", CONFIG / "climber.yaml", *fast

@@ -236,7 +236,7 @@ def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_pat
         ({}, "It followed its path, at most 4 mm off."),
         ({"truth_max_distance": 0.3}, "It followed its path, at most 300 mm off."),
         ({"settling_time": np.nan}, "It did not settle on its path, at most 4 mm off."),
-        ({"following": 0.0}, "It did not follow its reference."),
+        ({"following": 0.0}, "It did not follow its reference at all."),
         ({"max_distance": np.nan}, "There is no reference in it"),
         ({"safety_stops": 1.0}, "It stopped for safety (1 stop)."),
         ({"safety_stops": 2.0}, "It stopped for safety (2 stops)."),
@@ -260,7 +260,7 @@ def test_at_a_glance_each_side_and_what_nodes_warned_of_are_in_few_lines(bags, r
     titles = [line[2:19].strip() for line in out]
     assert {"Tracking", "Hold on the wall", "Safety", "Timing"} <= set(titles)
     assert len([line for line in out if "no odometry" in line]) == 2
-    assert out[-4] == "It stopped for safety (1 stop)."
+    assert out[-4] == "It did not follow its reference at all."
     assert out[-3] == str(tmp_path / "out" / "report.html")
 
 
