@@ -1,11 +1,13 @@
-"""Whether a simulated climber starts where its path begins."""
+"""Whether a simulated climber starts where its path begins, and is what its controller expects."""
 
+import dataclasses
 import math
 
 from climber_uk.control.approach import Approach
+from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.trajectory import Trajectory
-from climber_uk.messages.topics import PLANT
+from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.parameters.parameter_file import Values
 from climber_uk.simulation.options import SimulationOptions
 
@@ -27,3 +29,17 @@ def start_elsewhere(trajectory: Trajectory, controller: Values, plant: Values) -
         f"{PLANT} starts {distance:.2f} m and {turn:.2f} rad off where the path begins{most}: "
         f"there its initial_x is {x}, initial_y {y}, initial_heading {heading}"
     ), is_too_far
+
+
+def other_climber(controller: Values, plant: Values) -> str:
+    """Words on parameters of the climber that the two have otherwise; '' if there are none."""
+    expected, simulated = controller.read(Climber), plant.read(Climber)
+    names = [
+        field.name
+        for field in dataclasses.fields(Climber)
+        if getattr(expected, field.name) != getattr(simulated, field.name)
+    ]
+    said = ", ".join(
+        f"{name} {getattr(expected, name)} and {getattr(simulated, name)}" for name in names
+    )
+    return f"{CONTROLLER} and {PLANT} have {said}" if names else ""

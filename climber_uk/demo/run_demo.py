@@ -25,7 +25,7 @@ from std_srvs.srv import Trigger
 
 from climber_uk.closed_loop.node_parameters import PARAMETERS as NODE_PARAMETERS
 from climber_uk.closed_loop.node_parameters import doubts, read_planner
-from climber_uk.closed_loop.start import start_elsewhere
+from climber_uk.closed_loop.start import other_climber, start_elsewhere
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages import reading
@@ -276,20 +276,22 @@ def node_commands(
     return commands
 
 
-def start_of(config: Path, climber: str, is_refused: bool) -> list[str]:
-    """A line if a climber starts where its path does not begin; `ValueError` if it is refused.
+def misfits(config: Path, climber: str, is_refused: bool) -> list[str]:
+    """Lines on a climber that is not where its path begins, or other than its controller has it.
 
-    Where the parameters make no path or plant, the nodes say why.
+    Raises `ValueError` if the controller would refuse the path. Where the parameters make no path
+    or plant, the nodes say why.
     """
     controller, plant = (Values(read_file(config, f"{climber}/{n}")) for n in (CONTROLLER, PLANT))
     try:
         trajectory = build_trajectory(Values(read_planner(config, f"{climber}/{PLANNER}")).read)
-        said, is_too_far = start_elsewhere(trajectory, controller, plant)
+        elsewhere, is_too_far = start_elsewhere(trajectory, controller, plant)
+        said = other_climber(controller, plant), elsewhere
     except ValueError:
         return []
     if is_too_far and is_refused:
-        raise ValueError(f"{config}: {said}")
-    return [f"{config}: {said}"] if said else []
+        raise ValueError(f"{config}: {elsewhere}")
+    return [f"{config}: {line}" for line in said if line]
 
 
 def parse() -> argparse.Namespace:
@@ -345,7 +347,7 @@ def main() -> None:
                 values = read_file(options.config, f"{climber}/{node}")
                 said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
         for climber in climbers:
-            said += start_of(options.config, climber, not options.controller)
+            said += misfits(options.config, climber, not options.controller)
         for line in dict.fromkeys(said):
             print(f"run_demo: {line}", file=sys.stderr)
         options.output.mkdir(parents=True)
@@ -388,7 +390,7 @@ def record(
         said = "interrupted"
     except Ended as error:
         lines = log_of(error.name, options.output).read_text(errors="replace").splitlines()
-        said = f"{error}" + (f": {lines[-1]}" if lines else "")
+        said = f"{error}: {lines[-1] if lines else 'its log is empty: is the disk full?'}"
     except (RuntimeError, ValueError, OSError) as error:
         said = in_words(error)
     if not said:

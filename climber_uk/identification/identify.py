@@ -29,6 +29,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, given, read_sections
+from climber_uk.parameters.text_file import write_whole
 from climber_uk.report.outputs import check_writable, failing_in_a_line
 from climber_uk.system.command_line import Parser, between
 
@@ -63,7 +64,7 @@ def identify_bag(options: argparse.Namespace, doubtful: list[str]) -> list[str]:
         print(f"{unfit} unfit messages were left out")
     if options.json:
         text = json.dumps(list(rows(found, assumed)), indent=2)
-        options.json.write_text(text + "\n", encoding="utf-8")
+        write_whole(options.json, text + "\n")
     if options.figure:
         identification_figure.draw(motion, assumed, found, options.figure)
     if options.output:

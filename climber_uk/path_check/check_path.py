@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from climber_uk.closed_loop.node_parameters import PATHS, read_parameters, read_planner
-from climber_uk.closed_loop.start import start_elsewhere
+from climber_uk.closed_loop.start import other_climber, start_elsewhere
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics.adhesion import ADHESION, Grip
 from climber_uk.mechanics.climber import Climber
@@ -26,6 +26,7 @@ from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
 from climber_uk.mechanics.wall import WALLS, Wall
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
+from climber_uk.parameters.text_file import write_whole
 from climber_uk.path_check.demands import demands
 from climber_uk.path_check.fastest import fastest, write_fastest
 from climber_uk.path_check.findings import lines, told, told_of
@@ -59,8 +60,9 @@ def read(
     choice = values.read(ControllerChoice)
     name, wall = choice.adhesion, choice.wall
     plant = Values(read_parameters(file, f"/{PLANT}"))
-    said, _ = start_elsewhere(trajectory, values, plant)
-    remarks += [f"{file}: {said}"] if said and not changes else []
+    elsewhere, _ = start_elsewhere(trajectory, values, plant)
+    said = other_climber(values, plant), "" if changes else elsewhere
+    remarks += [f"{file}: {line}" for line in said if line]
     runs_on = plant.read(Physics).locomotion
     contact = Contact(
         adhesion=values.read(ADHESION[name], f"{name}."),
@@ -170,7 +172,7 @@ def main() -> None:
             from climber_uk.path_check.figure import draw  # matplotlib, which takes a second
 
             options.output.mkdir(parents=True, exist_ok=True)
-            (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
+            write_whole(options.output / "check_path.json", json.dumps(numbers, indent=1) + "\n")
             print(printable(str(draw(found, options.output / "check_path.png"))))
             if law:
                 planner = read_planner(options.params, f"/{PLANNER}", changes)

@@ -150,6 +150,18 @@ def test_a_simulated_climber_that_starts_elsewhere_is_said(
     assert capsys.readouterr().err == (line if said else "")
 
 
+def test_a_climber_of_which_a_number_was_changed_in_one_place_only_is_said(
+    monkeypatch, capsys, tmp_path
+):
+    text = (CONFIG / "climber.yaml").read_text().replace("mass: 5.0", "mass: 6.0", 1)
+    (tmp_path / "mine.yaml").write_text(text)
+    monkeypatch.setattr("sys.argv", ["check_path", "--params", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit):
+        check_path.main()
+    said = "uk_torque_controller and plant_simulator have mass 6.0 and 5.0"
+    assert capsys.readouterr().err == f"check_path: {tmp_path / 'mine.yaml'}: {said}\n"
+
+
 def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatch, capsys):
     fast = "-p", "rest_to_rest.rate:=2.0", "-p", "rest_to_rest.ramp_time:=0.05"
     words = "--params", CONFIG / "climber.yaml", *fast
