@@ -29,7 +29,7 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
         (
             "uk_torque_controller",
             ["settling_messages:=5.0"],
-            "settling_messages=5.0 must be of type int",
+            "settling_messages=5.0 must be an integer",
         ),
         (
             "uk_torque_controller",

@@ -270,7 +270,7 @@ def test_what_the_plant_runs_on_is_in_what_a_circle_asks_for(monkeypatch, capsys
         (None, ["-p", "shape:=nothing"], "shape='nothing' must be one of "),
         (None, ["-p", "shape"], "'shape' must be name:=value"),
         (None, ["-p", "shape:=[circle]"], "shape=['circle'] must be one of "),
-        ("shape: waypoints\n    waypoints: {file: [a]}", [], "waypoints.file=['a'] must be a str"),
+        ("shape: waypoints\n    waypoints: {file: [a]}", [], "waypoints.file=['a'] must be a text"),
         (None, ["-p", "rest_to_rest.ratee:=5.0"], "(did you mean rest_to_rest.rate?)"),
         (None, ["-p", "autostart:=false"], "autostart is no parameter of a path"),
         ("rest_to_rest.ramp_tim: 0.1", [], "(did you mean rest_to_rest.ramp_time?)"),
