@@ -135,7 +135,7 @@ $(SET_UP): requirements.txt setup.py
 
 $(TOOLS): requirements.txt setup.py
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --requirement requirements.txt
+	$(PIP) --no-compile --requirement requirements.txt
 	$(PIP) --no-deps --no-build-isolation \
 		evo==1.38.1 --editable . # evo without pandas and seaborn, 90 MB that the tests do not need
 	touch $(SET_UP) $@

@@ -87,7 +87,10 @@ class RecordedMotion:
         """The same, if torques act `delay` [s] later, and with a lag of first order [s]."""
         delayed = [np.interp(self.time - delay, self.time, wheel) for wheel in self.impulse.T]
         acting = np.stack([lagging(self.time, wheel, lag) for wheel in delayed], axis=1)
-        return replace(self, impulse=acting)
+        late = replace(self, impulse=acting)
+        of_poses = {name: getattr(self, name) for name in ("way", "smooth_rates", "side_slip")}
+        vars(late).update(of_poses)  # whatever drives it: a search asks for them a hundred times
+        return late
 
 
 def impulse(time: Array, begins: Array, torques: Array) -> Array:

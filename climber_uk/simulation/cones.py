@@ -3,8 +3,8 @@
     ν⁺ = ν + M⁻¹ Σ Hᵢᵀ λᵢ,   |λᵢ| <= Lᵢ,   λᵢ = -Lᵢ sᵢ/|sᵢ| where sᵢ = Hᵢ ν⁺ is not 0
 
 ν⁺ minimises ½ (ν⁺ - ν)ᵀ M (ν⁺ - ν) + Σ Lᵢ |sᵢ|: it is unique, and has no more energy than ν. It is
-found contact by contact until nothing changes (block Gauss-Seidel), each contact exactly. Many
-contacts on one body hinder each other there, so that these are left to Newton's method.
+found contact by contact until nothing changes (block Gauss-Seidel), each contact exactly. Contacts
+that hinder each other, as many on one body do, are left to Newton's method.
 """
 
 import math
@@ -14,7 +14,7 @@ import numpy as np
 
 from climber_uk.mechanics import Array
 
-MAX_SWEEPS = 5000  # a few suffice, unless contacts only just hold each other
+MAX_SWEEPS = 1000  # some ten suffice, unless contacts only just hold each other
 UNCHANGED = 1e-13  # of the speeds there are, and of 1 m/s
 FEW = 4  # contacts, for which sweeps alone are faster
 EPSILONS = 1e-3, 1e-6, 1e-9, 1e-12  # [m/s] of sliding, below which friction is taken for viscous
@@ -40,11 +40,12 @@ def solve_friction_impulses(
     And for each cone whether its contact sticks. `start` (n,) is a guess of ν⁺, as that of
     the step before; it decides how soon ν⁺ is found, not what it is.
     """
-    if len(cones) > FEW and lightness.all():
+    all_move = bool(lightness.all())
+    if len(cones) > FEW and all_move:
         found = _by_newton(velocity, 1 / lightness, cones, start)
         if found is not None:
             return found
-    velocity = velocity.copy()
+    before, velocity = velocity, velocity.copy()
     impulses: list[Array] = [np.zeros(len(cone.rows)) for cone in cones]
     per_impulse = [lightness[:, None] * cone.rows.T for cone in cones]  # M⁻¹ Hᵀ
     yielding = [(cone.rows**2) @ lightness for cone in cones]
@@ -61,6 +62,10 @@ def solve_friction_impulses(
             changed = max(changed, *map(abs, change.tolist()))
         if changed <= enough:
             break
+    else:
+        found = _by_newton(before, 1 / lightness, cones, velocity) if all_move else None
+        if found is not None:
+            return found
     sticks = [
         bool(impulse @ impulse < (1 - 1e-9) * cone.limit**2)
         for impulse, cone in zip(impulses, cones, strict=True)

@@ -166,7 +166,7 @@ def is_running(pid):
         return False
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_a_dask_cluster_that_loses_a_worker_loses_nothing(many, tmp_path):
     distributed = pytest.importorskip("distributed")

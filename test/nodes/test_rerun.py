@@ -13,7 +13,7 @@ from climber_uk.campaign.parts import computed
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 
-pytestmark = [pytest.mark.nodes, pytest.mark.slow]
+pytestmark = [pytest.mark.nodes, pytest.mark.soak]
 
 DURATION = 1.0  # [s]
 MARGINS = "/plant_simulator/margins"

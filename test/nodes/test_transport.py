@@ -83,8 +83,15 @@ def uses_shared_memory(process):
 
 
 @pytest.mark.nodes
-@pytest.mark.parametrize("heard_in", ["SUBNET", "LOCALHOST"])
-@pytest.mark.parametrize("published_in", ["SUBNET", "LOCALHOST"])
+@pytest.mark.parametrize(
+    ("published_in", "heard_in"),
+    [
+        ("SUBNET", "LOCALHOST"),
+        ("LOCALHOST", "SUBNET"),
+        pytest.param("SUBNET", "SUBNET", marks=pytest.mark.soak),
+        pytest.param("LOCALHOST", "LOCALHOST", marks=pytest.mark.soak),
+    ],
+)
 def test_those_who_have_shared_memory_hear_a_node_that_has_not(world, published_in, heard_in):
     chooses(world, **{RANGE: published_in})
     plant = world.start_node("plant_simulator")
