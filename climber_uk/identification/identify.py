@@ -65,10 +65,10 @@ def identify_bag(options: argparse.Namespace, doubtful: list[str]) -> list[str]:
     if options.json:
         text = json.dumps(list(rows(found, assumed)), indent=2)
         write_whole(options.json, text + "\n")
-    if options.figure:
-        identification_figure.draw(motion, assumed, found, options.figure)
     if options.output:
         write_changed(options.params, changes(found, assumed), options.output)
+    if options.figure:
+        identification_figure.draw(motion, assumed, found, options.figure)
     return list(missing(found))
 
 
@@ -144,6 +144,8 @@ def main() -> None:
         for file in written:
             if places[realpath(file)] > 1:
                 raise ValueError(f"{file} is given twice, and would be written over")
+            if file.is_dir():
+                raise ValueError(f"{file} is a directory, and would be a file")
             check_writable(file.parent)
         if options.plan:
             plan(options, doubtful)
