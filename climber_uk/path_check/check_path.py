@@ -15,6 +15,7 @@ from typing import Any
 
 from climber_uk.closed_loop.node_parameters import PATHS, read_parameters, read_planner
 from climber_uk.closed_loop.start import other_climber, start_elsewhere
+from climber_uk.control.build import KINDS as CONTROLLER_TYPES
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics.adhesion import ADHESION, Grip
 from climber_uk.mechanics.climber import Climber
@@ -57,6 +58,8 @@ def read(
     planner = read_planner(file, f"/{PLANNER}", changes, remarks)
     trajectory = build_trajectory(Values(planner).read)
     values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
+    for kind, prefix in CONTROLLER_TYPES:  # with a number that is refused no node would start
+        values.read(kind, prefix)
     choice = values.read(ControllerChoice)
     name, wall = choice.adhesion, choice.wall
     plant = Values(read_parameters(file, f"/{PLANT}"))

@@ -264,12 +264,16 @@ def test_what_the_plant_runs_on_is_in_what_a_circle_asks_for(monkeypatch, capsys
     assert status == (min(left.values()) < 1)
 
 
+UNSAFE = "/**/uk_torque_controller:\n  ros__parameters:\n    safe_output: x"
+
+
 @pytest.mark.parametrize(
     ("text", "words", "line"),
     [
         (None, ["-p", "shape:=nothing"], "shape='nothing' must be one of "),
         (None, ["-p", "shape"], "'shape' must be name:=value"),
         (None, ["-p", "shape:=[circle]"], "shape=['circle'] must be one of "),
+        (f"shape: circle\n{UNSAFE}", [], "safe_output='x' must be one of zero, hold"),
         ("shape: waypoints\n    waypoints: {file: [a]}", [], "waypoints.file=['a'] must be a text"),
         (None, ["-p", "rest_to_rest.ratee:=5.0"], "(did you mean rest_to_rest.rate?)"),
         (None, ["-p", "autostart:=false"], "autostart is no parameter of a path"),
