@@ -67,6 +67,27 @@ def test_ctrl_c_ends_a_tool_in_a_line_and_an_error_of_ours_in_a_traceback():
     assert "ZeroDivisionError" in spoken("1 / 0")[2]
 
 
+def test_a_stream_that_was_closed_does_not_lead_into_a_file_of_somebody(tmp_path):
+    file = tmp_path / "file"
+    code = f"""
+import os, subprocess, sys
+from climber_uk.system.command_line import Parser
+from climber_uk.system.exits import exit_after
+Parser("tool", None).arguments([])
+with open({str(file)!r}, "w") as file:
+    print("said")
+    print("said", file=sys.stderr)
+    os.write(1, b"said")
+    subprocess.run(["sh", "-c", "echo said; echo said >&2"], check=True)
+    file.write("kept")
+exit_after(60.0, 0)
+sys.exit(0 if sys.stdin.read() == "" else 1)
+"""
+    command = ["bash", "-c", 'exec "$0" -c "$1" <&- >&- 2>&-', sys.executable, code]
+    assert subprocess.run(command, timeout=60).returncode == 0
+    assert file.read_text() == "kept"
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 def test_what_a_terminal_cannot_show_is_written_otherwise(encoding):
     status, out, _ = spoken("print('σ \\udcff')", PYTHONIOENCODING=encoding)

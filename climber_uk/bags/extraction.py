@@ -27,7 +27,7 @@ FAULTS = (
     f"position not finite, or above {LARGEST:g} m",
     "orientation not finite",
     f"norm of the quaternion off 1 by more than {NORM_TOLERANCE:.0%}",
-    f"not a angle about z: tilted by more than {degrees(2 * asin(MOST_TILT)):.1f}°",
+    f"no turn about z: tilted by more than {degrees(2 * asin(MOST_TILT)):.1f}°",
     "stamp far off those around it",
 )
 STRAY = len(FAULTS) - 1

@@ -23,6 +23,9 @@ LEAST = 1e-3  # [m/s, rad/s] by poses, above which zeros in the twist are no mea
 # [s] between poses whose straight connections bound the distance travelled: noise makes the first
 # sum too long, bends make the other one too short
 OFTEN, SELDOM = 0.2, 1.0
+# correlation of twist and poses' rates, and metres or radians of way, from which on a ratio of them
+# counts, and the highest that is taken for noise or slip
+ALIKE, LEAST_WAY, MOST_RATIO = 0.9, 0.1, 1.4
 MISSING = 3.0  # typical times from one odometry to the next, above which the speed is unknown
 SLIP_REACH = 0.25  # [s] as `REACH`, for the speed to the side: slow, and hidden by noise of poses
 
@@ -88,6 +91,25 @@ class RecordedRun:
         if 0.7 * self._chords(SELDOM) - 0.1 <= distance <= 1.3 * by_poses + 0.05:
             return ""
         return f"its speeds make a way of {distance:.4g} m, its poses one of {by_poses:.4g} m"
+
+    @cached_property
+    def misfits(self) -> list[str]:
+        """What a twist has that is a multiple of its poses' rates, or not finite, in words."""
+        found, by_pose = [], body_rates(self.time, self.pose, REACH)
+        for name, column, turn in (("linear.x", 3, 0), ("angular.z", 5, 2)):
+            twist, rate = self.odometry.values[:, column], by_pose[:, turn]
+            is_known = np.isfinite(twist)
+            if 0 < (count := np.count_nonzero(~is_known)) < len(twist):
+                found.append(f"{name} is not finite in {count} of {len(twist)} messages")
+            twist, rate = twist[is_known], rate[is_known]
+            product, sizes = float(twist @ rate), float(np.sqrt(twist @ twist * (rate @ rate)))
+            if abs(product) <= ALIKE * sizes or abs(rate).mean() * self.time[-1] < LEAST_WAY:
+                continue  # noise, or too little to tell
+            ratio = product / float(rate @ rate)
+            is_said = name == "linear.x" and self.contradiction
+            if not (is_said or 1 / MOST_RATIO < ratio < MOST_RATIO):
+                found.append(f"{name} is {ratio:.3g} times the rate of its poses")
+        return found
 
     def _integral(self, speed: Array) -> float:
         """∫ |v| dt [m] of speeds (n,); straight on where odometry is missing."""

@@ -168,8 +168,8 @@ class RunReader:
             parameters=parameters,
             part=part,
         )
-        if run.contradiction:
-            self.bag.lose(f"{self.topic(topics.ODOMETRY)}: {run.contradiction}")
+        for said in filter(None, (run.contradiction, *run.misfits)):
+            self.bag.lose(f"{self.topic(topics.ODOMETRY)}: {said}")
         return run
 
     def reference(self, collected: Collected, stamps: Stamps) -> Array:

@@ -8,5 +8,7 @@ Many: arrays (N,) in the place of numbers -> `batch.Loops` (the nodes' `Estimato
 steps of the plants (`unicycle`, or `compiled`, which is the same by numba) -> `outcome.Tally` ->
 `outcome.Outcome`. By JAX (`traced`) all of it but the first periods.
 
-`node_parameters` has the parameters of controller, plant and planner, and reads files of them.
+`node_parameters` has the parameters of controller, plant and planner, and reads files of them;
+`start` tells of a simulated climber that does not start where its path begins, or is other than
+its controller has it.
 """

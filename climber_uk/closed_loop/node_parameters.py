@@ -15,6 +15,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.trajectory_parameters import TYPES as TRAJECTORY_TYPES
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.parameters.parameter_file import read_file
+from climber_uk.parameters.parameter_paths import located
 from climber_uk.parameters.plausibility import doubt
 from climber_uk.simulation.field_sensors import FIELD_SENSORS
 from climber_uk.simulation.motors import Motors
@@ -42,6 +43,12 @@ PARAMETERS = {
     **fields_of(PLANT, ((k, f"{n}.") for group in VARIANTS.values() for n, k in group.items())),
     **fields_of(PLANT, ON_WALL),
 }
+PATHS = {  # parameters of a path that are files
+    prefix + field.name
+    for kind, prefix in TRAJECTORY_TYPES
+    for field in dataclasses.fields(kind)  # type: ignore[arg-type]
+    if field.metadata.get("is_path")
+}
 # Those that have no effect in lock-step, of any node: names, topics, rates of publishing, and
 # sensors that no odometry comes from
 NODES_ONLY = {
@@ -65,6 +72,25 @@ def read_parameters(path: Path, node: str, remarks: list[str] | None = None) -> 
     if remarks is not None:
         remarks += doubts(path, values, PARAMETERS, f"{own}.")
     return values
+
+
+def read_planner(
+    path: Path,
+    node: str,
+    changes: Mapping[str, Any] | None = None,
+    remarks: list[str] | None = None,
+) -> dict[str, Any]:
+    """The same for a trajectory_publisher, but for `changes`, which are by name.
+
+    Names of files are relative to the working directory then.
+    """
+    changes = changes or {}
+    planner = {**read_parameters(path, node, remarks), **changes}
+    words = ["--ros-args", "--params-file", str(path)]
+    for name in PATHS & planner.keys() - changes.keys():
+        if isinstance(planner[name], str):  # else what reads it says so
+            planner[name] = located(planner[name], name, node, words)
+    return planner
 
 
 def doubts(

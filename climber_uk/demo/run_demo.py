@@ -24,8 +24,10 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
 from climber_uk.closed_loop.node_parameters import PARAMETERS as NODE_PARAMETERS
-from climber_uk.closed_loop.node_parameters import doubts
+from climber_uk.closed_loop.node_parameters import doubts, read_planner
+from climber_uk.closed_loop.start import other_climber, start_elsewhere
 from climber_uk.mechanics import SECOND
+from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages import reading
 from climber_uk.messages.topics import (
     CONTROLLER,
@@ -40,7 +42,7 @@ from climber_uk.messages.topics import (
     REFERENCE_PATH,
 )
 from climber_uk.parameters.declaration import parameter, parameters
-from climber_uk.parameters.parameter_file import given, read_file, read_sections
+from climber_uk.parameters.parameter_file import Values, given, read_file, read_sections
 from climber_uk.ros.leaving import leave
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import free_domain, use_udp
@@ -274,6 +276,24 @@ def node_commands(
     return commands
 
 
+def misfits(config: Path, climber: str, is_refused: bool) -> list[str]:
+    """Lines on a climber that is not where its path begins, or other than its controller has it.
+
+    Raises `ValueError` if the controller would refuse the path. Where the parameters make no path
+    or plant, the nodes say why.
+    """
+    controller, plant = (Values(read_file(config, f"{climber}/{n}")) for n in (CONTROLLER, PLANT))
+    try:
+        trajectory = build_trajectory(Values(read_planner(config, f"{climber}/{PLANNER}")).read)
+        elsewhere, is_too_far = start_elsewhere(trajectory, controller, plant)
+        said = other_climber(controller, plant), elsewhere
+    except ValueError:
+        return []
+    if is_too_far and is_refused:
+        raise ValueError(f"{config}: {elsewhere}")
+    return [f"{config}: {line}" for line in said if line]
+
+
 def parse() -> argparse.Namespace:
     """Options of the command line."""
     parser = Parser("run_demo", __doc__)
@@ -326,6 +346,8 @@ def main() -> None:
             for climber in climbers:
                 values = read_file(options.config, f"{climber}/{node}")
                 said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
+        for climber in climbers:
+            said += misfits(options.config, climber, not options.controller)
         for line in dict.fromkeys(said):
             print(f"run_demo: {line}", file=sys.stderr)
         options.output.mkdir(parents=True)
@@ -368,7 +390,7 @@ def record(
         said = "interrupted"
     except Ended as error:
         lines = log_of(error.name, options.output).read_text(errors="replace").splitlines()
-        said = f"{error}" + (f": {lines[-1]}" if lines else "")
+        said = f"{error}: {lines[-1] if lines else 'its log is empty: is the disk full?'}"
     except (RuntimeError, ValueError, OSError) as error:
         said = in_words(error)
     if not said:

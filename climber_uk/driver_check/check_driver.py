@@ -31,7 +31,7 @@ from climber_uk.messages.names import Names
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY
 from climber_uk.parameters.changed_parameters import write_sections
 from climber_uk.parameters.parameter_file import Section, nothing_for, read_sections, refuse_unknown
-from climber_uk.parameters.parameter_files import paths
+from climber_uk.parameters.parameter_files import ParameterFiles, paths
 from climber_uk.ros.leaving import leave
 from climber_uk.ros.running import in_a_line
 from climber_uk.ros.transport import use_udp
@@ -188,6 +188,7 @@ def main() -> None:
     node, status = None, 2
     try:
         use_udp()
+        ParameterFiles(sys.argv, "")  # raises with the line that is wrong, unlike rcl
         options = parse(remove_ros_args(sys.argv)[1:])
         with as_the_controller(sys.argv) as arguments:
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

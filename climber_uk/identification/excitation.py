@@ -5,6 +5,7 @@ the intervals that odometry with 1 mm, 1 mrad and 10 mm/s of noise would leave; 
 whose worst interval is narrowest.
 """
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -87,7 +88,9 @@ def plan(
     """The best of the candidates within the limits; `ValueError` if there is none."""
     found = list(_plans(climber, limits, origin, site))
     if not found:
-        raise ValueError(f"no trajectory keeps within {limits}")
+        rules = dataclasses.fields(limits)
+        said = [f"{of.name} {getattr(limits, of.name):g} {of.metadata['unit']}" for of in rules]
+        raise ValueError(f"no trajectory keeps within {', '.join(said)}")
     return min(found, key=lambda one: (one.is_short, one.worst))
 
 

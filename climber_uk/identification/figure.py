@@ -33,6 +33,9 @@ def draw(motion: RecordedMotion, assumed: Climber, found: Identified, path: Path
             last = len(fit.noise) - 1  # of way and heading; speeds are before them
             left = 1e3 * fit.noise[last] * fit.residuals[fit.quantity == last]
             below.plot(time[np.concatenate(windows)], left, ",", color="tab:blue")
+        else:
+            middle = {"x": 0.5, "y": 0.5, "ha": "center", "transform": below.transAxes}
+            below.text(s="not fitted: it moved so in too few windows", **middle)
         below.set(xlabel="time [s]", ylabel=f"left of {measured}")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)

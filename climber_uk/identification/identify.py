@@ -29,6 +29,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import CONTROLLER, ODOMETRY, PLANNER, PLANT
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, given, read_sections
+from climber_uk.parameters.text_file import write_whole
 from climber_uk.report.outputs import check_writable, failing_in_a_line
 from climber_uk.system.command_line import Parser, between
 
@@ -63,11 +64,11 @@ def identify_bag(options: argparse.Namespace, doubtful: list[str]) -> list[str]:
         print(f"{unfit} unfit messages were left out")
     if options.json:
         text = json.dumps(list(rows(found, assumed)), indent=2)
-        options.json.write_text(text + "\n", encoding="utf-8")
-    if options.figure:
-        identification_figure.draw(motion, assumed, found, options.figure)
+        write_whole(options.json, text + "\n")
     if options.output:
         write_changed(options.params, changes(found, assumed), options.output)
+    if options.figure:
+        identification_figure.draw(motion, assumed, found, options.figure)
     return list(missing(found))
 
 
@@ -143,6 +144,8 @@ def main() -> None:
         for file in written:
             if places[realpath(file)] > 1:
                 raise ValueError(f"{file} is given twice, and would be written over")
+            if file.is_dir():
+                raise ValueError(f"{file} is a directory, and would be a file")
             check_writable(file.parent)
         if options.plan:
             plan(options, doubtful)

@@ -49,6 +49,7 @@ class OdometryFields(NamedTuple):
     nanosec: int
     x: float  # [m]
     y: float
+    z: float  # off the wall: no part of a motion
     q_x: float  # orientation, a quaternion
     q_y: float
     q_z: float
@@ -93,7 +94,7 @@ class JointFields(NamedTuple):
 ODOMETRY = (
     (
         *STAMP,
-        *(f"pose.pose.position.{axis}" for axis in "xy"),
+        *(f"pose.pose.position.{axis}" for axis in "xyz"),
         *(f"pose.pose.orientation.{axis}" for axis in "xyzw"),
         *("twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z"),
     ),
@@ -125,7 +126,7 @@ def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motio
     ):
         if frame != wanted:
             raise ValueError(f"{name}={frame!r} must be {wanted!r}")
-    _, _, x, y, q_x, q_y, q_z, q_w, v_x, v_y, yaw_rate, _, _ = fields
+    _, _, x, y, _, q_x, q_y, q_z, q_w, v_x, v_y, yaw_rate, _, _ = fields
     check_stamp(fields.stamp)
     heading = heading_of(q_x, q_y, q_z, q_w)
     if not all(abs(number) <= LARGEST for number in (x, y, v_x, v_y, yaw_rate)):

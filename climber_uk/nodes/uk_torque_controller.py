@@ -56,6 +56,7 @@ from climber_uk.ros.running import (
 from climber_uk.ros.suction_setpoint import SuctionSetpoint
 
 SHORTEST = 0.002  # [s] of a timeout that is looked for: a timer of no time leaves no time
+OFF_WALL = 0.1  # [m] by which odometry may leave its plane, before it is said
 LARGEST_REFERENCE = 2**18  # [bytes], of some 1500 points, which take a quarter of a second to read
 
 
@@ -95,6 +96,7 @@ class UkTorqueController(ManagedNode):
         self.is_due = Throttle(PUBLISH_PERIOD)  # of the disturbance
         self.is_position_due = Throttle(PUBLISH_PERIOD)
         self.last_mode = Mode.WAITING
+        self.first_z: float | None = None  # [m] of odometry, off the wall
 
         self.read_odometry = NumberReader(Odometry, *reading.ODOMETRY)
         self.read_reference = PreviewReader()
@@ -207,6 +209,11 @@ class UkTorqueController(ManagedNode):
         except ValueError as error:
             self.publish(self.controller.on_bad_odometry(self.now(), str(error)))
             return
+        if self.first_z is None:
+            self.first_z = fields.z
+        elif abs(fields.z - self.first_z) > OFF_WALL:
+            detail = f"{self.first_z:.3g} to {fields.z:.3g} m; x and y are to be along the wall"
+            self.report(ODOMETRY, "position.z changes", detail, is_fault=False)
         self.publish(self.controller.on_odometry(self.now(), fields.stamp, motion))
 
     def on_reference(self, serialized: bytes) -> None:

@@ -180,7 +180,7 @@ def main() -> None:
     node = Node("climber", namespace=options.namespace)
     try:
         is_done, said = DO[options.verb](Operator(node, options.timeout), options.values)
-        print(printable(said))
+        print(printable(said), file=sys.stdout if is_done else sys.stderr)
         status = 0 if is_done else REFUSED
     except NoAnswerError as error:
         print(f"climber: {error}", file=sys.stderr)

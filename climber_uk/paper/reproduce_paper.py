@@ -22,7 +22,7 @@ from climber_uk.paper.study import (
     compute,
     jobs,
 )
-from climber_uk.report.outputs import check_writable
+from climber_uk.report.outputs import check_writable, failing_in_a_line
 from climber_uk.report.tables import markdown
 from climber_uk.system.command_line import Parser
 from climber_uk.system.workers import workers
@@ -119,16 +119,14 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="coarser, shorter, in part")
     options = parser.arguments()
     extent = QUICK if options.quick else FULL
-    try:
-        check_writable(options.output)
-    except OSError as error:
-        sys.exit(f"reproduce_paper: {error}")
     # matrices of 3 by 3 gain nothing from threads
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        with workers(os.cpu_count()) as pool:
-            results = compute(pool, jobs(extent))
-            paths = write(pool, results, extent, options.output)
+        with failing_in_a_line("reproduce_paper"):
+            check_writable(options.output)
+            with workers(os.cpu_count()) as pool:
+                results = compute(pool, jobs(extent))
+                paths = write(pool, results, extent, options.output)
     except KeyboardInterrupt:
         sys.exit("reproduce_paper: interrupted")
     print(f"{len(paths)} files in {options.output}")

@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 
 from climber_uk.parameters.parameter_file import PARAMETERS, TEXT, Section, read_sections, scalar
+from climber_uk.parameters.text_file import write_whole
 
 
 def write_changed(
@@ -41,7 +42,7 @@ def _tree(sections: Iterable[Section]) -> dict[str, Any]:
 
 
 def _write(tree: dict[str, Any], path: Path) -> None:
-    path.write_text(yaml.dump(tree, Dumper=_Dumper, sort_keys=False), encoding="utf-8")
+    write_whole(path, yaml.dump(tree, Dumper=_Dumper, sort_keys=False))
 
 
 class _Dumper(yaml.SafeDumper):

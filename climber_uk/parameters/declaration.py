@@ -10,6 +10,8 @@ from typing import Any, dataclass_transform
 import numpy as np
 
 SMALLEST, LARGEST = 1e-12, 1e12  # of any number that is divided by, or multiplied: see `check`
+KINDS = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}
+LONGEST_VALUE = 200  # [characters] of a value in a message
 QOS = "qos_overrides."  # with which rclpy's own parameters begin
 
 
@@ -83,21 +85,27 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
     An array (N,) holds a value for each of many climbers; all must be allowed.
     """
     rule = field.metadata
-    said = f"{field.name}={value!r} must be"
+    said = f"{field.name}={_shown(value)} must be"
     unit = f" [{rule['unit']}]" if rule["unit"] else ""
     if rule["choices"] is not None and not (isinstance(value, str) and value in rule["choices"]):
         raise ValueError(f"{said} one of {', '.join(rule['choices'])}")
     if isinstance(field.default, bool | str):
         if type(value) is not type(field.default):
-            raise ValueError(f"{said} a {type(field.default).__name__}")
+            raise ValueError(f"{said} {KINDS[type(field.default)]}")
         return
     # bounds are intervals: all are within if the extremes are, and these are nan if any is
     is_many = isinstance(value, np.ndarray)
     for number in (value.min().item(), value.max().item()) if is_many else (value,):
-        said = f"{field.name}={number!r} must be"
+        said = f"{field.name}={_shown(number)} must be"
         _check_number(rule, said, number, unit)
         if isinstance(field.default, float):
             _check_size(rule, said, abs(float(number)), unit)
+
+
+def _shown(value: Any) -> str:
+    """A value, with an end: what is behind it says what is wrong."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}…"
 
 
 def bounds(rule: Mapping[str, Any]) -> list[str]:

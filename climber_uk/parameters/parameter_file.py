@@ -311,6 +311,8 @@ class _Tables:
             yield value
         else:
             self.sequence.append(value)
+            if len(self.sequence) > MOST:
+                raise ValueError(f"{self.keys[-1]} has more than {MOST} values")
 
     def _expect_value(self) -> None:
         if self.sequence is not None or (self.keys and not self.keys[-1]):

@@ -51,9 +51,14 @@ class ParameterFiles:
 
 
 def paths(arguments: Sequence[str]) -> Iterator[Path]:
-    """Parameter files among arguments: each after --params-file, from `--ros-args` to `--`."""
+    """Parameter files among arguments: each after --params-file, from `--ros-args` to `--`.
+
+    Raises `ValueError` if there is none after it.
+    """
     is_for_ros = False
     for word, after in pairwise([*arguments, ""]):
         is_for_ros = (is_for_ros or word == "--ros-args") and word != "--"
         if is_for_ros and word == "--params-file":
+            if not after:
+                raise ValueError(f"{word} wants a file")
             yield Path(after)

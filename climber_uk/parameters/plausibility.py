@@ -40,7 +40,8 @@ def doubt(field: "dataclasses.Field[Any]", value: Any) -> str:
     """
     unit = field.metadata["unit"]
     low, high = field.metadata["plausible"] or USUAL.get(unit, (0.0, math.inf))
-    if isinstance(value, bool | str) or value == 0 or low <= abs(value) <= high:
+    is_number = not isinstance(value, bool | str) and math.isfinite(value)
+    if not is_number or value == 0 or low <= abs(value) <= high:
         return ""
     others = {
         other: value * factor

@@ -1,4 +1,4 @@
-"""Texts that users give, within bounds: what is given may be no text, or have no end."""
+"""Texts that users give, within bounds, and are given: wholly, or not at all."""
 
 import os
 from pathlib import Path
@@ -40,3 +40,21 @@ def text_of(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise ValueError(f"line {line}: not a text in UTF-8") from None
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text into a file, in UTF-8; if the disk is full, what was there before is kept.
+
+    Raises `OSError` naming the file.
+    """
+    if path.exists() and not path.is_file():  # as a pipe
+        path.write_text(text, encoding="utf-8")
+        return
+    target = Path(os.path.realpath(path))  # not a link to it
+    part = target.with_name(f".{target.name}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(target)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise OSError(f"cannot write {path} ({error.strerror})") from None

@@ -13,7 +13,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from climber_uk.closed_loop.node_parameters import read_parameters
+from climber_uk.closed_loop.node_parameters import PATHS, read_parameters, read_planner
+from climber_uk.closed_loop.start import other_climber, start_elsewhere
+from climber_uk.control.build import KINDS as CONTROLLER_TYPES
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics.adhesion import ADHESION, Grip
 from climber_uk.mechanics.climber import Climber
@@ -25,7 +27,7 @@ from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
 from climber_uk.mechanics.wall import WALLS, Wall
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
 from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
-from climber_uk.parameters.parameter_paths import located
+from climber_uk.parameters.text_file import write_whole
 from climber_uk.path_check.demands import demands
 from climber_uk.path_check.fastest import fastest, write_fastest
 from climber_uk.path_check.findings import lines, told, told_of
@@ -41,13 +43,6 @@ NAMES = {
     for kind, prefix in TYPES
     for field in fields(kind)  # type: ignore[arg-type]
 }
-PATHS = {  # parameters that are files
-    prefix + field.name
-    for kind, prefix in TYPES
-    for field in fields(kind)  # type: ignore[arg-type]
-    if field.metadata.get("is_path")
-}
-
 MOST_CLIMBERS = 1_000_000
 
 
@@ -59,11 +54,18 @@ def read(
     What resists a turn is that of plant_simulator's `locomotion`. Raises `ValueError`, also for a
     name that no part of the path has. `remarks` gets a line on each value that can hardly be meant.
     """
-    trajectory = build_trajectory(Values(_planner(file, changes, remarks)).read)
+    refuse_unknown(changes, NAMES, "a path")
+    planner = read_planner(file, f"/{PLANNER}", changes, remarks)
+    trajectory = build_trajectory(Values(planner).read)
     values = Values(read_parameters(file, f"/{CONTROLLER}", remarks))
+    for kind, prefix in CONTROLLER_TYPES:  # with a number that is refused no node would start
+        values.read(kind, prefix)
     choice = values.read(ControllerChoice)
     name, wall = choice.adhesion, choice.wall
     plant = Values(read_parameters(file, f"/{PLANT}"))
+    elsewhere, _ = start_elsewhere(trajectory, values, plant)
+    said = other_climber(values, plant), "" if changes else elsewhere
+    remarks += [f"{file}: {line}" for line in said if line]
     runs_on = plant.read(Physics).locomotion
     contact = Contact(
         adhesion=values.read(ADHESION[name], f"{name}."),
@@ -71,17 +73,6 @@ def read(
         locomotion=plant.read(LOCOMOTION[runs_on], f"{runs_on}."),
     )
     return trajectory, values.read(Climber), contact, values.read(WALLS[wall], f"{wall}.")
-
-
-def _planner(file: Path, changes: dict[str, Any], remarks: list[str]) -> dict[str, Any]:
-    """Parameters of the path by name, its files relative to the working directory."""
-    planner = {**read_parameters(file, f"/{PLANNER}", remarks), **changes}
-    refuse_unknown(changes, NAMES, "a path")
-    words = ["--ros-args", "--params-file", str(file)]
-    for name in PATHS & planner.keys() - changes.keys():
-        if isinstance(planner[name], str):  # else what reads it says so
-            planner[name] = located(planner[name], name, f"/{PLANNER}", words)
-    return planner
 
 
 def _fastest_law(
@@ -184,10 +175,10 @@ def main() -> None:
             from climber_uk.path_check.figure import draw  # matplotlib, which takes a second
 
             options.output.mkdir(parents=True, exist_ok=True)
-            (options.output / "check_path.json").write_text(json.dumps(numbers, indent=1) + "\n")
+            write_whole(options.output / "check_path.json", json.dumps(numbers, indent=1) + "\n")
             print(printable(str(draw(found, options.output / "check_path.png"))))
             if law:
-                planner = _planner(options.params, changes, remarks)
+                planner = read_planner(options.params, f"/{PLANNER}", changes)
                 files = {name: str(Path(planner[name]).absolute()) for name in PATHS & {*planner}}
                 changes |= files
                 print(printable(str(write_fastest(law, options.params, changes, options.output))))

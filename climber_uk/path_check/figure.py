@@ -23,8 +23,10 @@ def draw(found: Demands, path: Path) -> Path:
     for at in found.least():
         near = next((place for place in named if dist(place, at.place) < apart), at.place)
         named.setdefault(near, []).append(at.name)
+    middle = np.mean([found.pose[:, 0].min(), found.pose[:, 0].max()])
     for place, names in named.items():
-        above.annotate("; ".join(names), place, fontsize=8)
+        side = "left" if place[0] < middle else "right"
+        above.annotate("; ".join(names), place, fontsize=8, ha=side)
     above.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     for name, reserve in found.reserves.items():
         below.plot(found.distance, reserve.clip(0.0, ENOUGH), label=name)

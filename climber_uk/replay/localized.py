@@ -117,9 +117,14 @@ def localized(sensors: RecordedSensors, options: LocalizationOptions) -> Localiz
         missing = [] if localizer.knows_heading else ["heading"]
         missing += [] if localizer.knows_position else ["position"]
         untold = " and ".join(missing) or "place"
-        raise ValueError(
-            f"{untold} never known: no fix tells it, and no initial_* parameter (-p NAME:=VALUE)"
-        )
+        loose = [
+            f"initial_{name}_deviation {deviation:.3g} is above initial_{name}_limit {limit:.3g}"
+            for name in ("position", "heading")
+            if (deviation := getattr(options, f"initial_{name}_deviation"))
+            > (limit := getattr(options, f"initial_{name}_limit"))
+        ]
+        why = ", and ".join(["no fix tells it", *loose])
+        raise ValueError(f"{untold} never known: {why} (-p NAME:=VALUE changes them)")
     entries = entries[known.index(True) :]
     stamps = np.array([entry.stamp for entry in entries], dtype=np.int64)
     return Localized(

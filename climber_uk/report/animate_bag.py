@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Polygon
 from PIL import Image
+from tqdm import tqdm
 
+from climber_uk.bags.collecting import PROGRESS_DELAY
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.topics import Topics
@@ -88,19 +90,28 @@ class Film:
         return Image.fromarray(np.asarray(self.figure.canvas.buffer_rgba())[:, :, :3].copy())
 
 
-def pictures(run: RecordedRun, seconds: float, rate: float) -> Iterator[Image.Image]:
-    """Pictures of a whole run, for a film of `seconds` [s] with `rate` of them a second."""
+def pictures(run: RecordedRun, number: int) -> Iterator[Image.Image]:
+    """So many pictures of a whole run, evenly in its time."""
     with plt.rc_context(STYLE):
         film = Film(run)
-        for time in np.linspace(0.0, run.time[-1], max(2, round(seconds * rate))):
+        for time in np.linspace(0.0, run.time[-1], number):
             yield film.at(float(time))
         plt.close(film.figure)
 
 
 def write(run: RecordedRun, path: Path, seconds: float, rate: float) -> int:
     """Write a film of a run; return how many pictures it has."""
-    first, *others = pictures(run, seconds, rate)
-    duration = round(1000 / rate)  # [ms]
+    number, duration = max(2, round(seconds * rate)), round(1000 / rate)  # [ms]
+    drawn = tqdm(
+        pictures(run, number),
+        desc=path.name,
+        total=number,
+        unit=" pictures",
+        delay=PROGRESS_DELAY,
+        leave=False,
+        disable=None,
+    )
+    first, *others = drawn
     first.save(
         path, save_all=True, append_images=others, duration=duration, loop=0, quality=QUALITY
     )

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from climber_uk.bags.events import ERROR, OK, WARNING, Event
 from climber_uk.mechanics.adhesion import Alarm
+from climber_uk.report.metrics.safety import is_start_of
 from climber_uk.report.tables import Column
 
 WIDTH = 98  # of lines in a terminal
@@ -81,11 +82,11 @@ def verdict(column: Column) -> str:
     far = f"at most {shown(f'{of}max_distance')} off"
     stops = values["safety_stops"]
     if math.isnan(values["max_distance"]) and not stops > 0:
-        said = "There is no reference in it, so that nothing can be said of its path"
+        said = f"There is no reference in it, only that it drove {shown('travelled')}"
+    elif values["following"] == 0:
+        said = "It did not follow its reference at all"
     elif stops > 0:
         said = f"It stopped for safety ({STOPS.get(stops, f'{stops:.0f} stops')})"
-    elif values["following"] == 0:
-        said = "It did not follow its reference"
     elif math.isfinite(values["settling_time"]):
         said = f"It followed its path, {far}"
     else:
@@ -133,8 +134,9 @@ def _lines(column: Column) -> Iterator[str]:
 def _reported(column: Column, few: int) -> Iterator[str]:
     """So many of the things that nodes reported, each once."""
     reported: dict[tuple[str, str], list[tuple[float, Event]]] = {}
+    is_start, has_followed = is_start_of(column.case), column.values["following"] > 0
     for time, event in column.case.run.events:
-        if event.level > OK:
+        if event.level > OK and not (has_followed and is_start(time, event)):
             what = event.text if event.kind == "log" else event.kind
             reported.setdefault((event.node, what), []).append((time, event))
     for events in list(reported.values())[:few]:

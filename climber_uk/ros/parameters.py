@@ -15,7 +15,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from climber_uk.parameters.declaration import QOS, bounds, check_value
+from climber_uk.parameters.declaration import KINDS, QOS, bounds, check_value
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.parameters.plausibility import doubt
@@ -76,8 +76,8 @@ class NodeParameters:
             except ValueError as error:
                 raise ValueError(f"{prefix}{error}") from None
             except ParameterException:
-                wanted = type(field.default).__name__
-                raise ValueError(f"{name}={given!r} must be of type {wanted}") from None
+                wanted = KINDS[type(field.default)]
+                raise ValueError(f"{name}={given!r} must be {wanted}") from None
             self._fields[name] = (prefix, kind, field)
 
     def _given(self, name: str, prefix: str, field: Field) -> Any:

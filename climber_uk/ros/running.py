@@ -201,6 +201,9 @@ class ClimberNode(Node):
 
     def _overridden(self, create: partial[Any]) -> Any:
         """What `create` makes; `ValueError` if parameters have its QoS wrong."""
+        for name, given in self._parameter_overrides.items():
+            if name.startswith(QOS) and isinstance(given.value, int) and given.value < 0:
+                raise ValueError(f"{name}={given.value} must be >= 0")  # of which rcl says 25 lines
         try:
             return create(qos_overriding_options=QoSOverridingOptions.with_default_policies())
         except (ParameterException, RuntimeError) as error:

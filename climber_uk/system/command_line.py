@@ -12,6 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NoReturn
 
+from climber_uk.system.streams import open_closed_streams
+
 PACKAGE = "climber_uk"
 
 
@@ -42,8 +44,9 @@ class Parser(argparse.ArgumentParser):
         """Parsed options, with `~` in paths expanded.
 
         From now on a closed output (of `head`) is no error, nor are characters that it cannot show,
-        and Ctrl-C ends the tool in a line.
+        and Ctrl-C ends the tool in a line. Streams that were closed before lead nowhere.
         """
+        open_closed_streams()
         sys.excepthook = partial(_in_a_line_if_interrupted, self.prog)
         out = sys.stdout
         if out is sys.__stdout__ and out is not None:

@@ -36,8 +36,8 @@ def exit_after(seconds: float, status: int) -> None:
     nothing else is done at the end. A thread of libc does it: one of Python, or the handler of a
     signal, would wait for a library that does not come back. Raises `OSError` without a timer.
     """
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in filter(None, (sys.stdout, sys.stderr)):  # None: it was closed from the start
+        stream.flush()
     fraction, whole = math.modf(seconds)
     setting = _Setting(after_s=int(whole), after_ns=int(1e9 * fraction))
     if LIBRT.timer_settime(_timer(status), 0, ctypes.byref(setting), None):

@@ -235,6 +235,36 @@ def test_a_twist_that_contradicts_the_poses_is_said_and_makes_no_way(tmp_path, s
     assert line.endswith(f"m, its poses one of {run.travelled:.4g} m")
 
 
+@pytest.mark.parametrize(
+    ("field", "factor", "line"),
+    [
+        ("linear.x", -1.0, "linear.x is -1 times the rate of its poses"),
+        ("angular.z", 57.3, "angular.z is 57.3 times the rate of its poses"),
+        ("angular.z", -1.0, "angular.z is -1 times the rate of its poses"),
+    ],
+)
+def test_a_twist_of_another_sign_or_unit_is_said(tmp_path, field, factor, line):
+    made = a_run(800)
+    part, axis = field.split(".")
+
+    def change(sent):
+        rates = getattr(sent.twist.twist, part)
+        setattr(rates, axis, factor * getattr(rates, axis))
+
+    made.edit("odom", change)
+    _, said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert said == [f"/odom: {line}"]
+
+
+def test_a_twist_that_is_not_finite_now_and_then_is_counted(tmp_path):
+    made = a_run(800)
+    odometry = [sent for topic, *_, sent in made.messages if topic == "/odom"]
+    for sent in odometry[10:20]:
+        sent.twist.twist.linear.x = NAN
+    _, said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert said == ["/odom: linear.x is not finite in 10 of 800 messages"]
+
+
 def test_one_speed_that_cannot_be_makes_no_way(tmp_path):
     made = a_run(800)
     odometry = [sent for topic, *_, sent in made.messages if topic == "/odom"]

@@ -181,7 +181,7 @@ def test_parameters_are_those_that_the_controller_told_last(tmp_path):
         ("mass", -1.0, "must be > 0 [kg]"),
         ("max_wheel_torque", 1e300, "must be of a size from 1e-12 to 1e+12 [N m]"),
         ("adhesion", "glue", "must be one of suction, magnetic, none"),
-        ("left_wheel_joint", 5, "must be a str"),
+        ("left_wheel_joint", 5, "must be a text"),
     ],
 )
 def test_parameters_that_cannot_be_are_said_and_not_used(tmp_path, name, value, said):

@@ -23,8 +23,8 @@ WIDE = {"uniform": [0.1, 0.2]}
         ({PLANT + "wheel_load_share": {"choice": [0.5, 1.2]}}, "must be <= 1"),
         ({PLANT + "weight": WIDE}, "plant_simulator.weight is not a parameter"),
         ({PLANT + "mass": {"uniform": [6.0, 4.0]}}, "plant_simulator.mass: highest=4.0 must be"),
-        ({PLANT + "mass": "heavy"}, "plant_simulator.mass='heavy' must be a float"),
-        ({PLANT + "slip": 1}, "plant_simulator.slip=1 must be a bool"),
+        ({PLANT + "mass": "heavy"}, "plant_simulator.mass='heavy' must be a number"),
+        ({PLANT + "slip": 1}, "plant_simulator.slip=1 must be true or false"),
         ({PLANT + "integration_step": 0.003}, "must be a multiple of integration_step=0.003"),
         ({PLANT + "seed": 3}, "each run has one of its own"),
         ({CONTROLLER + "suction_pressure": 9000.0}, "is measured: set plant_simulator"),
@@ -49,7 +49,7 @@ def test_a_bad_parameter_is_refused_by_name_value_and_bound(campaign_file, param
     ("entries", "said"),
     [
         ({"runs": 0}, "runs=0 must be >= 1"),
-        ({"runs": 1.5}, "runs=1.5 must be a int"),
+        ({"runs": 1.5}, "runs=1.5 must be an integer"),
         ({"seed": -1}, "seed=-1 must be >= 0"),
         ({"duration": 0.0}, "duration=0.0 must be > 0 [s]"),
         ({"base": None}, "base"),
@@ -61,7 +61,7 @@ def test_a_bad_parameter_is_refused_by_name_value_and_bound(campaign_file, param
         ({"limits": ["fell < nan"]}, "nan must be a finite number"),
         ({"run": 3}, "run is not one of base, runs"),
         ({"backend": "abacus"}, "backend='abacus' must be one of numpy, numba, jax"),
-        ({"backend": 3}, "backend=3 must be a str"),
+        ({"backend": 3}, "backend=3 must be a text"),
     ],
 )
 def test_a_bad_entry_is_refused(campaign_file, entries, said):

@@ -49,7 +49,7 @@ def odometry(pose, twist, stamp, frames=FRAMES, covariance=1e-6):
         child_frame_id=frames[1],
         pose=SimpleNamespace(
             pose=SimpleNamespace(
-                position=SimpleNamespace(x=x, y=y),
+                position=SimpleNamespace(x=x, y=y, z=0.0),
                 orientation=SimpleNamespace(
                     x=0.0, y=0.0, z=np.sin(heading / 2), w=np.cos(heading / 2)
                 ),

@@ -34,7 +34,11 @@ def run(monkeypatch, *arguments):
         (["nowhere"], "identify: there is no bag nowhere"),
         (["nowhere", "--params", "nothing.yaml"], "nothing.yaml"),
         (["--plan", "p.yaml", "--speed", "-1"], "identify: speed=-1.0 must be > 0 [m/s]"),
-        (["--plan", "p.yaml", "--torque", "0.1"], "identify: no trajectory keeps within"),
+        (
+            ["--plan", "p.yaml", "--torque", "0.1"],
+            "no trajectory keeps within size 2 m, speed 0.3 m/s, torque 0.1 N m, duration 60 s",
+        ),
+        (["--plan", "."], "identify: . is a directory, and would be a file"),
         (["nowhere", "--window", "1e-9"], "identify: window=1e-09 must be >= 0.02 [s]"),
         (["nowhere", "--window", "nan"], "identify: window=nan must be a finite number [s]"),
     ],

@@ -323,3 +323,13 @@ def test_what_a_demo_cannot_start_with_is_said_in_one_line(world, tmp_path):
     (said,) = world.log("run_demo").splitlines()
     assert said.startswith("run_demo: No such file or directory: ")
     del world.processes["run_demo"]
+
+
+def test_a_path_that_begins_too_far_off_is_refused_before_anything_is_started(world, tmp_path):
+    text = (CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", "initial_y: 0.0")
+    (tmp_path / "mine.yaml").write_text(text)
+    assert demo(world, tmp_path / "run", tmp_path / "mine.yaml").wait(TIMEOUT) == 1
+    (said,) = world.log("run_demo").splitlines()
+    assert "plant_simulator starts 3.00 m and 0.00 rad off where the path begins" in said
+    assert not (tmp_path / "run").exists()
+    del world.processes["run_demo"]

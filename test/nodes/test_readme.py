@@ -1,5 +1,6 @@
 """What README and the docs say can be done, done as it is written there, by somebody new."""
 
+import json
 import os
 import re
 import shlex
@@ -88,7 +89,10 @@ def test_the_nodes_are_run_one_by_one(clone):
     assert [process.returncode for process in started] == [0] * 4
     done = given(["analyze_bag", "my_bag"], cwd=clone)
     assert done.returncode == 0, done.stderr
-    assert "It followed its path" in done.stdout
+    # a machine may be busy: then it stops, and goes on, but never is far off
+    assert re.search("It followed its path|It stopped for safety", done.stdout)
+    told = json.loads((clone / "my_bag" / "analysis" / "metrics.json").read_text())
+    assert told["runs"][0]["metrics"]["truth_max_distance"] < 0.3
 
 
 @pytest.fixture(scope="module")

@@ -116,3 +116,8 @@ def test_a_parameter_file_that_can_be_read_only_once_is_refused(tmp_path, name):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ValueError, match=r"(pipe|zero) is no regular file"):
         ParameterFiles(["--ros-args", "--params-file", str(tmp_path / name)], "/x")
+
+
+def test_an_option_without_its_parameter_file_is_refused():
+    with pytest.raises(ValueError, match="--params-file wants a file"):
+        ParameterFiles(["--ros-args", "--params-file"], "/x")

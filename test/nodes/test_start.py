@@ -29,7 +29,7 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
         (
             "uk_torque_controller",
             ["settling_messages:=5.0"],
-            "settling_messages=5.0 must be of type int",
+            "settling_messages=5.0 must be an integer",
         ),
         (
             "uk_torque_controller",
@@ -46,6 +46,7 @@ NODES = ["trajectory_publisher", "uk_torque_controller", "plant_simulator"]
             [f"{QOS}.reliability:=relaible"],
             "qos_overrides of odom: Unexpected",
         ),
+        ("uk_torque_controller", [f"{QOS}.depth:=-3"], f"{QOS}.depth=-3 must be >= 0"),
         ("uk_torque_controller", [f"{QOS}.depth:=five"], "qos_overrides of odom: "),
         ("plant_simulator", ["integration_step:=0.003"], "control_period=0.005 must be a multiple"),
         ("plant_simulator", ["suction_area:=.nan"], "suction_area=nan must be a finite number"),

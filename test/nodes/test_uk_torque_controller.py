@@ -118,6 +118,19 @@ def test_bad_odometry_gets_the_safe_output_and_good_one_is_followed_again(world,
     assert not any(said in line and said in later for line, later in pairwise(told))
 
 
+def test_odometry_that_leaves_its_plane_is_said_once(world):
+    def upright(message):
+        message.pose.pose.position.z = 0.2
+
+    loop = Loop(world, "odometry_timeout:=1.0")
+    loop.plan()
+    loop.follows()
+    said = "odom: position.z changes (0 to 0.2 m; x and y are to be along the wall)"
+    loop.until(lambda _: said in world.log(NAME), said, spoil=upright)
+    loop.until(any, "torques all the same", spoil=upright)
+    assert world.log(NAME).count("position.z") == 1
+
+
 def test_odometry_that_stops_is_noticed_and_followed_when_it_comes_back(world):
     loop = Loop(world)
     loop.plan()

@@ -2,6 +2,8 @@
 
 import math
 import random
+import resource
+import signal
 
 import pytest
 import rclpy
@@ -10,6 +12,7 @@ from rclpy.node import Node
 
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.parameter_file import Values, read_argument, read_file
+from climber_uk.parameters.text_file import write_whole
 from climber_uk.ros.parameters import NodeParameters
 
 SCALARS = """\
@@ -146,3 +149,34 @@ def test_any_scalar_is_what_rcl_takes_it_for(tmp_path):
         draw.choice(first) + "".join(draw.choices(later, k=draw.randrange(7))) for _ in range(5000)
     }
     assert not wrong(sorted(texts), tmp_path)
+
+
+def test_a_list_has_an_end_and_so_has_what_is_said_of_it(tmp_path):
+    @parameters
+    class Load:
+        mass: float = parameter(1.0, "kg", "mass", above=0)
+
+    for count, said in ((10_001, "line 3: mass has more than 10000 values"), (999, "finite")):
+        file = tmp_path / "long.yaml"
+        file.write_text(f"x:\n  ros__parameters:\n    mass: [{', '.join(['5.0'] * count)}]\n")
+        with pytest.raises(ValueError, match=said) as refused:
+            Values(read_file(file, "/x")).read(Load)
+        assert len(str(refused.value)) < 300
+
+
+def test_a_file_is_written_wholly_or_stays_what_it_was(tmp_path):
+    file = tmp_path / "mine.yaml"
+    (tmp_path / "link.yaml").symlink_to(file)
+    write_whole(tmp_path / "link.yaml", "before")
+    assert file.read_text() == "before"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"cannot write .*mine.yaml \(File too large\)"):
+            write_whole(file, 9999 * "x")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert file.read_text() == "before"
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.yaml", "link.yaml"}

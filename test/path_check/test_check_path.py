@@ -129,6 +129,39 @@ def test_what_looks_like_a_mistake_is_said(monkeypatch, capsys):
     assert capsys.readouterr().err == "check_path: laps=3 has no effect: the path is open\n"
 
 
+@pytest.mark.parametrize(
+    ("height", "said"),
+    [
+        ("3.0", ""),
+        ("2.5", "0.50 m and 0.00 rad off where the path begins: "),
+        ("0.0", "3.00 m and 0.00 rad off where the path begins, beyond max_start_distance (2 m): "),
+    ],
+)
+def test_a_simulated_climber_that_starts_elsewhere_is_said(
+    monkeypatch, capsys, tmp_path, height, said
+):
+    text = (CONFIG / "climber.yaml").read_text().replace("initial_y: 3.0", f"initial_y: {height}")
+    (tmp_path / "mine.yaml").write_text(text)
+    monkeypatch.setattr("sys.argv", ["check_path", "--params", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit):
+        check_path.main()
+    there = "there its initial_x is 0.0, initial_y 3.0, initial_heading 0.7854\n"
+    line = f"check_path: {tmp_path / 'mine.yaml'}: plant_simulator starts {said}{there}"
+    assert capsys.readouterr().err == (line if said else "")
+
+
+def test_a_climber_of_which_a_number_was_changed_in_one_place_only_is_said(
+    monkeypatch, capsys, tmp_path
+):
+    text = (CONFIG / "climber.yaml").read_text().replace("mass: 5.0", "mass: 6.0", 1)
+    (tmp_path / "mine.yaml").write_text(text)
+    monkeypatch.setattr("sys.argv", ["check_path", "--params", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit):
+        check_path.main()
+    said = "uk_torque_controller and plant_simulator have mass 6.0 and 5.0"
+    assert capsys.readouterr().err == f"check_path: {tmp_path / 'mine.yaml'}: {said}\n"
+
+
 def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatch, capsys):
     fast = "-p", "rest_to_rest.rate:=2.0", "-p", "rest_to_rest.ramp_time:=0.05"
     words = "--params", CONFIG / "climber.yaml", *fast
@@ -231,13 +264,17 @@ def test_what_the_plant_runs_on_is_in_what_a_circle_asks_for(monkeypatch, capsys
     assert status == (min(left.values()) < 1)
 
 
+UNSAFE = "/**/uk_torque_controller:\n  ros__parameters:\n    safe_output: x"
+
+
 @pytest.mark.parametrize(
     ("text", "words", "line"),
     [
         (None, ["-p", "shape:=nothing"], "shape='nothing' must be one of "),
         (None, ["-p", "shape"], "'shape' must be name:=value"),
         (None, ["-p", "shape:=[circle]"], "shape=['circle'] must be one of "),
-        ("shape: waypoints\n    waypoints: {file: [a]}", [], "waypoints.file=['a'] must be a str"),
+        (f"shape: circle\n{UNSAFE}", [], "safe_output='x' must be one of zero, hold"),
+        ("shape: waypoints\n    waypoints: {file: [a]}", [], "waypoints.file=['a'] must be a text"),
         (None, ["-p", "rest_to_rest.ratee:=5.0"], "(did you mean rest_to_rest.rate?)"),
         (None, ["-p", "autostart:=false"], "autostart is no parameter of a path"),
         ("rest_to_rest.ramp_tim: 0.1", [], "(did you mean rest_to_rest.ramp_time?)"),

@@ -14,8 +14,9 @@ from made_bag import a_run, write
 
 from climber_uk.bags.recorded_run import read_runs
 from climber_uk.bags.topics import Topics
+from climber_uk.control.safety import Mode
 from climber_uk.report import analyze_bag, compare_bags, figures
-from climber_uk.report.cards import WIDTH, verdict
+from climber_uk.report.cards import WIDTH, text, verdict
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import METRICS, Case
 from climber_uk.report.page import page
@@ -236,7 +237,7 @@ def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_pat
         ({}, "It followed its path, at most 4 mm off."),
         ({"truth_max_distance": 0.3}, "It followed its path, at most 300 mm off."),
         ({"settling_time": np.nan}, "It did not settle on its path, at most 4 mm off."),
-        ({"following": 0.0}, "It did not follow its reference."),
+        ({"following": 0.0}, "It did not follow its reference at all."),
         ({"max_distance": np.nan}, "There is no reference in it"),
         ({"safety_stops": 1.0}, "It stopped for safety (1 stop)."),
         ({"safety_stops": 2.0}, "It stopped for safety (2 stops)."),
@@ -260,8 +261,17 @@ def test_at_a_glance_each_side_and_what_nodes_warned_of_are_in_few_lines(bags, r
     titles = [line[2:19].strip() for line in out]
     assert {"Tracking", "Hold on the wall", "Safety", "Timing"} <= set(titles)
     assert len([line for line in out if "no odometry" in line]) == 2
-    assert out[-4] == "It stopped for safety (1 stop)."
+    assert out[-4] == "It did not follow its reference at all."
     assert out[-3] == str(tmp_path / "out" / "report.html")
+
+
+@pytest.mark.parametrize(("at", "is_told"), [(-0.5, False), (0.5, True)])
+def test_at_a_glance_there_is_no_clock_that_was_waited_for_at_the_start(tmp_path, at, is_told):
+    made = a_run()
+    for time, mode in sorted([(at, Mode.NO_CLOCK), (0.0, Mode.FOLLOWING)]):
+        made.add_mode(time, mode.value, level=2 if mode.is_fault else 0)
+    (found,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert ("there is no clock" in text([Column("a", "bag", Case(found))])) == is_told
 
 
 def test_comparing_one_bag_is_refused(bags, run):

@@ -1,6 +1,7 @@
 """Whether the controller followed, or had to give its safe output."""
 
 import math
+from collections.abc import Callable
 
 from climber_uk.bags.events import ERROR, Event
 from climber_uk.control.safety import Mode
@@ -37,14 +38,17 @@ def errors(case: Case) -> float:
         return NAN
     states = [(time, event) for time, event in case.run.events if event.kind == "state"]
     at_begin = {event.node: event for time, event in states if time < 0}.values()
-    follows = [t for t, e in case.run.events if e.kind == "mode" and e.text == Mode.FOLLOWING.value]
-    within = [
-        event
-        for time, event in states
-        if time >= 0 and not (_waits_for_clock(event) and time < min(follows, default=math.inf))
-    ]
+    is_start = is_start_of(case)
+    within = [event for time, event in states if time >= 0 and not is_start(time, event)]
     begun = [event for event in at_begin if not _waits_for_clock(event)]
     return float(sum(event.level == ERROR for event in [*begun, *within]))
+
+
+def is_start_of(case: Case) -> Callable[[float, Event], bool]:
+    """Whether an event, at a time [s], is that the clock was waited for before it followed."""
+    follows = [t for t, e in case.run.events if e.kind == "mode" and e.text == Mode.FOLLOWING.value]
+    first = min(follows, default=math.inf)
+    return lambda time, event: _waits_for_clock(event) and time < first
 
 
 def _waits_for_clock(event: Event) -> bool:
