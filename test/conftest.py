@@ -8,7 +8,6 @@ import gc
 import os
 import signal
 from contextlib import suppress
-from itertools import groupby, islice
 
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 if "PYTEST_XDIST_WORKER" not in os.environ:  # they have what `use_udp` has made of it
@@ -50,21 +49,3 @@ def pytest_collection():
     finally:
         gc.enable()
         gc.freeze()
-
-
-@pytest.hookimpl(trylast=True)  # of those that are to run
-def pytest_collection_modifyitems(items):
-    """Each process begins with its part of the modules that start nodes, which often wait.
-
-    What comes last, and goes from one process to another, are short tests.
-    """
-    processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
-    parts = [[] for _ in range(processes)]
-    with_nodes = [item for item in items if item.get_closest_marker("nodes")]
-    rest = iter([item for item in items if not item.get_closest_marker("nodes")])
-    modules = [list(module) for _, module in groupby(with_nodes, lambda item: item.path)]
-    for module in sorted(modules, key=len, reverse=True):
-        min(parts, key=len).extend(module)
-    size = len(items) // processes
-    items[:] = [item for part in parts for item in [*part, *islice(rest, size - len(part))]]
-    items.extend(rest)
