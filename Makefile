@@ -17,7 +17,7 @@ BIN := $(VENV)/bin
 # What has been installed: for nodes, recorder and analysis; for tests, campaigns and benches too
 SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools-set-up
-PIP := $(BIN)/pip install --quiet --disable-pip-version-check
+PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
 .PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean test-kilted sbom
 
@@ -129,13 +129,13 @@ colcon: $(TOOLS)
 $(SET_UP): requirements.txt setup.py
 	@echo "Setting up $(VENV), once: ROS 2, numpy, scipy, matplotlib (about 150 MB to fetch, 500 on the disk)"
 	@$(PYTHON) -m venv $(VENV)
-	@$(PIP) --no-compile --constraint requirements.txt setuptools
-	@$(PIP) --no-compile --constraint requirements.txt --no-build-isolation --editable .[ros,analysis]
+	@$(PIP) --constraint requirements.txt setuptools
+	@$(PIP) --constraint requirements.txt --no-build-isolation --editable .[ros,analysis]
 	@touch $@
 
 $(TOOLS): requirements.txt setup.py
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --no-compile --requirement requirements.txt
+	$(PIP) --requirement requirements.txt
 	$(PIP) --no-deps --no-build-isolation \
 		evo==1.38.1 --editable . # evo without pandas and seaborn, 90 MB that the tests do not need
 	touch $(SET_UP) $@

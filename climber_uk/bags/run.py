@@ -93,7 +93,7 @@ class RecordedRun:
         return f"its speeds make a way of {distance:.4g} m, its poses one of {by_poses:.4g} m"
 
     @cached_property
-    def misfits(self) -> list[str]:
+    def wrong_twist(self) -> list[str]:
         """What a twist has that is a multiple of its poses' rates, or not finite, in words."""
         found, by_pose = [], body_rates(self.time, self.pose, REACH)
         for name, column, turn in (("linear.x", 3, 0), ("angular.z", 5, 2)):

@@ -168,7 +168,7 @@ class RunReader:
             parameters=parameters,
             part=part,
         )
-        for said in filter(None, (run.contradiction, *run.misfits)):
+        for said in filter(None, (run.contradiction, *run.wrong_twist)):
             self.bag.lose(f"{self.topic(topics.ODOMETRY)}: {said}")
         return run
 

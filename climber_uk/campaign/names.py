@@ -10,7 +10,7 @@ from climber_uk.control.stops import StopOptions
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.wall import WALLS
 from climber_uk.messages.topics import CONTROLLER, PLANT
-from climber_uk.parameters.declaration import KINDS
+from climber_uk.parameters.declaration import TYPE_WORDS
 from climber_uk.simulation.sensors import Sensors
 
 SEED, PRESSURE = f"{PLANT}.seed", f"{PLANT}.suction_pressure"
@@ -90,7 +90,7 @@ def typed(name: str, value: Any, default: Any) -> Any:
     if isinstance(default, float) and type(value) is int:
         return float(value)
     if type(value) is not type(default):
-        raise ValueError(f"{name}={value!r} must be {KINDS[type(default)]}")
+        raise ValueError(f"{name}={value!r} must be {TYPE_WORDS[type(default)]}")
     return value
 
 

@@ -276,7 +276,7 @@ def node_commands(
     return commands
 
 
-def misfits(config: Path, climber: str, is_refused: bool) -> list[str]:
+def remarks_on(config: Path, climber: str, is_refused: bool) -> list[str]:
     """Lines on a climber that is not where its path begins, or other than its controller has it.
 
     Raises `ValueError` if the controller would refuse the path. Where the parameters make no path
@@ -347,7 +347,7 @@ def main() -> None:
                 values = read_file(options.config, f"{climber}/{node}")
                 said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
         for climber in climbers:
-            said += misfits(options.config, climber, not options.controller)
+            said += remarks_on(options.config, climber, not options.controller)
         for line in dict.fromkeys(said):
             print(f"run_demo: {line}", file=sys.stderr)
         options.output.mkdir(parents=True)

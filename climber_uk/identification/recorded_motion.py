@@ -89,7 +89,7 @@ class RecordedMotion:
         acting = np.stack([lagging(self.time, wheel, lag) for wheel in delayed], axis=1)
         late = replace(self, impulse=acting)
         of_poses = {name: getattr(self, name) for name in ("way", "smooth_rates", "side_slip")}
-        vars(late).update(of_poses)  # whatever drives it: a search asks for them a hundred times
+        vars(late).update(of_poses)  # the same: a search for the delay takes a hundred
         return late
 
 

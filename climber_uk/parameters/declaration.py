@@ -10,7 +10,7 @@ from typing import Any, dataclass_transform
 import numpy as np
 
 SMALLEST, LARGEST = 1e-12, 1e12  # of any number that is divided by, or multiplied: see `check`
-KINDS = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}
+TYPE_WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}
 LONGEST_VALUE = 200  # [characters] of a value in a message
 QOS = "qos_overrides."  # with which rclpy's own parameters begin
 
@@ -91,7 +91,7 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
         raise ValueError(f"{said} one of {', '.join(rule['choices'])}")
     if isinstance(field.default, bool | str):
         if type(value) is not type(field.default):
-            raise ValueError(f"{said} {KINDS[type(field.default)]}")
+            raise ValueError(f"{said} {TYPE_WORDS[type(field.default)]}")
         return
     # bounds are intervals: all are within if the extremes are, and these are nan if any is
     is_many = isinstance(value, np.ndarray)

@@ -15,7 +15,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from climber_uk.parameters.declaration import KINDS, QOS, bounds, check_value
+from climber_uk.parameters.declaration import QOS, TYPE_WORDS, bounds, check_value
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.parameters.parameter_paths import located
 from climber_uk.parameters.plausibility import doubt
@@ -76,7 +76,7 @@ class NodeParameters:
             except ValueError as error:
                 raise ValueError(f"{prefix}{error}") from None
             except ParameterException:
-                wanted = KINDS[type(field.default)]
+                wanted = TYPE_WORDS[type(field.default)]
                 raise ValueError(f"{name}={given!r} must be {wanted}") from None
             self._fields[name] = (prefix, kind, field)
 

@@ -64,6 +64,14 @@ def test_what_rests_trembles_comes_back_or_is_told_often_is_no_repetition(motion
     assert not any(found(motions))
 
 
+def test_one_that_rests_where_the_repetition_ended_is_heard_again():
+    motions = [*driven(40)]
+    there = motions[-1]._replace(speed=0.0, yaw_rate=0.0)
+    told = found([*motions, *motions[20:], there, there])
+    assert told[-3] > 0.0
+    assert told[-2:] == [0.0, 0.0]
+
+
 def test_it_keeps_a_second_of_messages():
     check = RepeatCheck()
     for number, motion in enumerate(driven(500)):
