@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from climber_uk.closed_loop.node_parameters import PARAMETERS, fields_of
-from climber_uk.control.constraints import CONSTRAINTS, UDWADIA_KALABA
+from climber_uk.control.constraints import CONSTRAINTS, FORCE_LAWS
 from climber_uk.control.stops import StopOptions
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.wall import WALLS
@@ -18,10 +18,12 @@ MEASURED = f"{CONTROLLER}.suction_pressure"
 # parameters that choose one of several kinds with parameters of their own
 VARIANTS: dict[str, Mapping[str, Any]] = {
     f"{CONTROLLER}.constraints": CONSTRAINTS,
+    f"{CONTROLLER}.controller": FORCE_LAWS,
     **{f"{node}.wall": WALLS for node in (CONTROLLER, PLANT)},
 }
 ON_WALL = [(kind, f"{name}.") for name, kind in WALLS.items()]
 LOSS_TIME = f"{PLANT}.pressure_loss_time"
+LAWS: dict[str, Any] = {**CONSTRAINTS, **FORCE_LAWS}
 # Parameters that may differ from run to run
 VARIED = {
     *fields_of(PLANT, [(Climber, ""), *ON_WALL]),
@@ -30,7 +32,7 @@ VARIED = {
     *(f"{PLANT}.initial_{n}" for n in ("x", "y", "heading", "speed", "yaw_rate")),
     *(LOSS_TIME, f"{PLANT}.pressure_loss_level"),
     *fields_of(CONTROLLER, [(Climber, ""), *ON_WALL]),
-    *fields_of(CONTROLLER, [(kind, f"{name}.") for name, kind in CONSTRAINTS.items()]),
+    *fields_of(CONTROLLER, [(kind, f"{name}.") for name, kind in LAWS.items()]),
     *(f"{CONTROLLER}.{n}" for n in ("friction_speed", "observer.bandwidth")),
 }
 VARIED -= {MEASURED}
@@ -41,7 +43,6 @@ REQUIRED = {
     **{f"{CONTROLLER}.stops.{f.name}": f.default for f in dataclasses.fields(StopOptions)},
     f"{CONTROLLER}.adhesion": "suction",
     f"{CONTROLLER}.least_suction.enabled": False,
-    f"{CONTROLLER}.controller": UDWADIA_KALABA,
     f"{CONTROLLER}.motors": "torque",
     f"{CONTROLLER}.observer.velocity_source": "odometry",
     f"{PLANT}.friction": "coulomb",

@@ -134,9 +134,10 @@ class ForceLaw(Protocol):
     def wrench(self, climber: Climber, target: ReferencePoint, motion: Motion) -> Wrench:
         """Drive [N] and yaw moment [N m] wanted of the wheels of a climber in `motion`.
 
-        They include what carries the climber's weight and overcomes its friction. `target` is the
-        reference at the time of `motion`, both in the wall's frame. What is not finite, or raises
-        `ValueError` or `ArithmeticError`, gives the safe output.
+        Numbers of any kind, or arrays where those of the motion are. They include what carries the
+        climber's weight and overcomes its friction. `target` is the reference at the time of
+        `motion`, both in the wall's frame. What is not finite, or raises `ValueError` or
+        `ArithmeticError`, gives the safe output.
         """
 
 
@@ -170,6 +171,7 @@ class ControlLaw:
         bounds = self._fixed_bounds or climber.bounds(motion)
         near = None if everywhere(self.options.max_torque_rate == 0) else self._bounds(situation)
         solve, ways = self._solve, (self.comes(target), stiction)
+        is_one = isinstance(motion.speed, float)
         drive, yaw_moment = climber.wrench(held.right, held.left)
         wall, push, left_pull = self.wall, r_F, 0.0
         if wall is not None:
@@ -177,9 +179,9 @@ class ControlLaw:
         for _ in range(2 if ahead else 1):
             force, moment = drive + push, yaw_moment + r_N
             predicted = predict(climber, motion, force, moment, ahead, friction, turning, aside)
-            force, moment, v_1, yaw_rate = solve(
-                prepared, predicted, ways, friction, turning, course
-            )
+            answer = solve(prepared, predicted, ways, friction, turning, course)
+            # a law of somebody else's may answer with numbers of another kind
+            force, moment, v_1, yaw_rate = map(float, answer) if is_one else answer
             if wall is not None:
                 forward_pull, left_pull = weight_beyond(wall, climber, predicted)
                 force = force - forward_pull

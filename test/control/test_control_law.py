@@ -1,4 +1,5 @@
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import product
 
 import numpy as np
@@ -12,7 +13,15 @@ from climber_uk.control.control_law import Braking, ControlInput, ControlLaw, Co
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.quantities import Motion, State, Torques, Wrench, across, along
+from climber_uk.mechanics.quantities import (
+    DesiredAcceleration,
+    Motion,
+    State,
+    Torques,
+    Wrench,
+    across,
+    along,
+)
 from climber_uk.mechanics.shapes import Ellipse
 from climber_uk.mechanics.time_laws import ConstantRate
 from climber_uk.mechanics.trajectory import Trajectory
@@ -166,6 +175,39 @@ def test_a_control_law_of_forces_has_prediction_disturbance_and_limits_around_it
     )
     assert np.abs(command.torques).max() <= 0.3
     assert np.abs(command.lost).max() > 0.1
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A law of forces, and of accelerations, that answers in another kind of number."""
+
+    number: type
+
+    def wrench(self, climber, target, motion):
+        return Wrench(self.number(3), self.number(-1))
+
+    def prepare(self, target):
+        return target
+
+    def desired_acceleration(self, prepared, motion):
+        return DesiredAcceleration(*map(self.number, (1, -1, 0, 0)))
+
+
+@pytest.mark.parametrize("number", [int, Fraction, np.float64, np.float32, np.int64, np.array])
+@pytest.mark.parametrize("of_forces", [False, True])
+def test_a_law_of_somebody_else_s_may_answer_with_any_kind_of_number(number, of_forces):
+    """What is compared and told by it further on is made of Python's own."""
+
+    def command(number):
+        given = (Guidance(), ControlOptions(), Kind(number)) if of_forces else (Kind(number),)
+        return ControlLaw(Climber(), *given).command(
+            situation(START, disturbance=(4.0, -0.5)), PAPER.at(0.1).target
+        )
+
+    told = command(number)
+    told = [*told.wheels, *told.demanded, *told.lost, told.lateral, told.forward, told.yaw_rate]
+    assert {type(one) for one in told} == {float}
+    np.testing.assert_allclose(told[:2], command(float).wheels, rtol=1e-6)
 
 
 def test_what_the_limits_take_away_is_told():

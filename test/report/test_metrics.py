@@ -373,6 +373,7 @@ def test_a_change_of_the_torque_over_a_gap_is_none(tmp_path):
         ([(-0.5, "no clock"), (0.0, "following")], 0),
         ([(-0.5, "no odometry"), (-0.1, "waiting for a reference"), (0.0, "following")], 0),
         ([(0.2, "no clock"), (0.4, "following")], 0),
+        ([(0.0, "no clock"), (0.0, "following")], 0),  # at the first time that there is
         ([(0.0, "no clock"), (0.1, "following"), (0.5, "no clock"), (0.6, "following")], 1),
         ([(-0.5, "bad odometry"), (0.5, "following")], 1),
         ([(0.0, "following"), (0.5, "no odometry"), (0.6, "following"), (0.7, "bad odometry")], 2),

@@ -45,10 +45,10 @@ def errors(case: Case) -> float:
 
 
 def is_start_of(case: Case) -> Callable[[float, Event], bool]:
-    """Whether an event, at a time [s], is that the clock was waited for before it followed."""
+    """Whether an event, at a time [s], is that the clock was waited for until it followed."""
     follows = [t for t, e in case.run.events if e.kind == "mode" and e.text == Mode.FOLLOWING.value]
     first = min(follows, default=math.inf)
-    return lambda time, event: _waits_for_clock(event) and time < first
+    return lambda time, event: _waits_for_clock(event) and time <= first
 
 
 def _waits_for_clock(event: Event) -> bool:
