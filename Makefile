@@ -59,8 +59,10 @@ $(VENV)/bench: $(TOOLS) bench/requirements.txt
 	$(PIP) --constraint requirements.txt --requirement bench/requirements.txt
 	touch $@
 
-## all that CI runs: lint, unit, colcon
-test: lint unit colcon
+## all that CI runs: lint and unit, at once, and then colcon
+test: $(TOOLS)
+	@$(MAKE) --no-print-directory --jobs 2 lint unit
+	@$(MAKE) --no-print-directory colcon
 
 ## ruff, mypy and the spelling
 lint: $(TOOLS)
@@ -135,7 +137,7 @@ $(SET_UP): requirements.txt setup.py
 
 $(TOOLS): requirements.txt setup.py
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --requirement requirements.txt
+	grep '^[^#]' requirements.txt | xargs -P 2 -n 90 $(PIP) --no-deps # all that it needs is in it
 	$(PIP) --no-deps --no-build-isolation \
 		evo==1.38.1 --editable . # evo without pandas and seaborn, 90 MB that the tests do not need
 	touch $(SET_UP) $@

@@ -550,6 +550,7 @@ def test_a_noisy_closed_loop_tells_what_is_30_percent_off(seed):
     assert np.abs(off).max() < 0.02
 
 
+@pytest.mark.soak
 @pytest.mark.slow
 def test_a_controller_with_what_was_found_tracks_as_one_with_the_truth():
     true, found = identified(SHORT, 4)

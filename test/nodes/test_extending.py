@@ -79,6 +79,7 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
     assert np.abs(true - 1e-3 * np.round(true / 1e-3)).max() > 1e-4
 
 
+@pytest.mark.soak
 def test_a_controller_of_somebody_else_s_takes_ours_place(world, tmp_path):
     own = shlex.join([sys.executable, str(CONFIG.parent / "examples" / "own_controller.py")])
     options = ["--config", CONFIG / "climber.yaml", "--output", tmp_path / "run"]

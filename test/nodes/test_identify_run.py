@@ -29,6 +29,7 @@ def run(world, name, *arguments):
     return done.stdout
 
 
+@pytest.mark.soak  # without nodes: test/identification
 def test_a_planned_run_tells_what_is_30_percent_off_and_the_nodes_load_it(world, tmp_path):
     plan, true, found = (tmp_path / f"{name}.yaml" for name in ("plan", "true", "found"))
     limits = "--duration", 8, "--size", 1, "--speed", 0.3
