@@ -196,9 +196,12 @@ def has_answered(torques: list[JointState]) -> bool:
 
 @contextmanager
 def running(
-    commands: dict[str, list[str]], logs: Path, signals: Sequence[int]
+    commands: dict[str, list[str]], logs: Path, signals: Sequence[int], killed: list[str]
 ) -> Iterator[Processes]:
-    """Processes of commands by name; at the end all are stopped, the first, the recorder, first."""
+    """Processes of commands by name; at the end all are stopped, the first, the recorder, first.
+
+    Names of those that did not end, and had to be killed, are added to `killed`.
+    """
     processes: Processes = {}
     try:
         for name, command in commands.items():
@@ -214,9 +217,10 @@ def running(
         yield processes
     finally:
         # else a node's last messages would be lost, where its end is known before them
-        groups = [*processes.values()][:1], [*processes.values()][1:]
+        groups = [*processes][:1], [*processes][1:]
         for group, hurried in zip(groups, HURRIED_TIMEOUTS, strict=True):
-            end(group, partial(patience, signals, hurried))
+            remaining = {name: processes[name] for name in group}
+            killed += end(remaining, partial(patience, signals, hurried))
 
 
 def patience(signals: Sequence[int], hurried: float) -> float:
@@ -379,10 +383,11 @@ def record(
     duration = ["-p", f"duration:={options.duration}"] if options.duration else []
     arguments = ["--ros-args", "--params-file", str(options.config), *duration]
     demo, said = None, ""
+    killed: list[str] = []
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         demo = Demo(climbers, signals, arguments, not options.controller)
-        with running(commands, options.output, signals) as demo.processes:
+        with running(commands, options.output, signals, killed) as demo.processes:
             print(f"{options.config} in ROS domain {os.environ['ROS_DOMAIN_ID']}", flush=True)
             demo.start(simulated, bag)
             demo.run()
@@ -393,6 +398,8 @@ def record(
         said = f"{error}: {lines[-1] if lines else 'its log is empty: is the disk full?'}"
     except (RuntimeError, ValueError, OSError) as error:
         said = in_words(error)
+    if killed:
+        said = f"{said + ', and ' if said else ''}{', '.join(killed)} did not end, and was killed"
     if not said:
         return demo, ""
     if demo is not None and demo.has_begun:

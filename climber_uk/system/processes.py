@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -44,16 +44,22 @@ def call(command: Sequence[str | Path]) -> int:
             signal.signal(number, handler)
 
 
-def end(processes: Sequence["subprocess.Popen[bytes]"], patience: Callable[[], float]) -> None:
+def end(
+    processes: Mapping[str, "subprocess.Popen[bytes]"], patience: Callable[[], float]
+) -> list[str]:
     """End processes by SIGTERM; by SIGKILL those that have not ended after `patience()` [s].
 
-    `patience` is called again and again, as it may shrink meanwhile.
+    `patience` is called again and again, as it may shrink meanwhile. Returns the names of those
+    that were killed.
     """
-    for process in processes:
+    for process in processes.values():
         process.send_signal(signal.SIGTERM)
     begin = time.monotonic()
-    while alive := [process for process in processes if process.poll() is None]:
-        if time.monotonic() > begin + patience():
-            for process in alive:
-                process.kill()
+    killed: list[str] = []
+    while alive := [name for name, process in processes.items() if process.poll() is None]:
+        if not killed and time.monotonic() > begin + patience():
+            killed = alive
+            for name in killed:
+                processes[name].kill()
         time.sleep(0.02)
+    return killed

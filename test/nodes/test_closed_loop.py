@@ -158,6 +158,7 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     assert run.distance[-1] < 5e-3
 
 
+@pytest.mark.soak  # without nodes: test/control/test_least_suction.py
 def test_with_the_least_suction_it_drives_with_less_and_keeps_its_margins_and_its_path(runs):
     pump = "\n    suction:\n      pump_time: 0.1"
     asked = (
@@ -249,6 +250,7 @@ def test_evo_reads_the_exported_trajectories_and_finds_our_errors(
             np.testing.assert_allclose(errors[:, column], measure.error, atol=1e-6)
 
 
+@pytest.mark.soak  # each node alone: test_uk_torque_controller.py, test_plant_simulator.py
 def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_end(world, tmp_path):
     """The pump fails at 1 s, with 0.6 s to the volume: P = 8 kPa exp((1 - t) / 0.6)."""
     config = tmp_path / "lost.yaml"

@@ -133,8 +133,10 @@ def test_a_demo_does_not_wait_long_for_a_node_that_does_not_end_once_it_is_told_
     for pid in family:
         os.kill(pid, signal.SIGSTOP)
     interrupt_twice(process)
-    process.stdout.read()
+    said = process.stdout.read()
     gone(world, family)
+    assert "run_demo: interrupted, and record_bag, " in said
+    assert " did not end, and was killed; recorded so far" in said
     assert process.wait(TIMEOUT) == 1
 
 
