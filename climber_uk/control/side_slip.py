@@ -32,7 +32,8 @@ MOST_LEAD = 0.7  # [s]
 HINDSIGHT, FORESIGHT = 1.0, 0.7
 FASTEST = 0.4  # B T, at most
 NEGLIGIBLE = 1e-5  # [rad] of a course off its heading
-STEPS = 7  # in which either is gone through
+REACH, NEAREST = 5.0, 0.035  # times T, and [s]: what is further off counts for nothing
+STEPS = 7  # in which that is gone through
 PASSES = 3
 SHORTEST_LEAD = 1e-9  # [s]
 CLEARLY_TURNS = 0.1  # [rad/s]
@@ -231,8 +232,9 @@ def _ahead(
     T < 0). From there it is stepped back to now, with T θ̇_d even in a step and T that of its end;
     what is later than can be seen turns on as it does there.
     """
-    sign = 1 if lead(target) >= 0 else -1
-    step = (FORESIGHT if sign > 0 else -HINDSIGHT) / STEPS
+    now = lead(target)
+    sign, far = (1, FORESIGHT) if now >= 0 else (-1, HINDSIGHT)
+    step = sign * clipped(REACH * abs(now), NEAREST, far) / STEPS
 
     def time(point: ReferencePoint, angle: float) -> float:
         return sign * max(sign * lead(point, angle), SHORTEST_LEAD)
