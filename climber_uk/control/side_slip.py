@@ -12,12 +12,12 @@ how much the point that it turns about is shifted: the weight loads the wheels t
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
 from climber_uk.mechanics.climber import GRAVITY, Climber
-from climber_uk.mechanics.elementary import clipped, wrapped
+from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
 from climber_uk.mechanics.wall import Wall, weight
 
@@ -32,8 +32,11 @@ MOST_LEAD = 0.7  # [s]
 HINDSIGHT, FORESIGHT = 1.0, 0.7
 FASTEST = 0.4  # B T, at most
 NEGLIGIBLE = 1e-5  # [rad] of a course off its heading
-# Gauss-Laguerre, of second order: the integral of exp(-u) f(u) from 0 on is about Σ weight f(node)
-NODES = (2 - math.sqrt(2), (2 + math.sqrt(2)) / 4), (2 + math.sqrt(2), (2 - math.sqrt(2)) / 4)
+REACH, NEAREST = 5.0, 0.035  # times T, and [s]: what is further off counts for nothing
+STEPS = 7  # in which that is gone through
+PASSES = 3
+SHORTEST_LEAD = 1e-9  # [s]
+CLEARLY_TURNS = 0.1  # [rad/s]
 At = Callable[[float], ReferencePoint]
 
 
@@ -84,11 +87,19 @@ class Course(NamedTuple):
     acceleration: float  # β̈ [rad/s²]
     cosine: float  # of β
     sine: float
+    lever: float = 0.0  # [m] from the centre ahead to the point that goes along the heading
+    away: tuple[float, float] = (0.0, 0.0)  # [m] from that point to the centre, as they should be
 
     @classmethod
-    def at(cls, angle: float, rate: float, acceleration: float) -> "Course":
-        """A course that is off by an angle [rad], with its derivatives."""
-        return cls(angle, rate, acceleration, math.cos(angle), math.sin(angle))
+    def at(
+        cls, angle: float, rate: float, acceleration: float, lever: float = 0.0, heading: float = 0
+    ) -> "Course":
+        """A course that is off by an angle [rad], with its derivatives.
+
+        The point that holds is a `lever` [m] ahead, in the direction of the `heading` [rad] wanted.
+        """
+        away = -lever * math.cos(heading), -lever * math.sin(heading)
+        return cls(angle, rate, acceleration, math.cos(angle), math.sin(angle), lever, away)
 
     @property
     def slope(self) -> float:
@@ -96,9 +107,14 @@ class Course(NamedTuple):
         return self.sine / self.cosine
 
     def motion(self, of: Motion) -> Motion:
-        """The same motion along its course: that of a climber whose wheels hold."""
+        """The same motion along its course: that of a climber whose wheels hold.
+
+        One that turns otherwise than it should is where its point that holds tells: as it goes
+        aside by a lever times the turn, the centre would tell a turn upwards by a way downwards.
+        """
         x, y, heading, cosine, sine, v, omega = of
         along = cosine * self.cosine - sine * self.sine, sine * self.cosine + cosine * self.sine
+        x, y = x + self.away[0] + self.lever * cosine, y + self.away[1] + self.lever * sine
         return Motion(x, y, heading + self.angle, *along, v / self.cosine, omega + self.rate)
 
 
@@ -167,31 +183,37 @@ class SideSlip(NamedTuple):
         """
         v, fade = abs(target.speed), _fade(target.speed)
         angle, rate = math.atan(self.creep * v * fade), self.creep_rate * v * fade
-        one, other = self._leads(climber, wall, target)
+        leads = {way: partial(self._lead, climber, wall, way) for way in (1, -1)}
+        one, other = (lead(target) for lead in leads.values())
         if abs(angle) + (abs(one) + abs(other)) * abs(target.yaw_rate) < NEGLIGIBLE:
             return None
         # it sags, whichever way it turns: of both ways to turn, the heading that is higher
-        leads = partial(self._leads, climber, wall)
-        ways = [_ahead(target, at, leads, way) for way in (0, 1)]
-        turned, faster, sooner = max(ways) if one > other else min(ways)
-        return Course.at(angle - turned, rate - faster, -sooner)
+        ways = [(*_ahead(target, at, lead), way) for way, lead in leads.items()]
+        turned, faster, sooner, way = max(ways) if one > other else min(ways)
+        turns = target.yaw_rate + faster
+        lever = leads[way](target, turned) * target.speed
+        lever *= math.tanh(max(way * turns, 0.0) / CLEARLY_TURNS)
+        return Course.at(
+            angle - turned, rate - faster, -sooner, lever, target.heading - angle + turned
+        )
 
-    def _leads(
-        self, climber: Climber, wall: Wall | None, target: ReferencePoint
-    ) -> tuple[float, float]:
-        """Times T [s] by which its heading is ahead of its course, while it turns left, and right.
+    def _lead(
+        self,
+        climber: Climber,
+        wall: Wall | None,
+        way: int,
+        target: ReferencePoint,
+        turned: float = 0.0,
+    ) -> float:
+        """Time T [s] by which its heading is ahead of its course, creep apart: θ̇ = (θ - θ_d) / T.
 
-        Creep apart, β = v_y / v = -T ω.
+        It turns left (`way` 1) or right (-1), at a heading `turned` [rad] from the reference's.
         """
         v = target.speed
-        there = Motion.at(target.x, target.y, target.heading, v, target.yaw_rate)
+        there = Motion.at(target.x, target.y, target.heading + turned, v, target.yaw_rate)
         reaction, uphill = _pulls(climber, there, wall)
-        sags, shifts = self.scrub * reaction, self.pivot * uphill  # [m] -v_y / |ω|, v_y / ω
-        fade = _fade(v)
-        return (
-            clipped(fade * (sags - shifts), -MOST_LEAD, MOST_LEAD),
-            clipped(fade * (-sags - shifts), -MOST_LEAD, MOST_LEAD),
-        )
+        lever = way * self.scrub * reaction - self.pivot * uphill
+        return clipped(_fade(v) * lever, -MOST_LEAD, MOST_LEAD)
 
 
 def _fade(speed: float) -> float:
@@ -200,32 +222,36 @@ def _fade(speed: float) -> float:
 
 
 def _ahead(
-    target: ReferencePoint, at: At, leads: Callable[[ReferencePoint], Sequence[float]], way: int
+    target: ReferencePoint, at: At, lead: Callable[..., float]
 ) -> tuple[float, float, float]:
     """How far the heading has to be ahead of a reference, and its derivatives.
 
-    `leads` gives T [s] of a reference, for each way to turn.
+    `lead` gives T [s] of a reference, for a heading that is so far [rad] ahead of it.
 
-    θ - T θ̇ = θ_d, so that θ is the mean of what θ_d will be (was, of T < 0), with weights that fade
-    exponentially by ∫ dt / T: the only solution that does not grow. T changes about evenly until
-    then; what is later than can be seen goes on as it does there.
+    θ - T θ̇ = θ_d, whose only solution that does not grow comes from what θ_d will be (was, of
+    T < 0). From there it is stepped back to now, with T θ̇_d even in a step and T that of its end;
+    what is later than can be seen turns on as it does there.
     """
-    now = leads(target)[way]
+    now = lead(target)
+    sign, far = (1, FORESIGHT) if now >= 0 else (-1, HINDSIGHT)
+    step = sign * clipped(REACH * abs(now), NEAREST, far) / STEPS
+
+    def time(point: ReferencePoint, angle: float) -> float:
+        return sign * max(sign * lead(point, angle), SHORTEST_LEAD)
+
+    point = at(STEPS * step)
     angle = rate = acceleration = 0.0
-    for node, share in NODES:
-        mean = leads(at(clipped(now * node / 2, -HINDSIGHT, FORESIGHT)))[way]
-        stretched = clipped(2 * mean / now - 1, 0.0, 3.0) if now else 1.0  # T then by T now
-        mean = mean if mean * now > 0 else 0.0
-        seen = clipped(mean * node, -HINDSIGHT, FORESIGHT)
-        beyond, later = mean * node - seen, at(seen)
-        heading = wrapped(later.heading - target.heading) + beyond * later.yaw_rate
-        yaw_rate = stretched * (later.yaw_rate + beyond * later.yaw_acceleration)
-        angle += share * heading
-        rate += share * (yaw_rate - target.yaw_rate)
-        acceleration += share * (
-            stretched * stretched * later.yaw_acceleration - target.yaw_acceleration
-        )
-    return angle, rate, acceleration
+    for _ in range(PASSES):  # where it ends: a heading that is ahead loads the wheels otherwise
+        angle = time(point, angle) * point.yaw_rate
+    even = angle  # T θ̇_d
+    for number in reversed(range(STEPS)):
+        later, point = point, at(number * step) if number else target
+        T, change = time(point, angle), (later.yaw_rate - point.yaw_rate) / step
+        rises = (even - T * point.yaw_rate) / step
+        left = ((angle - even) / T - rises) * math.exp(-step / T)
+        rate, acceleration = point.yaw_rate + rises + left, change + left / T
+        angle, even = T * rate, T * point.yaw_rate
+    return angle, rate - target.yaw_rate, acceleration - target.yaw_acceleration
 
 
 def _rates(climber: Climber, motion: Motion, wall: Wall | None) -> tuple[float, float, float]:
