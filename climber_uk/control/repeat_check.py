@@ -7,6 +7,7 @@ leap back along its way: if it does without repeating a message, that way is how
 import math
 
 from climber_uk.control.delay_check import MOVES
+from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Motion
 
@@ -52,8 +53,8 @@ class RepeatCheck:
         back = math.copysign(1.0, speed) * (time * speed - gone)
         is_leap = back > max(BACK, SHARPLY * math.sqrt(self._leaps))
         self._leaps = max(math.exp(-time / MEMORY) * self._leaps, back * back)
-        if not is_leap or abs(speed) < MOVES:
-            return
+        if not is_leap or abs(speed) < MOVES or time > LONGEST_STEP:
+            return  # after a silence it may have been stopped
         older = round(back / abs(speed) * SECOND)
         if OLD * SECOND < older < KEPT:
             self._back_by, self._until = older / SECOND, stamp + older
