@@ -185,7 +185,7 @@ class Controller:
         was_older = self._repeats.older
         self._repeats.add(stamp, motion, self._law.climber.half_track)
         if older := self._repeats.older:
-            return self.on_bad_odometry(now, f"it told the same {older:.2f} s ago")
+            return self.on_bad_odometry(now, f"it is back where it was {older:.2f} s ago")
         self._heard = stamp
         if now > 0:
             self.ages.add(now, off)

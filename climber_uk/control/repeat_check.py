@@ -1,14 +1,23 @@
 """Whether odometry tells again what it told before: a buffer that repeats itself, with new stamps.
 
-What moves is never again exactly where it was, as fast as it was, message by message.
+What moves is never again exactly where it was, as fast as it was, message by message. Nor does it
+leap back along its way: if it does without repeating a message, that way is how old it is.
 """
 
+import math
+
 from climber_uk.control.delay_check import MOVES
+from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Motion
 
 KEPT = SECOND  # [ns] for which a message is kept
 IN_A_ROW = 4  # messages that move and were told before in the same order, each with another pose
+
+# [m] by which it leaps back at least, as many times the root mean square of leaps before it, and
+# as old [s] as it is then at least: stamps may be a little off
+BACK, SHARPLY, OLD = 0.02, 6.0, 0.05
+MEMORY = 0.5  # [s] of leaps
 
 
 class RepeatCheck:
@@ -23,11 +32,37 @@ class RepeatCheck:
         self._last: Motion | None = None
         self._number = self._back = 0  # of what moves, and how many back the last one was told
         self._in_a_row = 0
+        # [ns] of the last message, and until when it tells what was, by so much [s]; [m²] of leaps
+        self._stamp, self._until, self._back_by, self._leaps = 0, 0, 0.0, 0.0
         self.older = 0.0  # [s] than its stamp, where odometry repeats itself
 
     def add(self, stamp: int, motion: Motion, half_track: float) -> None:
         """Take an odometry of `stamp` [ns]."""
         before, self._last = self._last, motion
+        if before is not None and stamp > self._stamp:
+            self._look_for_leaps(stamp, before, motion)
+        self._stamp = stamp
+        self._compare(stamp, before, motion, half_track)
+        if stamp < self._until:
+            self.older = max(self.older, self._back_by)
+
+    def _look_for_leaps(self, stamp: int, before: Motion, motion: Motion) -> None:
+        """Notice a pose that leaps back by what it went in some time."""
+        time, speed = (stamp - self._stamp) / SECOND, motion.speed
+        gone = (motion.x - before.x) * motion.cosine + (motion.y - before.y) * motion.sine
+        back = math.copysign(1.0, speed) * (time * speed - gone)
+        is_leap = back > max(BACK, SHARPLY * math.sqrt(self._leaps))
+        self._leaps = max(math.exp(-time / MEMORY) * self._leaps, back * back)
+        if not is_leap or abs(speed) < MOVES or time > LONGEST_STEP:
+            return  # after a silence it may have been stopped
+        older = round(back / abs(speed) * SECOND)
+        if OLD * SECOND < older < KEPT:
+            self._back_by, self._until = older / SECOND, stamp + older
+
+    def _compare(
+        self, stamp: int, before: Motion | None, motion: Motion, half_track: float
+    ) -> None:
+        """Notice what was told before, message by message."""
         if max(abs(motion.speed), half_track * abs(motion.yaw_rate)) < MOVES:
             self._in_a_row, self.older = 0, 0.0
             return

@@ -205,7 +205,7 @@ class SafeOutput:
             way = self._way if mode.is_fault else 1
             sign, yaw_sign = self.polarities.signs
             drive, yaw = rate * (sign or way), rate * (yaw_sign or 1)
-            holds = not falls
+            holds = not falls and law.climber.seal_friction > 0
             # The other wheel can brake a turn, while the seal holds what it drives. What goes
             # against its torques has motors the wrong way round, or late ones: a seal stops both.
             # Where that is known of the yaw alone, the drive is left to the seal as well.

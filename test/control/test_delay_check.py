@@ -323,3 +323,23 @@ def test_noise_of_the_twist_is_no_delay_that_stops_anybody(seed):
     climb = noisy(seed)
     assert Mode.LATE not in climb.modes
     assert climb.off_the_path() < 0.01
+
+
+@pytest.mark.parametrize(("planner", "number"), WAYS)
+@pytest.mark.parametrize("span", [*(pytest.param(it, marks=soak) for it in (0.1, 0.4)), 0.25])
+def test_odometry_that_goes_back_between_its_messages_stops_it(span, number, planner):
+    """What it tells is late from then on, and no message of it was told before."""
+    climb = deepcopy(healthy(planner, number))
+    late = Late(span, climb.state)
+    late.past += climb.states[-200:]
+
+    def between(time, state):
+        late(time, state)
+        index = round(span / PERIOD)
+        one, other = late.past[-1 - index].motion, late.past[-2 - index].motion
+        middle = [0.7 * here + 0.3 * there for here, there in zip(one, other, strict=True)]
+        return State.rolling(np.array(middle[:3]), *middle[-2:])
+
+    climb.run(2.5, odometry=every(number, between))
+    assert climb.faulty_after(4.0) < 0.1
+    assert_never_runs_away(climb, 4.0)

@@ -69,6 +69,23 @@ def test_motors_that_turn_the_wrong_way_round_do_not_run_away(wiring, scrubs, pa
     assert climb.fastest(since) < 1.5 * climb.reference_speed + 0.1
 
 
+@pytest.mark.parametrize("since", [2.0, pytest.param(4.0, marks=soak)])
+def test_swapped_motors_are_braked_on_a_floor_where_nothing_rubs(since):
+    """Nothing pulls the climber there, and nothing but its motors stops it."""
+    climb = Climb(inclination=0.0, adhesion="none").run(since)
+    climb.run(2.0, motors=lambda _, torques: torques[::-1])
+    assert climb.controller.guard.faults
+    assert climb.fastest(since) < 1.5 * climb.reference_speed + 0.1
+    assert climb.fastest(climb.time - 0.2) < 0.01
+
+
+@pytest.mark.soak
+def test_one_motor_the_wrong_way_round_does_not_run_away_where_nothing_rubs():
+    climb = Climb(inclination=0.0, adhesion="none").run(4.0)
+    climb.run(2.0, motors=lambda _, torques: torques * [1, -1])
+    assert climb.fastest(4.0) < 1.5 * climb.reference_speed + 0.1
+
+
 def deaths():
     """When which motor dies, and on what; but for soak each side once, and tracks once."""
     for turn, since in enumerate((1.0, 7.0, 13.0, 19.0)):

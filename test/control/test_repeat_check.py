@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from climber_uk.control.repeat_check import IN_A_ROW, KEPT, RepeatCheck
+from climber_uk.control.repeat_check import BACK, IN_A_ROW, KEPT, RepeatCheck
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import Motion
 
@@ -33,15 +34,16 @@ def found(motions):
     return older
 
 
-@pytest.mark.parametrize("back", [6, 20, 60])
+@pytest.mark.parametrize("back", [6, 24, 60])
 @pytest.mark.parametrize("each", [1, 2])
 def test_a_buffer_that_repeats_itself_is_found_until_it_tells_something_new(back, each):
     motions = [*driven(160, each=each)]
     told = found(motions[:100] + motions[100 - back :])
     again = [number for number, older in enumerate(told) if older]
-    first = 100 + each * (IN_A_ROW - 1)
+    leaps = 0.2 * PERIOD * back / each > BACK  # which shows at once
+    first = 100 if leaps else 100 + each * (IN_A_ROW - 1)
     assert again == [*range(first, 100 + back)]
-    assert all(told[number] == pytest.approx(back * PERIOD) for number in again)
+    assert not again or told[99 + back] == pytest.approx(back * PERIOD)
 
 
 def test_so_is_one_that_repeats_itself_for_ever():
@@ -77,3 +79,37 @@ def test_it_keeps_a_second_of_messages():
     for number, motion in enumerate(driven(500)):
         check.add(round(number * PERIOD * SECOND), motion, HALF_TRACK)
     assert len(check._told) <= KEPT / SECOND / PERIOD + 1
+
+
+@pytest.mark.parametrize("speed", [0.2, -0.2, 0.05])
+@pytest.mark.parametrize("back", [12.5, 40.5, 80.5])
+def test_one_that_leaps_back_along_its_way_is_as_old_as_that_way(back, speed):
+    """No message of it was told before: it tells what was between two."""
+    motions = [*driven(400, speed=speed, yaw_rate=0.0)]
+    gone = speed * back * PERIOD
+    later = [motion._replace(x=motion.x - gone * motion.cosine) for motion in motions[200:]]
+    later = [it._replace(y=it.y - gone * it.sine) for it in later]
+    told = found(motions[:200] + later)
+    again = [number for number, older in enumerate(told) if older]
+    if abs(gone) < BACK:
+        assert not again
+        return
+    assert again == [*range(200, 200 + math.ceil(back))]
+    assert all(told[number] == pytest.approx(back * PERIOD, abs=0.6 * PERIOD) for number in again)
+
+
+@pytest.mark.parametrize("noise", [1e-3, 5e-3, 2e-2])
+def test_noise_of_the_pose_is_no_leap(noise):
+    random = np.random.default_rng(1)
+    off = noise * np.clip(random.normal(size=(400, 2)), -2.5, 2.5)
+    off *= np.minimum(np.arange(400) / 40, 1.0)[:, None]
+    motions = driven(400)
+    noisy = zip(motions, off, strict=True)
+    assert not any(found([it._replace(x=it.x + x, y=it.y + y) for it, (x, y) in noisy]))
+
+
+def test_what_a_fix_corrects_by_less_or_more_than_a_second_of_the_way_is_no_repetition():
+    motions = [*driven(200, yaw_rate=0.0)]
+    for corrected in (0.87 * BACK, 0.2113):
+        fixed = [it._replace(x=it.x - corrected) for it in motions[100:]]
+        assert not any(found(motions[:100] + fixed))

@@ -111,7 +111,7 @@ class Repeating:
 @pytest.mark.parametrize(
     ("how", "said"),
     [
-        ({"spoil": Repeating()}, "it told the same"),
+        ({"spoil": Repeating()}, "it is back where it was"),
         ({"spoil": spoil_nan}, "is not finite"),
         ({"spoil": spoil_frame}, "frame_id='map' must be 'odom'"),
         ({"spoil": spoil_child_frame}, "child_frame_id='base_footprint' must be 'base_link'"),
