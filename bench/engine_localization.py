@@ -79,14 +79,15 @@ class EngineLoop(Loop):
 
 
 def scrubs(parts: Parts) -> dict[str, float]:
-    """What is expected of λ [m], ζ and ξ: weight and drag, by the moment that turns the wheels."""
+    """What is expected of λ, a [m], ζ and ξ: weight, drag, by the moment that turns the wheels."""
     climber, contact = parts.plant.climber, parts.plant.contact
     load = climber.wheel_load_share * contact.adhesion.force(climber)
     moment, d = contact.locomotion.turning_resistance(load), climber.half_track
     length = max(contact.locomotion.footholds) - min(contact.locomotion.footholds)
-    weight = climber.mass * GRAVITY
+    weight, height = climber.mass * GRAVITY, contact.grip.centre_height
     return {
         "initial_scrub": weight * length**2 / moment,
+        "initial_pivot": weight * height * (1 + (2 * d / length) ** 2) / load,
         "initial_drag_slip": contact.seal_friction(climber) * d / moment,
         "initial_weight_slip": weight * d / moment,
     }

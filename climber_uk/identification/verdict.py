@@ -35,6 +35,9 @@ USUAL = 1e-2  # [m/s], [rad/s]
 SAME = 1e-5  # [m], [rad] and of a value: odometry that agrees so well is made of the wheel angles
 MUCH = 0.05  # share of the drive that is unexplained, above which no parameter is determined
 OFF = 0.2  # difference of the torques at the wheels from those commanded, above which none is
+# of the speed: least difference of speeds that tells viscous friction from Coulomb's where wheels
+# scrub. What they drive is off by some percent between straights and bends, for which less will do
+SCRUBBED = 0.2
 OF_DRIVING = ("mass", "seal_friction_coefficient", "viscous_friction")
 OF_WHEELS = ("wheel_radius", "half_track")
 OF_TORQUES = (*OF_DRIVING, ROTORS, *OF_TURNING)
@@ -147,6 +150,10 @@ def _lumped(found: Identified) -> Iterator[tuple[str, Reason]]:
         (YAW, OF_TURNING[1:], "yaw rate", f"{found.turning_moment:.3g} N m"),
     )
     lacking = {lack.kind for lack in found.lacks if lack.size > 0}
+    extent, scrubs = found.extent, found.resisted[0] > found.resisted[1]
+    if scrubs and extent.speed_spread < SCRUBBED * extent.speed:
+        words = f"speeds hardly differ, of wheels that scrub: together {found.friction:.3g} N"
+        yield from ((name, Reason("absent", words)) for name in OF_DRIVING[1:])
     for kind, (coulomb, viscous), rate, together in groups:
         falls = found[viscous] < 0 and found.is_clear(viscous) and kind in lacking
         if falls or _is_surely_negative(found, viscous):

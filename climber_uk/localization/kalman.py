@@ -53,7 +53,11 @@ class Estimate:
         deviations[HEADING], deviations[BIAS] = o.initial_heading_deviation, o.gyro_bias_deviation
         deviations[SCALE], deviations[CREEP] = o.scale_deviation, o.creep_deviation
         deviations[models.FORCE_BIASES] = o.acceleration_bias_deviation
-        deviations[[SCRUB, PIVOT]] = o.scrub_deviation
+        deviations[SCRUB] = o.scrub_deviation
+        # the same forces make both: they are off by the same share
+        told = o.initial_scrub > 0 and o.initial_pivot > 0
+        share = o.initial_pivot / o.initial_scrub if told else 1.0
+        deviations[PIVOT] = share * o.scrub_deviation
         deviations[models.SLIPS] = o.slip_deviation if o.scrubs else 0.0
         pose = o.initial_x, o.initial_y, o.initial_heading
         scrub = o.initial_scrub, o.initial_pivot, o.initial_drag_slip, o.initial_weight_slip

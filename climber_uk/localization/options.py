@@ -49,7 +49,8 @@ class LocalizationOptions:
     scrub_deviation: float = parameter(
         0.0,
         "m",
-        "of how far wheels that scrub give way by an angle (λ, a); 0: they do not scrub",
+        "of how far wheels that scrub give way by an angle: λ, and a, by the same share of both if "
+        "they are told; 0: they do not scrub",
         at_least=0,
         plausible=(0.0, 1.0),
     )

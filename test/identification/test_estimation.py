@@ -300,6 +300,17 @@ def test_nearly_the_same_speed_is_no_reason_to_tell_one_friction_for_both():
         assert "speeds hardly differ: together 55" in told[name]["reason"]
 
 
+def test_what_scrubbing_wheels_drive_is_off_by_some_percent_and_that_is_no_viscous_friction():
+    speed = 0.3 + 0.05 * np.sin(TIME), 0.05 * np.cos(TIME)
+    lacking = 1.5 * np.sin(TIME), 0.0  # [N] of 50 N of friction
+    motion = moved(speed, lacking=lacking, scrub=30.0, effective=1.2, noise=1.0, wheels=True)
+    found = identify(motion, BELIEVED)
+    told = {row["parameter"]: row for row in rows(found, BELIEVED)}
+    for name in ("seal_friction_coefficient", "viscous_friction"):
+        assert not told[name]["known"], told[name]
+        assert "together 49" in told[name]["reason"]
+
+
 def test_a_moment_that_hides_the_inertia_is_told_all_the_same():
     round_and_round = 0.3 * TIME, 0.3 + 0 * TIME, 0 * TIME
     motion = moved(heading=round_and_round, scrub=30.0, effective=1.2, noise=1.0, wheels=True)

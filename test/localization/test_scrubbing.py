@@ -88,6 +88,14 @@ class Circles:
             self.too_fast = max(self.too_fast, motion.speed - speed)
 
 
+@pytest.mark.parametrize(("pivot", "deviation"), [(0.0, 0.04), (LEVER, 0.015)])  # of 0.08: half
+def test_a_pivot_that_is_told_is_as_uncertain_as_the_scrub_by_its_share(pivot, deviation):
+    told = {"scrub_deviation": 0.04, "initial_scrub": LAMBDA, "initial_pivot": pivot}
+    estimate = Localizer(LocalizationOptions(**told)).estimate
+    assert estimate.deviation(SCRUB) == pytest.approx(0.04)
+    assert estimate.deviation(PIVOT) == pytest.approx(deviation)
+
+
 def test_how_wheels_give_way_is_learnt_from_fixes_and_carries_through_a_time_without():
     circles = Circles(scrub_deviation=0.1).go_on(1, 0.0)
     for _ in range(3):
