@@ -14,8 +14,8 @@ from climber_uk.mechanics.quantities import Motion
 KEPT = SECOND  # [ns] for which a message is kept
 IN_A_ROW = 4  # messages that move and were told before in the same order, each with another pose
 
-# [m] by which it leaps back at least, as many times the root mean square of leaps before it, and
-# as old [s] as it is then at least: stamps may be a little off
+# [m] by which it leaps back at least, as many times the leaps of before (root mean square), and
+# [s] as old as it is then at least: stamps may be a little off
 BACK, SHARPLY, OLD = 0.02, 6.0, 0.05
 MEMORY = 0.5  # [s] of leaps
 
@@ -50,7 +50,8 @@ class RepeatCheck:
         """Notice a pose that leaps back by what it went in some time."""
         time, speed = (stamp - self._stamp) / SECOND, motion.speed
         gone = (motion.x - before.x) * motion.cosine + (motion.y - before.y) * motion.sine
-        back = math.copysign(1.0, speed) * (time * speed - gone)
+        went = time * (before.speed + speed) / 2
+        back = math.copysign(1.0, speed) * (went - gone)
         is_leap = back > max(BACK, SHARPLY * math.sqrt(self._leaps))
         self._leaps = max(math.exp(-time / MEMORY) * self._leaps, back * back)
         if not is_leap or abs(speed) < MOVES or time > LONGEST_STEP:

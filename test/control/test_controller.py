@@ -450,7 +450,7 @@ def test_enabling_forgives_what_the_guard_found(loop):
 
 def test_a_twist_is_compared_from_a_jump_on(loop):
     assert set(faster(loop, 1.8, 100)) == {Mode.FOLLOWING}
-    modes = faster(loop, 1.8, 60, moved=(1.0, 0.0, 0.0))
+    modes = faster(loop, 1.8, 60, moved=(-1.0, 0.0, 0.0))
     assert modes[0] is Mode.JUMPED
     assert set(modes) == {Mode.JUMPED, Mode.FOLLOWING}
 

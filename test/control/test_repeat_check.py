@@ -108,6 +108,17 @@ def test_noise_of_the_pose_is_no_leap(noise):
     assert not any(found([it._replace(x=it.x + x, y=it.y + y) for it, (x, y) in noisy]))
 
 
+@pytest.mark.parametrize("speeds", [(0.0, 0.5), (-0.3, 0.3), (1.0, 2.0)])
+def test_what_changes_its_speed_at_once_leaps_back_nowhere(speeds):
+    """At 5 Hz: from one message to the next it goes as far as both speeds tell."""
+    check, before, after = RepeatCheck(), *speeds
+    ways = np.cumsum([*5 * [0.2 * before], 0.1 * (before + after), *5 * [0.2 * after]])
+    for number, x in enumerate(ways):
+        speed = before if number < 5 else after
+        check.add(round(0.2 * number * SECOND), Motion.at(x, 0.0, 0.0, speed, 0.0), HALF_TRACK)
+        assert not check.older
+
+
 def test_what_a_fix_corrects_by_less_or_more_than_a_second_of_the_way_is_no_repetition():
     motions = [*driven(200, yaw_rate=0.0)]
     for corrected in (0.87 * BACK, 0.2113):
