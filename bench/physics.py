@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from climber_uk.closed_loop.simulate import Link, simulate
+from climber_uk.control.active_reference import ActiveReference
 from climber_uk.control.build import build_controller
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.trajectory import Trajectory
@@ -92,10 +93,11 @@ class Row(NamedTuple):
 
 
 class Watched:
-    """A robot whose turning and sagging are watched."""
+    """A robot whose turning and sagging are watched, and by how much its reference has waited."""
 
-    def __init__(self, robot: Any) -> None:
+    def __init__(self, robot: Any, reference: ActiveReference) -> None:
         self.robot, self.shown, self.side_slip = robot, list[float](), 0.0
+        self.reference, self.waited = reference, list[float]()  # [s]
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.robot, name)
@@ -103,6 +105,7 @@ class Watched:
     def measure(self) -> None:
         """Measure, and see what the wheels show."""
         self.robot.measure()
+        self.waited.append(self.reference.waited)
         state, climber = self.robot.state, self.robot.plant.climber
         self.side_slip = max(self.side_slip, abs(float(state.side_slip)))
         if abs(state.yaw_rate) > TURNING:
@@ -125,7 +128,7 @@ def run(robot: str, path: str, kind: Any) -> Row:
     robots: list[Watched] = []
 
     def make(_: Any, start: State, period: float) -> Any:
-        robots.append(Watched(kind(parts, start, period)))
+        robots.append(Watched(kind(parts, start, period), controller.active))
         return robots[-1]
 
     reference, (_, duration) = trajectory(path), PATHS[path]
@@ -137,8 +140,11 @@ def run(robot: str, path: str, kind: Any) -> Row:
     course = reference, start, duration, controller, parts.plant.climber, link
     driven = simulate(*course, robot_of=make)
     shown = float(np.median(robots[0].shown)) if robots[0].shown else float("nan")
-    most = 1e3 * float(driven.distance.max())
-    return Row(1e3 * driven.rms(), most, 1e3 * robots[0].side_slip, shown)
+    waited = np.array([*robots[0].waited, controller.active.waited])
+    wanted = reference.at(driven.time - waited).pose
+    distance = 1e3 * np.hypot(*(driven.pose - wanted)[:, :2].T)
+    rms, most = float(np.sqrt(np.mean(distance**2))), float(distance.max())
+    return Row(rms, most, 1e3 * robots[0].side_slip, shown)
 
 
 def both(robot: str, path: str) -> str:
