@@ -12,7 +12,7 @@ from climber_uk.mechanics.climber import Climber
 
 SLIDES = 0.01  # [m/s] from which it is known against what the seal rubs
 UNANSWERED = 5.0  # times as much the torque explains less than no torque at all
-LACKS = 0.4, 1.3  # of a wheel's torque that is missing all at once, if nothing of the other one's
+LACKS = 0.3, 1.3  # of a wheel's torque that is missing all at once, if nothing of the other one's
 LACKS_ELSE = 0.25  # of the same, is missing or too much there,
 LACKS_MOMENT = 0.5  # and of what is missing: what scrubs gives one what it takes from the other
 LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
