@@ -7,6 +7,8 @@ from climber_uk.bags.events import ERROR, Event
 from climber_uk.control.safety import Mode
 from climber_uk.report.metrics.metric import NAN, Case, Metric
 
+ARRIVED = 0.1  # [s] later than it was said, at most: of a line of the log only its arrival is known
+
 
 def following(case: Case) -> float:
     """Share of the time of which the mode is known [%]."""
@@ -48,7 +50,12 @@ def is_start_of(case: Case) -> Callable[[float, Event], bool]:
     """Whether an event, at a time [s], is that the clock was waited for until it followed."""
     follows = [t for t, e in case.run.events if e.kind == "mode" and e.text == Mode.FOLLOWING.value]
     first = min(follows, default=math.inf)
-    return lambda time, event: _waits_for_clock(event) and time <= first
+
+    def is_start(time: float, event: Event) -> bool:
+        arrived = ARRIVED if event.kind == "log" else 0.0
+        return _waits_for_clock(event) and time <= first + arrived
+
+    return is_start
 
 
 def _waits_for_clock(event: Event) -> bool:
