@@ -1,5 +1,6 @@
 """Every command in the documents is one that can be given: program, options, names and files."""
 
+import ast
 import importlib
 import re
 import shlex
@@ -127,6 +128,27 @@ def test_tests_are_there_and_k_finds_some(words):
     text = "\n".join(file.read_text() for file in inside if file.is_file())
     for word in set(sought.split()) - {"and", "or", "not"}:
         assert re.search(rf"def test_\w*{word}|id=.*{word}|\"[^\"]*{word}", text, re.IGNORECASE)
+
+
+def soak_alone(file):
+    """Whether each test of a file is one, by its name; not one whose rows are partly."""
+    tree = ast.parse(file.read_text())
+    marks = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign)]
+    whole = any(mark.startswith("pytestmark") and "mark.soak" in mark for mark in marks)
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            named = [ast.unparse(decorator) for decorator in node.decorator_list]
+            yield node.name, whole or any(it in ("pytest.mark.soak", "soak") for it in named)
+
+
+@of("pytest")
+def test_tests_that_are_soak_alone_are_asked_for_as_such(words):
+    sought = words[words.index("-k") + 1].lower() if "-k" in words else ""
+    files = [ROOT / word for word in words[1:] if word.endswith(".py")]
+    found = [
+        is_soak for f in files for name, is_soak in soak_alone(f) if not sought or sought in name
+    ]
+    assert "soak" in " ".join(words) or not found or not all(found)
 
 
 @of("climber.launch.py")

@@ -182,7 +182,7 @@ class Controller:
             return self.on_bad_odometry(now, f"stamp is {off:.2f} s from the clock, too far")
         if 0 < self._stamp - stamp <= round(timeout * SECOND):
             return None
-        was_older = self._repeats.older
+        was_older, repeated = self._repeats.older, self._repeats.repeated
         self._repeats.add(stamp, motion, self._law.climber.half_track)
         if older := self._repeats.older:
             return self.on_bad_odometry(now, f"it is back where it was {older:.2f} s ago")
@@ -195,8 +195,8 @@ class Controller:
                 self.estimator.reset()
                 self._watch_anew()
                 self._resumes = stamp + min(silent, LONGEST_SILENCE)
-                if was_older:  # and the rest of it comes as late
-                    self.estimator.acts_later(was_older)
+                if repeated:  # and the rest of it comes as late; a leap may be a correction
+                    self.estimator.acts_later(repeated)
             self._trouble = self._see(stamp, motion)
             self._stamp = stamp
         return self._answer(now)

@@ -34,7 +34,8 @@ class RepeatCheck:
         self._in_a_row = 0
         # [ns] of the last message, and until when it tells what was, by so much [s]; [m²] of leaps
         self._stamp, self._until, self._back_by, self._leaps = 0, 0, 0.0, 0.0
-        self.older = 0.0  # [s] than its stamp, where odometry repeats itself
+        self.older = 0.0  # [s] than its stamp, where odometry is back where it was
+        self.repeated = 0.0  # [s] the same, as far as it told that message by message
 
     def add(self, stamp: int, motion: Motion, half_track: float) -> None:
         """Take an odometry of `stamp` [ns]."""
@@ -43,8 +44,8 @@ class RepeatCheck:
             self._look_for_leaps(stamp, before, motion)
         self._stamp = stamp
         self._compare(stamp, before, motion, half_track)
-        if stamp < self._until:
-            self.older = max(self.older, self._back_by)
+        back_by = self._back_by if stamp < self._until else 0.0
+        self.older = max(self.repeated, back_by)
 
     def _look_for_leaps(self, stamp: int, before: Motion, motion: Motion) -> None:
         """Notice a pose that leaps back by what it went in some time."""
@@ -65,7 +66,7 @@ class RepeatCheck:
     ) -> None:
         """Notice what was told before, message by message."""
         if max(abs(motion.speed), half_track * abs(motion.yaw_rate)) < MOVES:
-            self._in_a_row, self.older = 0, 0.0
+            self._in_a_row, self.repeated = 0, 0.0
             return
         # a driver may tell the same more often than it knows anything new
         if before is not None and motion[:3] == before[:3]:
@@ -79,4 +80,4 @@ class RepeatCheck:
         self._back = back
         is_again = number > 0 and (self._in_a_row == 0 or back == before_that)
         self._in_a_row = self._in_a_row + 1 if is_again else 0
-        self.older = (stamp - told) / SECOND if self._in_a_row >= IN_A_ROW else 0.0
+        self.repeated = (stamp - told) / SECOND if self._in_a_row >= IN_A_ROW else 0.0

@@ -343,3 +343,15 @@ def test_odometry_that_goes_back_between_its_messages_stops_it(span, number, pla
     climb.run(2.5, odometry=every(number, between))
     assert climb.faulty_after(4.0) < 0.1
     assert_never_runs_away(climb, 4.0)
+
+
+@pytest.mark.parametrize("back", [0.025, pytest.param(0.03, marks=soak), 0.05])
+def test_one_correction_backwards_stops_nobody_for_good(back):
+    """As of a fix: it leaps as odometry does that goes back in time, but is no later then."""
+    climb = deepcopy(healthy("eight", 1))
+    heading = climb.state.pose[2]
+    off = -back * np.array([np.cos(heading), np.sin(heading), 0.0])
+    climb.run(5.0, odometry=lambda _, state: State(state.pose + off, state.velocity))
+    assert climb.controller.mode is Mode.FOLLOWING
+    assert abs(climb.controller.estimator.latency.delay) < 0.01
+    assert_never_runs_away(climb, 4.0)
