@@ -95,7 +95,8 @@ from climber_uk.ros import running
 running.LONGEST_START = 1
 def make_nodes():
     print("begins", flush=True)
-    time.sleep(1000.0)
+    while True:  # a signal just before one long sleep would be looked at after it
+        time.sleep(0.01)
 running.run(make_nodes, None)
 """
 
