@@ -59,10 +59,9 @@ $(VENV)/bench: $(TOOLS) bench/requirements.txt
 	$(PIP) --constraint requirements.txt --requirement bench/requirements.txt
 	touch $@
 
-## all that CI runs: lint and unit, at once, and then colcon
+## all that CI runs: unit, and beside it lint and then colcon
 test: $(TOOLS)
-	@$(MAKE) --no-print-directory --jobs 2 lint unit
-	@$(MAKE) --no-print-directory colcon
+	@$(MAKE) --no-print-directory --jobs 2 unit lint colcon
 
 ## ruff, mypy and the spelling
 lint: $(TOOLS)

@@ -8,7 +8,7 @@ from climber_uk.closed_loop import unicycle
 from climber_uk.closed_loop.unicycle import UnicycleModel
 from climber_uk.mechanics.quantities import Wrench
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.soak  # numba compiles for a quarter of a minute
 
 
 @pytest.fixture(scope="module")

@@ -129,6 +129,7 @@ def test_the_plant_passes_all_checks(world, clock, parameters, skipped):
     assert "is going to turn left, drive forward, back and turn right" in said
 
 
+@pytest.mark.soak
 def test_with_a_controller_in_lock_step_it_listens_and_refuses_to_move(world):
     slow = "control_period:=0.02"
     world.start_node("plant_simulator", *PACED, slow, config="climber.yaml")

@@ -109,6 +109,7 @@ def climber_bag(runs):
     return small_bag(runs, "climber.yaml", DURATION, SMALL | SLOW)
 
 
+@pytest.mark.soak  # without nodes: test/closed_loop/test_speed_motors.py
 def test_a_motor_board_that_takes_speeds_follows_and_does_not_hunt(runs, replay):
     """In steps of 1 mm/s, with a dead band of 20 mm/s: below it a wheel stands.
 

@@ -251,6 +251,7 @@ def test_in_lock_step_a_plant_whose_time_starts_again_is_brought_to_the_path(wor
     climb.is_on_path()
 
 
+@pytest.mark.soak  # of one from outside: test_operating.py
 def test_another_path_is_taken_up_from_where_the_climber_is(world):
     climb = Climb(world, LOCK_STEP)
     climb.is_under_way()

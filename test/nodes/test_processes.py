@@ -92,7 +92,7 @@ def gone(world, pids):
     [
         pytest.param(kill, False, marks=pytest.mark.soak),
         (kill, True),
-        (interrupt_twice, True),
+        pytest.param(interrupt_twice, True, marks=pytest.mark.soak),
         (close_the_terminal, False),
     ],
     ids=["kill-alone", "kill-under make", "interrupt_twice-under make", "close_the_terminal-alone"],
@@ -124,6 +124,7 @@ def test_a_demo_that_is_ended_before_it_began_leaves_nothing(world, start, tmp_p
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.soak  # 40 s
 def test_a_demo_does_not_wait_long_for_a_node_that_does_not_end_once_it_is_told_twice(
     world, start, tmp_path
 ):

@@ -304,7 +304,7 @@ BALANCES = {
     "tilted": Plant(PAPER, FINE, wall=Plane(tilt=30.0)),
     "gripping": Plant(PAPER, FINE, Contact(grip=Grip(100.0)), slip=True),
 }
-OFTEN = "lugre", "pipe", "gripping"  # the others for soak
+OFTEN = "lugre", "gripping"  # the others for soak
 
 
 def friction_power(plant, state):
