@@ -38,7 +38,9 @@ def call(command: Sequence[str | Path]) -> int:
     before = {number: signal.getsignal(number) for number in END}
     on_end(lambda number, _: process.send_signal(number))
     try:
-        return process.wait()
+        while (status := process.poll()) is None:
+            time.sleep(0.05)  # a signal just before one long wait would be passed on after it
+        return status
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
