@@ -20,13 +20,16 @@ OURS = {
     for script in entry_points(group="console_scripts")
     if script.value.startswith("climber_uk.")
 }
-# what each `main` does with some arguments, each in turn: its status and its output; all in one
-# process, as most of a start is imports
+# what each `main` does with some arguments, each in turn: its status and its output; what they
+# import once for all, as that is most of a start; each forked, as a node has its process end soon
 TRY = """
-import contextlib, importlib, io, json, sys
+import contextlib, importlib, io, json, os, sys
 modules, *tries = sys.argv[1:]
-for name, module in json.loads(modules).items():
-    main = importlib.import_module(module).main
+mains = {name: importlib.import_module(of).main for name, of in json.loads(modules).items()}
+for name, main in mains.items():
+    if os.fork():
+        os.wait()
+        continue
     for word in tries:
         sys.argv = [name, word]
         out, err = io.StringIO(), io.StringIO()
@@ -35,7 +38,8 @@ for name, module in json.loads(modules).items():
                 status = main()
             except SystemExit as end:
                 status = end.code
-        print(json.dumps([status, out.getvalue(), err.getvalue()]))
+        print(json.dumps([status, out.getvalue(), err.getvalue()]), flush=True)
+    os._exit(0)
 """
 SILENT = {
     *("trajectory_publisher", "uk_torque_controller", "plant_simulator", "markers", "check_driver"),
