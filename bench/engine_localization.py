@@ -65,7 +65,9 @@ class EngineLoop(Loop):
         plant = {**read_file(file, f"/{PLANT}"), **more}
         parts = plant_parts.parts(Values({**plant, **unseen}))
         known = scrubs(plant_parts.parts(Values(plant))) if told == SCRUBS else {}
-        self.controller = build_controller(Values(read_file(file, f"/{CONTROLLER}")), None)
+        source = {} if is_told or told != SCRUBS else {"observer.side_slip_source": "odometry"}
+        given = {**read_file(file, f"/{CONTROLLER}"), **source}
+        self.controller = build_controller(Values(given), None)
         self.trajectory = trajectory(path)
         start = State(self.trajectory.at(0.0).pose, np.zeros(3))
         self.robot = MujocoClimber(parts, start, period)

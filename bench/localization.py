@@ -167,7 +167,7 @@ class Loop:
                 if case.rests:
                     continue
                 motion = self.robot.state.motion if case.believes_truth else located.motion
-                answer = self.controller.on_odometry(stamp, stamp, motion)
+                answer = self.controller.on_odometry(stamp, stamp, motion, located.aside)
                 if answer is not None:
                     self.torques = answer.torques
                 if self.controller.mode.is_fault and not self.record.fault:

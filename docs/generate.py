@@ -59,7 +59,7 @@ EVERY_NODE = (
 )
 
 CONTENTS = {
-    topics.ODOMETRY: "pose in `odom`, twist in `base_link`: forward, to the left (0), about z",
+    topics.ODOMETRY: "pose in `odom`, twist in `base_link`: forward, to the left, about z",
     topics.REFERENCE_TIME: "where on the reference the climber is (`time_ref`) at an odometry's "
     "stamp; `source`: the controller's mode",
     topics.REFERENCE: "the next second: per point pose, velocity and acceleration, in `odom`; the "

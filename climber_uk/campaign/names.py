@@ -45,6 +45,7 @@ REQUIRED = {
     f"{CONTROLLER}.least_suction.enabled": False,
     f"{CONTROLLER}.motors": "torque",
     f"{CONTROLLER}.observer.velocity_source": "odometry",
+    f"{CONTROLLER}.observer.side_slip_source": "pose",
     f"{PLANT}.friction": "coulomb",
     f"{PLANT}.adhesion": "suction",
     f"{PLANT}.locomotion": "wheeled",

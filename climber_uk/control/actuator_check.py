@@ -17,6 +17,7 @@ LACKS_ELSE = 0.25  # of the same, is missing or too much there,
 LACKS_MOMENT = 0.5  # and of what is missing: what scrubs gives one what it takes from the other
 LACKS_FROM = 0.3  # of the largest torque, that a wheel has to be asked for
 LACKS_IN_A_ROW = 3  # odometry messages
+STANDS_OUT = 100.0  # sum of their squares, by the mean square of what was missing before
 WENT, GOES, STANDS = 0.05, 0.01, 1e-3  # [m/s] of a rim: before, of the other one, of this one
 ASKED = 0.02  # [m/s] of a rim that is not to stand: of one that turns back all tell a little else
 ASKED_SHARE = 0.5  # of the speed at which the other one goes, which is enough where that is less
@@ -55,6 +56,8 @@ class Wheel:
         self.asked, self.acted, self.unexplained = Variance(), Variance(), Variance()
         self.force = self.missing = 0.0  # [N] that was asked for last, and what of it did not act
         self.lacking = 0  # odometry messages in a row, for which it was
+        self._lacked = self._usual = 0.0  # [N²] sum of squares in these; mean square before them
+        self._weight = 0.0
 
     def add(self, asked: float, acted: float, known: float, weight: float) -> None:
         """Add the force [N] that a torque should cause, the one that acted, and a known one."""
@@ -62,16 +65,25 @@ class Wheel:
         self.acted.add(acted, weight)
         self.unexplained.add(acted - asked, weight)
         self.force, self.missing = asked, asked + known - acted
+        self._weight = max(weight, 1 / self.asked.number)
 
     def lacks(self, other: "Wheel", largest: float) -> bool:
-        """Whether its force is missing all at once, of `largest` [N], and only its force."""
+        """Whether its force is missing all at once, of `largest` [N], and only its force.
+
+        What is missing has to stand out of what was before, of wheels that scrub and noise.
+        """
         force = abs(self.force)
         missing = math.copysign(1.0, self.force) * self.missing
         least, most = LACKS
         is_missing = force > LACKS_FROM * largest and least * force < missing < most * force
         alone = abs(other.missing) < min(LACKS_ELSE * force, LACKS_MOMENT * missing)
-        self.lacking = self.lacking + 1 if is_missing and alone else 0
-        return self.lacking >= LACKS_IN_A_ROW
+        square = missing * missing
+        if is_missing and alone:
+            self.lacking, self._lacked = self.lacking + 1, self._lacked + square
+        else:
+            self.lacking, self._lacked = 0, 0.0
+            self._usual += self._weight * (square - self._usual)
+        return self.lacking >= LACKS_IN_A_ROW and self._lacked > STANDS_OUT * self._usual
 
     def answers(self, other: "Wheel", largest: float, proof: float) -> bool:
         """Whether it does, or too little was asked of it to know; of `largest` [N] at most."""

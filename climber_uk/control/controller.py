@@ -168,8 +168,13 @@ class Controller:
 
     # What comes in
 
-    def on_odometry(self, now: int, stamp: int, motion: Motion) -> Answer | None:
-        """Answer an odometry; None while a reference is waited for, or if a newer one was here."""
+    def on_odometry(
+        self, now: int, stamp: int, motion: Motion, aside: float = 0.0
+    ) -> Answer | None:
+        """Answer an odometry; None while a reference is waited for, or if a newer one was here.
+
+        `aside` is the speed [m/s] to the left that it tells: `observer.side_slip_source`.
+        """
         self._look_at_clock(now)
         # a simulation publishes its first odometry right before its first /clock: how long there
         # was no clock until then does not count
@@ -197,7 +202,7 @@ class Controller:
                 self._resumes = stamp + min(silent, LONGEST_SILENCE)
                 if repeated:  # and the rest of it comes as late; a leap may be a correction
                     self.estimator.acts_later(repeated)
-            self._trouble = self._see(stamp, motion)
+            self._trouble = self._see(stamp, motion, aside)
             self._stamp = stamp
         return self._answer(now)
 
@@ -245,10 +250,10 @@ class Controller:
 
     # 1. What an odometry tells, and whether that is possible
 
-    def _see(self, stamp: int, motion: Motion) -> Trouble | None:
+    def _see(self, stamp: int, motion: Motion, aside: float) -> Trouble | None:
         """Take in an odometry; return what is wrong with it."""
         is_first = self.estimator.motion is None
-        observed = self.estimator.see(stamp, motion)
+        observed = self.estimator.see(stamp, motion, aside)
         self._safe_output.watch(self._law.climber, observed, motion)
         self.stops.move(self.estimator.motion if observed or is_first else None)
         if observed is None and not is_first:

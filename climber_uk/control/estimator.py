@@ -21,7 +21,7 @@ from climber_uk.control.model import (
 )
 from climber_uk.control.observed import Acting, Observed
 from climber_uk.control.safety import Safety
-from climber_uk.control.side_slip import NO_SLIP
+from climber_uk.control.side_slip import NO_SLIP, shown
 from climber_uk.control.timing import (
     LONGEST_DELAY,
     LONGEST_STEP,
@@ -135,9 +135,10 @@ class Estimator:
         moment = learnt.moment - self._turn * learnt.turning
         return Wrench(learnt.force - self._direction * learnt.friction, moment)
 
-    def see(self, stamp: int, motion: Motion) -> Observed | None:
+    def see(self, stamp: int, motion: Motion, aside: float = 0.0) -> Observed | None:
         """Correct state and disturbance by an odometry of `stamp` [ns], newer than the last.
 
+        `aside` is the speed [m/s] to the left that it tells, which counts only where it is to.
         Returns what it tells of the time since the last; None for the first, and after a jump.
         """
         before, has_twist = self.motion, self.observer.velocity_source == "odometry"
@@ -148,6 +149,7 @@ class Estimator:
                 motion = motion._replace(speed=expected.speed, yaw_rate=expected.yaw_rate)
             safety = self.safety
             if safety is None or not safety.has_jumped(expected, motion, self.climber.half_track):
+                self._learn_slip(motion, aside, (stamp - self.stamp) / SECOND)
                 return self._correct(stamp, before, acted, expected, motion)
             self.reset()
         self.stamp = stamp
@@ -261,12 +263,6 @@ class Estimator:
             before, motion, time, acted, self.disturbance, reaction, pull, self._turning
         )
         has_twist = self.observer.velocity_source == "odometry" and isinstance(motion.x, float)
-        bandwidth = self.observer.side_slip_bandwidth
-        # speeds that come from poses share their noise, which would be learnt
-        if self._last_pose is not None and has_twist and bandwidth > 0:
-            poses = self._last_pose, motion
-            self.slip = self.slip.learnt(self.climber, *poses, time, bandwidth, self.wall)
-        self._last_pose = motion
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)
         self._period_is_measured = True
@@ -292,6 +288,19 @@ class Estimator:
                 learnt = chosen(self._learning, learnt, self.learnt.without_rates)
             self.learnt = learnt
         return observed
+
+    def _learn_slip(self, motion: Motion, aside: float, time: float) -> None:
+        """Learn how wheels give way, of poses `time` [s] apart, or a speed `aside` [m/s] told."""
+        observer, before = self.observer, self._last_pose
+        self._last_pose = motion
+        # speeds that come from poses share their noise, which would be learnt
+        has_twist = observer.velocity_source == "odometry" and isinstance(motion.x, float)
+        bandwidth = observer.side_slip_bandwidth
+        if before is None or not has_twist or bandwidth == 0:
+            return
+        if observer.side_slip_source == "pose":
+            aside = shown(before, motion, time)
+        self.slip = self.slip.learnt(self.climber, motion, aside, time, bandwidth, self.wall)
 
     def _at_its_stamp(self, before: Motion, expected: Motion, now: Motion, time: float) -> Motion:
         """Motion whose speeds are those of its stamp, not the mean of the `time` [s] before."""

@@ -200,6 +200,13 @@ class Observer:
         at_least=0,
         runtime=True,
     )
+    side_slip_source: str = parameter(
+        "pose",
+        "",
+        "what it is learnt from; odometry: from `twist.linear.y`, of wall_odometry whose wheels "
+        "scrub, as its poses have the noise of fixes",
+        choices=("odometry", "pose"),
+    )
     pose_bandwidth: float = parameter(
         60.0, "1/s", "of the filter that takes speeds from poses", above=0, runtime=True
     )

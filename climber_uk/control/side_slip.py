@@ -136,22 +136,16 @@ class SideSlip(NamedTuple):
     def learnt(
         self,
         climber: Climber,
-        before: Motion,
         now: Motion,
+        aside: float,
         time: float,
         bandwidth: float,
         wall: Wall | None = None,
     ) -> "SideSlip":
-        """As two odometry messages teach, `time` [s] apart; with both poles at a bandwidth [1/s].
+        """As v_y [m/s] to a side teaches, for a `time` [s]; with both poles at a bandwidth [1/s].
 
         It is the likeliest change of the parts that explains it, as a Kalman filter finds it.
         """
-        cosine, sine = (before.cosine + now.cosine) / 2, (before.sine + now.sine) / 2
-        aside = ((now.y - before.y) * cosine - (now.x - before.x) * sine) / time
-        mean, rate = (before.speed + now.speed) / 2, (before.yaw_rate + now.yaw_rate) / 2
-        # an arc that is driven ever faster, or bends ever more, is not even about its middle
-        faster, tighter = now.speed - before.speed, now.yaw_rate - before.yaw_rate
-        aside -= time / 12 * (rate * faster - mean * tighter)
         v, scrubbing, shifting = _rates(climber, now, wall)
         error = aside - self.creep * v - self.scrub * scrubbing - self.pivot * shifting
         by_creep, by_scrub, by_pivot = by = self.covariance.times(v, scrubbing, shifting)
@@ -214,6 +208,16 @@ class SideSlip(NamedTuple):
         reaction, uphill = _pulls(climber, there, wall)
         lever = way * self.scrub * reaction - self.pivot * uphill
         return clipped(_fade(v) * lever, -MOST_LEAD, MOST_LEAD)
+
+
+def shown(before: Motion, now: Motion, time: float) -> float:
+    """v_y [m/s] that the poses of two odometry messages show, `time` [s] apart."""
+    cosine, sine = (before.cosine + now.cosine) / 2, (before.sine + now.sine) / 2
+    aside = ((now.y - before.y) * cosine - (now.x - before.x) * sine) / time
+    mean, rate = (before.speed + now.speed) / 2, (before.yaw_rate + now.yaw_rate) / 2
+    # an arc that is driven ever faster, or bends ever more, is not even about its middle
+    faster, tighter = now.speed - before.speed, now.yaw_rate - before.yaw_rate
+    return aside - time / 12 * (rate * faster - mean * tighter)
 
 
 def _fade(speed: float) -> float:

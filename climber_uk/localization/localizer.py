@@ -49,6 +49,7 @@ class Located(NamedTuple):
     motion: Motion
     pose_covariance: Array  # (3, 3) of x, y, θ
     twist_variances: tuple[float, float]  # of speed and yaw rate
+    aside: float = 0.0  # [m/s] to the left, at which wheels that scrub give way
 
 
 class Counts(NamedTuple):
@@ -82,6 +83,7 @@ class Localizer:
         self._disagrees = 0.0  # [s]
         self._is_first = False  # whether gravity's first samples tell the heading, each anew
         self._scrubbing = Scrubbing()
+        self._aside = 0.0  # [m/s] u
         self._output = OutputSpeed(options.output_frequency, options.scrubs)
 
     @property
@@ -156,6 +158,7 @@ class Localizer:
         aside = 0.0
         if self.options.scrubs:
             travel, rolled, aside = self._scrubbed(rolled, travel, forwards)
+        self._aside = aside
         weight = self.imu.weight(rolled, yaw_rate, aside) if is_gyro else None
         if self._scrubbing.breaks_away:
             weight = None
@@ -292,4 +295,5 @@ class Localizer:
             Motion.at(x, y, heading, speed, yaw_rate),
             self.estimate.covariance[:3, :3] + np.outer(offset, offset),
             ((speed * scale) ** 2 + SPEED_NOISE**2, bias**2 + self.options.gyro_noise**2 / DELAY),
+            self._aside,
         )

@@ -31,7 +31,7 @@ SIZE = 12
 ASIDE, SLIPS = [SCRUB, PIVOT], [DRAG_SLIP, WEIGHT_SLIP]
 FORCE_BIASES = [FORWARD_BIAS, LEFT_BIAS]
 # [s] twice for how long slip is by a chance off its share, times the square of how much of T
-SCATTERS = 0.006
+SCATTERS = 0.02
 
 
 class Travel(NamedTuple):

@@ -214,7 +214,7 @@ class UkTorqueController(ManagedNode):
         elif abs(fields.z - self.first_z) > OFF_WALL:
             detail = f"{self.first_z:.3g} to {fields.z:.3g} m; x and y are to be along the wall"
             self.report(ODOMETRY, "position.z changes", detail, is_fault=False)
-        self.publish(self.controller.on_odometry(self.now(), fields.stamp, motion))
+        self.publish(self.controller.on_odometry(self.now(), fields.stamp, motion, fields.v_y))
 
     def on_reference(self, serialized: bytes) -> None:
         """Check and keep a reference; answer an odometry that waits for it."""

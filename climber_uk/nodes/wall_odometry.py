@@ -161,7 +161,7 @@ class WallOdometry(ClimberNode):
         twist = np.diag([speed_variance, speed_variance, yaw_variance])
         self.odometry.publish(
             located.stamp,
-            *(x, y, math.sin(heading / 2), math.cos(heading / 2), speed, 0.0, yaw_rate),
+            *(x, y, math.sin(heading / 2), math.cos(heading / 2), speed, located.aside, yaw_rate),
             writing.planar_covariance(located.pose_covariance),
             writing.planar_covariance(twist),
         )

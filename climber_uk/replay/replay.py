@@ -134,10 +134,11 @@ class Replay:
         try:
             with of_its_type():
                 motion = reading.motion(message, self.names.odom_frame, self.names.base_frame)
+                aside = message.twist.twist.linear.y
         except ValueError as error:
             self.record(self.controller.on_bad_odometry(self.clock, str(error)))
             return
-        self.record(self.controller.on_odometry(self.clock, stamp, motion))
+        self.record(self.controller.on_odometry(self.clock, stamp, motion, aside))
 
     def on_reference(self, _: int, message: Any) -> None:
         """Pass on a reference, unless the node refuses such a one."""

@@ -30,7 +30,7 @@ def as_it_is(_, value):
 class Climb:
     """Odometry every 5 ms, torques that act at once; what spoils either is given by the time.
 
-    `truth` makes the true climber from the one that is believed in.
+    `truth` makes the true climber from the one that is believed in; `scrubs` may be its contact.
     """
 
     def __init__(
@@ -47,7 +47,9 @@ class Climb:
         given = {**read_file(CONFIG, "/uk_torque_controller"), **parameters}
         self.controller = build_controller(Values(given), None)
         climber = replace(truth(self.controller.law.climber), max_wheel_torque=100.0)
-        self.plant = Plant(climber, STEP, **({"contact": SCRUB, "slip": True} if scrubs else {}))
+        contact = scrubs if isinstance(scrubs, Contact) else SCRUB
+        slips = {"contact": contact, "slip": True} if scrubs else {}
+        self.plant = Plant(climber, STEP, **slips)
         reference = self.trajectory.at(0.0)
         self.state = State(reference.pose + np.array(offset), reference.velocity)
         self.time, self.torques = 0.0, np.zeros(2)

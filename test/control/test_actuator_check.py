@@ -1,5 +1,10 @@
 """What is no dead wheel: numbers of healthy climbers that were stopped as if they had one."""
 
+import math
+
+import numpy as np
+import pytest
+
 from climber_uk.control.actuator_check import (
     ASKED,
     LACKS_IN_A_ROW,
@@ -52,3 +57,34 @@ def test_a_moment_of_scrubbing_wheels_is_not_taken_for_a_dead_one():
     assert not lacks(-20.0, 14.0)
     assert lacks(-62.0, 14.0)
     assert lacks(-20.0, 5.0)
+
+
+def named_at(noise, share=0.0, since=math.inf, messages=2000, seed=1):
+    """Message at which a wheel is named, of which a share of its force is missing since one.
+
+    It is asked for 56 N of 148 N. What else does not act, beside the force, is noise of so much
+    RMS [N] that lasts 17 ms, half as much at the other wheel; a message each 5 ms.
+    """
+    kept, weight = math.exp(-0.005 / 0.017), 1 - math.exp(-0.005 / 0.15)
+    chance = np.random.default_rng(seed).normal(size=(messages, 2))
+    wheel, other, off = Wheel(), Wheel(), np.zeros(2)
+    for number in range(messages):
+        off = kept * off + noise * math.sqrt(1 - kept * kept) * chance[number] * [1.0, 0.5]
+        acts = 56.0 * (1 - share * (number >= since)) + off[0]
+        wheel.add(56.0, acts, 0.0, weight)
+        other.add(104.0, 104.0 + off[1], 0.0, weight)
+        if wheel.lacks(other, LARGEST):
+            return number
+    return None
+
+
+@pytest.mark.parametrize("noise", [6.0, 9.0])
+def test_a_force_that_fluctuates_is_none_that_is_missing_all_at_once(noise):
+    """As of four wheels that scrub with all their torque, with odometry by an IMU."""
+    assert named_at(noise) is None
+
+
+@pytest.mark.parametrize(("noise", "share"), [(0.0, 0.4), (3.0, 0.5), (6.0, 0.5), (6.0, 1.0)])
+def test_a_force_that_is_missing_all_at_once_stands_out_of_what_fluctuates(noise, share):
+    found = [named_at(noise, share, 400, 500, seed) for seed in range(4)]
+    assert all(number is not None and 400 < number < 407 for number in found)

@@ -13,7 +13,7 @@ from climber_uk.control.guard import Guard, GuardOptions
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Suction
-from climber_uk.mechanics.contact import Contact
+from climber_uk.mechanics.contact import Contact, Tracked
 from climber_uk.mechanics.friction import Stribeck
 from climber_uk.mechanics.quantities import State
 from climber_uk.simulation.plant import Plant
@@ -122,6 +122,37 @@ def test_a_motor_with_part_of_its_torque_lets_nothing_run_away(scrubs, side, sha
     print(f"{climb.fastest(since):.2f} m/s, {climb.off_the_path(since):.3f} m, {', '.join(faults)}")
     assert climb.fastest(since) < 1.5 * climb.reference_speed + 0.1
     assert climb.off_the_path(since) < 0.05
+
+
+RAMPS = {"time_law": "rest_to_rest", "rest_to_rest.ramp_time": 2.0}
+BENDS = {
+    "circle": {**RAMPS, "shape": "circle", "circle.radius": 0.5, "rest_to_rest.rate": 0.4},
+    "sine": {
+        **RAMPS,
+        "shape": "sine_wave",
+        "sine_wave.length": 2.0,
+        "sine_wave.amplitude": 0.2,
+        "sine_wave.wavelength": 1.0,
+        "rest_to_rest.rate": 0.15,
+    },
+}
+
+
+@soak
+@pytest.mark.parametrize(
+    ("path", "scrub", "length", "friction", "mass"),
+    [
+        ("circle", 0.85, 0.73, 0.81, 0.95),
+        ("sine", 0.9, 0.73, 0.75, 1.12),
+    ],
+)
+def test_a_climber_that_needs_most_of_its_torque_for_its_turns_is_not_stopped(
+    path, scrub, length, friction, mass
+):
+    contact = Contact(locomotion=Tracked(scrub_friction_coefficient=scrub, length=length))
+    climb = Climb(planner=BENDS[path], scrubs=contact, truth=Odd(friction, mass).true).run(8.0)
+    assert not climb.controller.guard.faults
+    assert np.quantile(np.abs(climb.sent).max(axis=1), 0.9) > 0.7 * LIMIT
 
 
 def test_a_dead_wheel_is_named_and_waits_for_somebody():

@@ -13,11 +13,13 @@ from climber_uk.control.active_reference import KEPT_BEHIND
 from climber_uk.control.approach import ANYWHERE
 from climber_uk.control.control_law import ControlInput, ControlLaw, ControlOptions
 from climber_uk.control.controller import Controller, Settings
+from climber_uk.control.estimator import Estimator
 from climber_uk.control.exact import Exact
 from climber_uk.control.guidance import Guidance
 from climber_uk.control.model import DisturbanceEstimate, Observer, predict
 from climber_uk.control.safety import Mode
-from climber_uk.control.side_slip import Course, SideSlip, _ahead
+from climber_uk.control.side_slip import Course, SideSlip, _ahead, shown
+from climber_uk.control.timing import Timing
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.quantities import Motion, ReferencePoint, State, Torques, Wrench
@@ -259,8 +261,20 @@ def test_to_its_constraints_a_climber_that_turns_otherwise_has_wheels_that_hold(
 
     before, after = seen(0.0), seen(step)
     speed = before.speed * before.cosine, before.speed * before.sine
-    shown = (after.x - before.x) / step, (after.y - before.y) / step
-    assert shown == pytest.approx(speed, abs=1.1 * wanted * abs(lever * off) + 1e-5)
+    went = (after.x - before.x) / step, (after.y - before.y) / step
+    assert went == pytest.approx(speed, abs=1.1 * wanted * abs(lever * off) + 1e-5)
+
+
+@pytest.mark.parametrize(("source", "learnt"), [("odometry", 0.01), ("pose", 0.0)])
+def test_a_side_slip_that_odometry_tells_counts_where_it_is_to(source, learnt):
+    """Its poses show none."""
+    observer = Observer(side_slip_source=source)
+    estimator = Estimator(CLIMBER, observer, Timing(control_period=PERIOD))
+    for number in range(400):
+        now = Motion.at(0.2 * PERIOD * number, 0.0, 0.0, 0.2, 0.0)
+        estimator.see(SECOND + round(number * PERIOD * SECOND), now, 0.01)
+        estimator.sent(estimator.stamp, Torques(0.0, 0.0))
+    assert estimator.slip.speed(CLIMBER, now) == pytest.approx(learnt, abs=1e-4)
 
 
 @given(st.floats(-0.5, 0.5))
@@ -271,7 +285,7 @@ def test_a_pose_that_jumps_is_hardly_a_side_slip(jump):
         way = 0.2 * PERIOD * number
         x, y = way * np.cos(0.3) - jump * np.sin(0.3), way * np.sin(0.3) + jump * np.cos(0.3)
         now = Motion.at(float(x), float(y), 0.3, 0.2, 0.0)
-        slip, before = slip.learnt(CLIMBER, before, now, PERIOD, 6.0), now
+        slip, before = slip.learnt(CLIMBER, now, shown(before, now, PERIOD), PERIOD, 6.0), now
         assert abs(slip.creep) < 0.2
     assert abs(slip.creep) < 0.01
 
@@ -314,7 +328,8 @@ def test_on_a_tilted_wall_it_slips_as_upright_on_one_that_is_not(
             ]
         )
         end = Motion.at(float(x), float(y), heading + turned + omega * PERIOD, v + v_1, omega)
-        slip = SideSlip(scrub=0.1).learnt(CLIMBER, before, end, PERIOD, 6.0, wall)
+        moved = shown(before, end, PERIOD)
+        slip = SideSlip(scrub=0.1).learnt(CLIMBER, end, moved, PERIOD, 6.0, wall)
         speeds = v * np.cos(heading + turned), v * np.sin(heading + turned)
         point = ReferencePoint(0.0, 0.0, heading + turned, *speeds, omega, *np.zeros(5).tolist())
         course = slip.course(CLIMBER, point, lambda _: point, wall)
@@ -361,7 +376,7 @@ def test_an_arc_on_wheels_that_hold_shows_no_side_slip(v, v_1, omega, omega_1, t
     x, y = float(way @ np.cos(heading)), float(way @ np.sin(heading))
     end = 0.3 + omega * time + omega_1 * time**2 / 2
     now = Motion.at(x, y, end, v + v_1 * time, omega + omega_1 * time)
-    learnt = SideSlip().learnt(CLIMBER, before, now, time, 1.0)
+    learnt = SideSlip().learnt(CLIMBER, now, shown(before, now, time), time, 1.0)
     turned = abs(omega) * time + abs(omega_1) * time**2
     assert abs(learnt.offset) <= 1e-9 + (abs(v) + abs(v_1) * time) * time * turned**3
 

@@ -43,7 +43,7 @@ class Circles:
         self.localizer, self.random = Localizer(self.options), np.random.default_rng(0)
         self.pose, self.angles, self.now = np.array([0.0, 0.0, 0.3]), np.zeros(2), 0.0
         self.speed = self.yaw_rate = 0.0
-        self.off, self.too_fast = 0.0, 0.0
+        self.off, self.too_fast, self.aside_off = 0.0, 0.0, 0.0
 
     def go_on(self, duration, yaw_rate, fixes=True, spin=0.0):
         """Speeds change within 0.5 s; wheels turn faster by a `spin` [m/s] for the first 0.3 s."""
@@ -86,6 +86,7 @@ class Circles:
             motion = located.motion
             self.off = math.hypot(motion.x - self.pose[0], motion.y - self.pose[1])
             self.too_fast = max(self.too_fast, motion.speed - speed)
+            self.aside_off = max(self.aside_off, abs(located.aside - side))
 
 
 @pytest.mark.parametrize(("pivot", "deviation"), [(0.0, 0.04), (LEVER, 0.015)])  # of 0.08: half
@@ -125,6 +126,7 @@ def test_what_an_earlier_run_has_told_of_it_needs_no_fixes():
     circles = Circles(**told).go_on(1, 0.0, fixes=False)
     circles.go_on(6, YAW_RATE, fixes=False).go_on(6, -YAW_RATE, fixes=False)
     assert circles.off < 0.01
+    assert circles.aside_off < 0.008  # [m/s] of 32 mm/s, as its turn goes through a low-pass
     plain = Circles().go_on(1, 0.0, fixes=False)
     plain.go_on(6, YAW_RATE, fixes=False).go_on(6, -YAW_RATE, fixes=False)
     assert plain.off > 0.1
