@@ -1,10 +1,11 @@
 """Wheels that give way sideways: by how much, learnt from poses, and the course that is left.
 
-    v_y = ρ |v| - λ |ω| Y / (m g) + p ω X / (m g)
+    v_y = ρ |v| - λ |ω| (Y + f v_y / V) / (m g) + p ω X / (m g)
 
-    Y = m v ω + m g_t cosθ, what the wheels take to the left        X = m g_t sinθ
+    Y = m v ω + m g_t cosθ, what pulls to the right        X = m g_t sinθ        V = √(v² + v_y²)
 
-on a plane; on a wall that is told, with the weight as it pulls there.
+on a plane; on a wall that is told, with the weight as it pulls there. The wheels take what the drag
+of the seal, f, leaves of Y: it acts against the whole of the motion.
 
 ρ is creep. λ is what scrubbing wheels lack: a contact that is dragged round holds sideways like
 something viscous, and gives way the more, the faster it is dragged (docs/theory.md, §8.5). p is by
@@ -26,17 +27,16 @@ LARGEST = 10.0  # times as large as that, at most
 FORGOTTEN = 10.0  # [s] in which what is known of them is known no more
 FADE_SPEED = 0.02  # [m/s] of a reference below which its course is its heading
 SLOW_TO_LEARN = 0.05  # [m/s] below which poses tell less and less of ρ
-MOST_LEAD = 0.7  # [s]
-# [s] of the reference behind and ahead that are looked at. They have come in any case: if more
-# counted where it happens to be there, a run would not repeat itself
-HINDSIGHT, FORESIGHT = 1.0, 0.7
+HINDSIGHT = 1.0  # [s] of the reference behind that is looked at
 FASTEST = 0.4  # B T, at most
 NEGLIGIBLE = 1e-5  # [rad] of a course off its heading
 REACH, NEAREST = 5.0, 0.035  # times T, and [s]: what is further off counts for nothing
-STEPS = 7  # in which that is gone through
+STEPS = 7  # a second, in which that is gone through, and at least
 PASSES = 3
 SHORTEST_LEAD = 1e-9  # [s]
 CLEARLY_TURNS = 0.1  # [rad/s]
+STILL = 1e-3  # [m/s] below which a seal's drag has no direction
+NEWTON = 4  # steps to v_y, each nearer from below
 At = Callable[[float], ReferencePoint]
 
 
@@ -130,8 +130,27 @@ class SideSlip(NamedTuple):
 
     def speed(self, climber: Climber, motion: Motion, wall: Wall | None = None) -> float:
         """v_y [m/s] of a climber in `motion`."""
-        v, scrubbing, shifting = _rates(climber, motion, wall)
-        return self.creep * v + self.scrub * scrubbing + self.pivot * shifting
+        return self._shown(climber, motion, wall)[0]
+
+    def _shown(
+        self, climber: Climber, motion: Motion, wall: Wall | None
+    ) -> tuple[float, tuple[float, float, float]]:
+        """v_y [m/s], by Newton's method, and its derivatives by ρ [m/s], λ and p [rad/s]."""
+        v, scrubbing, shifting = parts = _rates(climber, motion, wall)
+        freely = self.creep * v + self.scrub * scrubbing + self.pivot * shifting
+        dragged = _seal(climber) * abs(motion.yaw_rate)
+        held = self.scrub * dragged  # [m/s]
+        if held == 0.0:
+            return freely, parts
+        size, along = abs(freely), v * v + STILL * STILL
+        slip = max(size / (1 + held / math.sqrt(along)), size - held)  # is too small
+        for _ in range(NEWTON):
+            speed = math.sqrt(along + slip * slip)
+            yields = 1 / (1 + held * along / speed**3)
+            slip += yields * (size - slip - held * slip / speed)
+        slip = math.copysign(slip, freely)
+        scrubbing -= dragged * slip / speed
+        return slip, (yields * v, yields * scrubbing, yields * shifting)
 
     def learnt(
         self,
@@ -146,8 +165,8 @@ class SideSlip(NamedTuple):
 
         It is the likeliest change of the parts that explains it, as a Kalman filter finds it.
         """
-        v, scrubbing, shifting = _rates(climber, now, wall)
-        error = aside - self.creep * v - self.scrub * scrubbing - self.pivot * shifting
+        expected, (v, scrubbing, shifting) = self._shown(climber, now, wall)
+        error = aside - expected
         by_creep, by_scrub, by_pivot = by = self.covariance.times(v, scrubbing, shifting)
         large = math.hypot(SIZES[0] * v, SIZES[1] * scrubbing, SIZES[2] * shifting)
         share = large / math.hypot(large, SIZES[0] * SLOW_TO_LEARN)
@@ -155,7 +174,7 @@ class SideSlip(NamedTuple):
         per = share * share / variance if variance > 0 else 0.0
         poles = min(bandwidth, FASTEST / time)
         # a pose that jumps is no side slip; of noise, each difference takes back the last one
-        most = (v + climber.half_track * abs(now.yaw_rate)) / (2 * poles)
+        most = (abs(now.speed) + climber.half_track * abs(now.yaw_rate)) / (2 * poles)
         offset = clipped(self.offset + time * error, -most, most)
         gain = poles * poles * offset * per
         creeps, scrubs, pivots = (LARGEST * largest for largest in SIZES)
@@ -169,23 +188,31 @@ class SideSlip(NamedTuple):
         )
 
     def course(
-        self, climber: Climber, target: ReferencePoint, at: At, wall: Wall | None = None
+        self,
+        climber: Climber,
+        target: ReferencePoint,
+        at: At,
+        foresight: float,
+        wall: Wall | None = None,
     ) -> Course | None:
         """Course of a climber on its reference; None where its wheels hold.
 
-        `at` gives the reference at a time [s] after the one of `target`.
+        `at` gives the reference at a time [s] after the one of `target`, of which `foresight` [s]
+        count.
         """
         v, fade = abs(target.speed), _fade(target.speed)
         angle, rate = math.atan(self.creep * v * fade), self.creep_rate * v * fade
-        leads = {way: partial(self._lead, climber, wall, way) for way in (1, -1)}
-        one, other = (lead(target) for lead in leads.values())
+        leads = {way: partial(self._lead, climber, wall, foresight, way) for way in (1, -1)}
+        one, other = (lead(target, 0.0, target.yaw_rate) for lead in leads.values())
         if abs(angle) + (abs(one) + abs(other)) * abs(target.yaw_rate) < NEGLIGIBLE:
             return None
         # it sags, whichever way it turns: of both ways to turn, the heading that is higher
-        ways = [(*_ahead(target, at, lead), way) for way, lead in leads.items()]
+        ways = [(*_ahead(target, at, lead, foresight), way) for way, lead in leads.items()]
         turned, faster, sooner, way = max(ways) if one > other else min(ways)
         turns = target.yaw_rate + faster
-        lever = leads[way](target, turned) * target.speed
+        # by how much more it goes aside the faster it turns
+        held = v / (v + self.scrub * _seal(climber) * abs(turns))
+        lever = leads[way](target, turned, turns) * held * target.speed
         lever *= math.tanh(max(way * turns, 0.0) / CLEARLY_TURNS)
         return Course.at(
             angle - turned, rate - faster, -sooner, lever, target.heading - angle + turned
@@ -195,19 +222,23 @@ class SideSlip(NamedTuple):
         self,
         climber: Climber,
         wall: Wall | None,
+        most: float,
         way: int,
         target: ReferencePoint,
-        turned: float = 0.0,
+        turned: float,
+        turning: float,
     ) -> float:
         """Time T [s] by which its heading is ahead of its course, creep apart: θ̇ = (θ - θ_d) / T.
 
-        It turns left (`way` 1) or right (-1), at a heading `turned` [rad] from the reference's.
+        It turns left (`way` 1) or right (-1), at a heading `turned` [rad] from the reference's,
+        at a rate `turning` [rad/s]. T is `most` [s] at most.
         """
         v = target.speed
         there = Motion.at(target.x, target.y, target.heading + turned, v, target.yaw_rate)
         reaction, uphill = _pulls(climber, there, wall)
         lever = way * self.scrub * reaction - self.pivot * uphill
-        return clipped(_fade(v) * lever, -MOST_LEAD, MOST_LEAD)
+        held = self.scrub * _seal(climber) * abs(turning)
+        return clipped(_fade(v, held) * lever, -most, most)
 
 
 def shown(before: Motion, now: Motion, time: float) -> float:
@@ -220,13 +251,18 @@ def shown(before: Motion, now: Motion, time: float) -> float:
     return aside - time / 12 * (rate * faster - mean * tighter)
 
 
-def _fade(speed: float) -> float:
-    """About 1 / v of a speed v [m/s], and 0 at rest."""
-    return speed / (speed * speed + FADE_SPEED * FADE_SPEED)
+def _fade(speed: float, held: float = 0.0) -> float:
+    """About 1 / (v + what is `held`) of a speed v [m/s], and 0 at rest."""
+    return speed / (speed * speed + abs(speed) * held + FADE_SPEED * FADE_SPEED)
+
+
+def _seal(climber: Climber) -> float:
+    """What a seal drags, f, over the weight."""
+    return float(climber.seal_friction) / (climber.mass * GRAVITY)
 
 
 def _ahead(
-    target: ReferencePoint, at: At, lead: Callable[..., float]
+    target: ReferencePoint, at: At, lead: Callable[..., float], foresight: float
 ) -> tuple[float, float, float]:
     """How far the heading has to be ahead of a reference, and its derivatives.
 
@@ -236,21 +272,23 @@ def _ahead(
     T < 0). From there it is stepped back to now, with T θ̇_d even in a step and T that of its end;
     what is later than can be seen turns on as it does there.
     """
-    now = lead(target)
-    sign, far = (1, FORESIGHT) if now >= 0 else (-1, HINDSIGHT)
-    step = sign * clipped(REACH * abs(now), NEAREST, far) / STEPS
+    now = lead(target, 0.0, target.yaw_rate)
+    sign, far = (1, foresight) if now >= 0 else (-1, HINDSIGHT)
+    span = clipped(REACH * abs(now), NEAREST, far)
+    steps = max(STEPS, math.ceil(STEPS * span))
+    step = sign * span / steps
 
-    def time(point: ReferencePoint, angle: float) -> float:
-        return sign * max(sign * lead(point, angle), SHORTEST_LEAD)
+    def time(point: ReferencePoint, angle: float, rate: float) -> float:
+        return sign * max(sign * lead(point, angle, rate), SHORTEST_LEAD)
 
-    point = at(STEPS * step)
-    angle = rate = acceleration = 0.0
+    point = at(steps * step)
+    angle, rate, acceleration = 0.0, point.yaw_rate, 0.0
     for _ in range(PASSES):  # where it ends: a heading that is ahead loads the wheels otherwise
-        angle = time(point, angle) * point.yaw_rate
+        angle = time(point, angle, rate) * rate
     even = angle  # T θ̇_d
-    for number in reversed(range(STEPS)):
+    for number in reversed(range(steps)):
         later, point = point, at(number * step) if number else target
-        T, change = time(point, angle), (later.yaw_rate - point.yaw_rate) / step
+        T, change = time(point, angle, rate), (later.yaw_rate - point.yaw_rate) / step
         rises = (even - T * point.yaw_rate) / step
         left = ((angle - even) / T - rises) * math.exp(-step / T)
         rate, acceleration = point.yaw_rate + rises + left, change + left / T
