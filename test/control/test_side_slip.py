@@ -265,7 +265,7 @@ def test_what_is_learnt_at_one_speed_holds_at_another():
         along, left = (middle.cosine, middle.sine), (-middle.sine, middle.cosine)
         place = place + PERIOD * (speed * np.array(along) + aside * np.array(left))
         now = Motion.at(*place.tolist(), heading, speed, turning)
-        slip, before = slip.learnt(CLIMBER, before, now, PERIOD, 6.0), now
+        slip, before = slip.learnt(CLIMBER, now, shown(before, now, PERIOD), PERIOD, 6.0), now
         errors.append(slip.speed(CLIMBER, now) - aside)
     assert np.abs(errors[500:]).max() < 2e-3  # [m/s] of 3e-2
 
