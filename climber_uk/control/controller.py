@@ -419,8 +419,7 @@ class Controller:
             if point is None:
                 return target.mode, target.detail, None
             at = partial(active.around, target, target_time)
-            foresight = estimator.observer.side_slip_foresight
-            course = estimator.slip.course(self._law.climber, point, at, foresight, self._law.wall)
+            course = estimator.slip.course(self._law.climber, point, at, self._law.wall)
             ahead, law = ahead._replace(course=course), self._law_for(target.is_gentle)
             command = law.command(ahead, point)
             lost = command.lost.force

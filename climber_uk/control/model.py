@@ -207,15 +207,6 @@ class Observer:
         "scrub, as its poses have the noise of fixes",
         choices=("odometry", "pose"),
     )
-    side_slip_foresight: float = parameter(
-        0.7,
-        "s",
-        "of the reference ahead that is looked at for it: 0.3 s less than the planner's preview, "
-        "which has come in any case; wheels that scrub in slow, sharp bends need 1.5 s and more",
-        at_least=0.1,
-        at_most=5,
-        runtime=True,
-    )
     pose_bandwidth: float = parameter(
         60.0, "1/s", "of the filter that takes speeds from poses", above=0, runtime=True
     )

@@ -27,11 +27,14 @@ LARGEST = 10.0  # times as large as that, at most
 FORGOTTEN = 10.0  # [s] in which what is known of them is known no more
 FADE_SPEED = 0.02  # [m/s] of a reference below which its course is its heading
 SLOW_TO_LEARN = 0.05  # [m/s] below which poses tell less and less of ρ
-HINDSIGHT = 1.0  # [s] of the reference behind that is looked at
+MOST_LEAD = 0.7  # [s]
+# [s] of the reference behind and ahead that are looked at. They have come in any case: if more
+# counted where it happens to be there, a run would not repeat itself
+HINDSIGHT, FORESIGHT = 1.0, 0.7
 FASTEST = 0.4  # B T, at most
 NEGLIGIBLE = 1e-5  # [rad] of a course off its heading
 REACH, NEAREST = 5.0, 0.035  # times T, and [s]: what is further off counts for nothing
-STEPS = 7  # a second, in which that is gone through, and at least
+STEPS = 7  # in which that is gone through
 PASSES = 3
 SHORTEST_LEAD = 1e-9  # [s]
 CLEARLY_TURNS = 0.1  # [rad/s]
@@ -188,26 +191,20 @@ class SideSlip(NamedTuple):
         )
 
     def course(
-        self,
-        climber: Climber,
-        target: ReferencePoint,
-        at: At,
-        foresight: float,
-        wall: Wall | None = None,
+        self, climber: Climber, target: ReferencePoint, at: At, wall: Wall | None = None
     ) -> Course | None:
         """Course of a climber on its reference; None where its wheels hold.
 
-        `at` gives the reference at a time [s] after the one of `target`, of which `foresight` [s]
-        count.
+        `at` gives the reference at a time [s] after the one of `target`.
         """
         v, fade = abs(target.speed), _fade(target.speed)
         angle, rate = math.atan(self.creep * v * fade), self.creep_rate * v * fade
-        leads = {way: partial(self._lead, climber, wall, foresight, way) for way in (1, -1)}
+        leads = {way: partial(self._lead, climber, wall, way) for way in (1, -1)}
         one, other = (lead(target, 0.0, target.yaw_rate) for lead in leads.values())
         if abs(angle) + (abs(one) + abs(other)) * abs(target.yaw_rate) < NEGLIGIBLE:
             return None
         # it sags, whichever way it turns: of both ways to turn, the heading that is higher
-        ways = [(*_ahead(target, at, lead, foresight), way) for way, lead in leads.items()]
+        ways = [(*_ahead(target, at, lead), way) for way, lead in leads.items()]
         turned, faster, sooner, way = max(ways) if one > other else min(ways)
         turns = target.yaw_rate + faster
         # by how much more it goes aside the faster it turns
@@ -222,7 +219,6 @@ class SideSlip(NamedTuple):
         self,
         climber: Climber,
         wall: Wall | None,
-        most: float,
         way: int,
         target: ReferencePoint,
         turned: float,
@@ -231,14 +227,14 @@ class SideSlip(NamedTuple):
         """Time T [s] by which its heading is ahead of its course, creep apart: θ̇ = (θ - θ_d) / T.
 
         It turns left (`way` 1) or right (-1), at a heading `turned` [rad] from the reference's,
-        at a rate `turning` [rad/s]. T is `most` [s] at most.
+        at a rate `turning` [rad/s].
         """
         v = target.speed
         there = Motion.at(target.x, target.y, target.heading + turned, v, target.yaw_rate)
         reaction, uphill = _pulls(climber, there, wall)
         lever = way * self.scrub * reaction - self.pivot * uphill
         held = self.scrub * _seal(climber) * abs(turning)
-        return clipped(_fade(v, held) * lever, -most, most)
+        return clipped(_fade(v, held) * lever, -MOST_LEAD, MOST_LEAD)
 
 
 def shown(before: Motion, now: Motion, time: float) -> float:
@@ -262,7 +258,7 @@ def _seal(climber: Climber) -> float:
 
 
 def _ahead(
-    target: ReferencePoint, at: At, lead: Callable[..., float], foresight: float
+    target: ReferencePoint, at: At, lead: Callable[..., float]
 ) -> tuple[float, float, float]:
     """How far the heading has to be ahead of a reference, and its derivatives.
 
@@ -273,20 +269,18 @@ def _ahead(
     what is later than can be seen turns on as it does there.
     """
     now = lead(target, 0.0, target.yaw_rate)
-    sign, far = (1, foresight) if now >= 0 else (-1, HINDSIGHT)
-    span = clipped(REACH * abs(now), NEAREST, far)
-    steps = max(STEPS, math.ceil(STEPS * span))
-    step = sign * span / steps
+    sign, far = (1, FORESIGHT) if now >= 0 else (-1, HINDSIGHT)
+    step = sign * clipped(REACH * abs(now), NEAREST, far) / STEPS
 
     def time(point: ReferencePoint, angle: float, rate: float) -> float:
         return sign * max(sign * lead(point, angle, rate), SHORTEST_LEAD)
 
-    point = at(steps * step)
+    point = at(STEPS * step)
     angle, rate, acceleration = 0.0, point.yaw_rate, 0.0
     for _ in range(PASSES):  # where it ends: a heading that is ahead loads the wheels otherwise
         angle = time(point, angle, rate) * rate
     even = angle  # T θ̇_d
-    for number in reversed(range(steps)):
+    for number in reversed(range(STEPS)):
         later, point = point, at(number * step) if number else target
         T, change = time(point, angle, rate), (later.yaw_rate - point.yaw_rate) / step
         rises = (even - T * point.yaw_rate) / step

@@ -30,18 +30,13 @@ def preview(rows):
     return Preview(np.array(times, np.int64), *parts)
 
 
-def course_options(config):
-    """As a file has them."""
-    return Values(read_file(config, "/trajectory_publisher")).read(CourseOptions)
-
-
 class UnderWay:
     """Odometry every 5 ms, torques that act at once, previews every 0.1 s."""
 
     def __init__(
         self, trajectory, *, state=None, options=None, config=CONFIG, plant_of=None, **parameters
     ):
-        self.options = options or course_options(config)
+        self.options = options or CourseOptions()
         given = {**read_file(config, "/uk_torque_controller"), **parameters}
         self.controller = build_controller(Values(given), None)
         self.now, self.torques = SECOND, np.zeros(2)
@@ -101,11 +96,11 @@ class UnderWay:
 class Travelling(UnderWay):
     """The same with a stick, paths from outside and starts in mid-course, as the planner has it."""
 
-    def __init__(self, trajectory, *, config=CONFIG, **how):
+    def __init__(self, trajectory, **how):
         hand = HandOptions(input="twist", speed=0.2)
         make = lambda reference, time: (time, reference)  # noqa: E731
-        self.journey = Journey(trajectory, course_options(config), hand, make)
-        super().__init__(trajectory, config=config, **how)
+        self.journey = Journey(trajectory, CourseOptions(), hand, make)
+        super().__init__(trajectory, **how)
 
     def begin(self, trajectory, **_):
         self.position, self.period, self.course = 0, 0, self
