@@ -128,7 +128,9 @@ def test_a_dead_band_costs_millimetres_and_makes_no_servo_hunt(path):
         pytest.param(replace(SERVO, servo_time_constant=0.04), INNER, marks=pytest.mark.soak),
         pytest.param(SERVO, replace(INNER, delay=0.02), marks=pytest.mark.soak),
         pytest.param(SERVO, replace(INNER, period=0.02), marks=pytest.mark.soak),
-        (DEAD_BAND, replace(INNER, delay=0.005, sensors=ENCODERS)),
+        pytest.param(
+            DEAD_BAND, replace(INNER, delay=0.005, sensors=ENCODERS), marks=pytest.mark.soak
+        ),
     ],
     ids=["at once", "10 ms", "40 ms", "20 ms of delay", "50 Hz", "encoders"],
 )

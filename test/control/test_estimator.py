@@ -73,14 +73,17 @@ def test_the_papers_ellipse_is_tracked_to_hundredths_of_a_millimetre(constraints
     assert run.distance.max() <= 0.05e-3
 
 
-def test_prediction_takes_the_error_of_holding_a_torque_away():
-    def error(options=LAW, delay=0.0, known=True):
+@pytest.mark.parametrize(
+    ("delay", "times"), [(0.0, 47), pytest.param(0.005, 50, marks=pytest.mark.soak)]
+)
+def test_prediction_takes_the_error_of_holding_a_torque_away(delay, times):
+    def error(options=LAW, known=True):
         timing = Timing(transport_delay=delay * known)
         ours = controller(options=options, timing=timing, observer=FIXED_MODEL)
         return lap(ours, link=Link(delay=delay), duration=7.0).rms(after=1.0)
 
-    assert error() < error(ControlOptions(predict=False)) / 47
-    assert error(delay=0.005) < error(delay=0.005, known=False) / 50
+    other = error(known=False) if delay else error(ControlOptions(predict=False))
+    assert error() < other / times
 
 
 def test_the_delay_that_the_clock_shows_need_not_be_known():

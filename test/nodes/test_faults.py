@@ -185,6 +185,7 @@ def test_odometry_that_was_overtaken_is_ignored(world):
     assert "bad odometry" not in world.log(CONTROLLER)
 
 
+@pytest.mark.soak  # the controller alone: test_uk_torque_controller.py
 def test_a_reference_that_stops_gets_the_safe_output_until_a_new_one_comes(world):
     climb = Climb(world, WALL_CLOCK)
     climb.is_under_way()

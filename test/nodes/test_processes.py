@@ -93,7 +93,7 @@ def gone(world, pids):
         pytest.param(kill, False, marks=pytest.mark.soak),
         (kill, True),
         pytest.param(interrupt_twice, True, marks=pytest.mark.soak),
-        (close_the_terminal, False),
+        pytest.param(close_the_terminal, False, marks=pytest.mark.soak),
     ],
     ids=["kill-alone", "kill-under make", "interrupt_twice-under make", "close_the_terminal-alone"],
 )

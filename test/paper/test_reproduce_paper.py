@@ -288,6 +288,7 @@ it.main()
 """
 
 
+@pytest.mark.soak  # 25 s; each job and each table has its own test
 def test_quick_writes_every_figure_and_table(tmp_path):
     command = [sys.executable, "-c", QUICKER, "--quick"]
     done = subprocess.run(

@@ -71,7 +71,9 @@ def asked_at_random(under_way, random, number):
     assert fastest <= 1.02 * np.abs(course.trajectory.at(np.linspace(0, 60, 6001)).speed).max()
 
 
-@pytest.mark.parametrize("trajectory", [climber_trajectory, lanes])
+@pytest.mark.parametrize(
+    "trajectory", [climber_trajectory, pytest.param(lanes, marks=pytest.mark.soak)]
+)
 def test_whatever_is_asked_at_any_time_the_climber_stays_on_its_path_and_no_torque_jumps(
     trajectory,
 ):
