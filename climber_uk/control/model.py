@@ -204,7 +204,8 @@ class Observer:
         "pose",
         "",
         "what it is learnt from; odometry: from `twist.linear.y`, of wall_odometry whose wheels "
-        "scrub, as its poses have the noise of fixes",
+        "scrub, as its poses have the noise of fixes; of a driver that tells 0, wheels are taken "
+        "to hold",
         choices=("odometry", "pose"),
     )
     pose_bandwidth: float = parameter(

@@ -253,7 +253,7 @@ def _fade(speed: float, held: float = 0.0) -> float:
 
 
 def _seal(climber: Climber) -> float:
-    """What a seal drags, f, over the weight."""
+    """Drag of the seal, f, over the weight m g."""
     return float(climber.seal_friction) / (climber.mass * GRAVITY)
 
 
