@@ -39,6 +39,7 @@ from climber_uk.ros import plant_parts
 
 sys.path.insert(0, str(ROOT / "examples"))
 PLAN = "plan"  # of identify
+COURSES = [*(path for path in PATHS if not path.startswith("line")), PLAN]  # all that turn
 COUNT = 2 * np.pi / 4096  # [rad] of the encoders
 SHARE = 0.2  # by which the truth is off what is believed
 TURNING = 0.1  # [rad/s]
@@ -150,7 +151,7 @@ def main() -> None:
     options = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with ProcessPoolExecutor(options.cores) as pool:
-        for path in [*PATHS, PLAN]:
+        for path in COURSES:
             if options.only not in path:
                 continue
             results = list(pool.map(partial(trial, path), range(options.seeds)))

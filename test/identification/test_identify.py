@@ -139,11 +139,16 @@ EVERY = 4  # of the times of a made motion
 WHEELS = ("a_right", "a_left")
 
 
-def bag_of(path, motion, torques, parameters=None, others=(), name=WHEELS):
-    """A bag of a made motion, its torques (n, 2) commanded, and recorded parameters."""
+def bag_of(path, motion, parameters=None, others=(), name=WHEELS):
+    """A bag of a made motion, the torques that it took, each held, and recorded parameters.
+
+    The last time has none any more, and is left out.
+    """
     messages = []
     right_left = [*name]
-    for i in range(0, len(motion.time), EVERY):
+    time, impulse = motion.time[::EVERY], motion.impulse[::EVERY]
+    held = np.diff(impulse, axis=0) / np.diff(time)[:, None]
+    for i, torques in zip(range(0, len(motion.time), EVERY), held, strict=False):
         stamp = SECOND + round(motion.time[i] * SECOND)
         x, y, heading = motion.pose[i]
         odometry = message(
@@ -156,8 +161,7 @@ def bag_of(path, motion, torques, parameters=None, others=(), name=WHEELS):
             twist__twist__linear__x=float(motion.rates[i, 0]),
             twist__twist__angular__z=float(motion.rates[i, 1]),
         )
-        mean = torques[i : i + EVERY].mean(axis=0)
-        commanded = message(JOINTS, stamp, name=right_left, effort=mean)
+        commanded = message(JOINTS, stamp, name=right_left, effort=torques)
         told = message(JOINTS, stamp, name=right_left, position=motion.wheel_angles[i])
         messages += [("/odom", ODOMETRY, stamp, odometry)]
         messages += [("/wheel_torques", JOINTS, stamp, commanded)]
@@ -180,13 +184,12 @@ def parameter(name, value):
 
 
 def made_bag(path, recorded, believed=None, **others):
-    """A bag of the motion of `test_estimation`, and its torques."""
+    """A bag of the motion of `test_estimation`."""
     from test_estimation import TRUE, moved
 
     motion = moved(noise=1.0, wheels=True, true=believed or TRUE)
-    torques = np.gradient(motion.impulse, motion.time, axis=0)
     names = {f"{side}_wheel_joint": name for side, name in zip(SIDES, WHEELS, strict=True)}
-    return bag_of(path, motion, torques, {**names, **recorded}, **others)
+    return bag_of(path, motion, {**names, **recorded}, **others)
 
 
 def told_of(monkeypatch, tmp_path, capsys, bag, *arguments):
@@ -258,9 +261,8 @@ def test_what_cannot_be_told_is_in_status_file_and_table(monkeypatch, tmp_path, 
     from test_estimation import STRAIGHT, moved
 
     motion = moved(heading=STRAIGHT, noise=1.0, wheels=True)
-    torques = np.gradient(motion.impulse, motion.time, axis=0)
     names = {f"{side}_wheel_joint": name for side, name in zip(SIDES, WHEELS, strict=True)}
-    bag = bag_of(tmp_path / "bag", motion, torques, names)
+    bag = bag_of(tmp_path / "bag", motion, names)
     rows, written, said, status = told_of(monkeypatch, tmp_path, capsys, bag)
     assert "identify: " in status
     assert "yaw inertia cannot be told" in status

@@ -15,7 +15,7 @@ from climber_uk.bags.recorded_run import read_run
 pytestmark = pytest.mark.nodes
 
 OWN = "ros__parameters"
-PATH = {"origin_y": 3.0, "parabola.length": 0.6, "one_go.rate": 0.3}
+PATH = {"origin_y": 3.0, "parabola.length": 0.3, "one_go.rate": 0.3}
 PERIOD = {"control_period": 0.02}
 START = {"initial_x": 0.0, "initial_y": 3.0, "initial_heading": 0.0, **PERIOD}
 ELECTRIC = {"adhesion": "electroadhesion", "electroadhesion.film_pressure": 6000.0}
@@ -50,7 +50,7 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
     world.environment["PYTHONPATH"] = str(tmp_path / "packages")
     output = tmp_path / "run"
     options = ["--config", parameter_file, "--output", output, "--climbers", "2"]
-    demo = world.run("run_demo", executable("run_demo"), *options, "--duration", "4.4")
+    demo = world.run("run_demo", executable("run_demo"), *options, "--duration", "3.2")
     assert demo.wait(300) == 0, world.log("run_demo")
 
     def log(node):
@@ -66,7 +66,7 @@ def test_the_document_s_package_drives_two_climbers(world, tmp_path, parameter_f
     bag = output / "bag"
     for climber in ("/climber_1", "/climber_2"):
         run = read_run(bag, climber)
-        np.testing.assert_allclose(run.pose[-1, :2], [0.6, 3.0 + 0.4 * 0.36], atol=0.01)
+        np.testing.assert_allclose(run.pose[-1, :2], [0.3, 3.0 + 0.4 * 0.09], atol=0.01)
         assert run.distance.max() < 0.02
         assert np.abs(run.reference[:, 1] - 3.0 - 0.4 * run.reference[:, 0] ** 2).max() < 1e-6
 

@@ -11,27 +11,25 @@ from pathlib import Path
 
 import rclpy
 from ament_index_python import PackageNotFoundError, get_package_prefix
-from forking import PROGRAMS, Forked
+from forking import EXAMPLES, PROGRAMS, Forked
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 from climber_uk.ros.transport import reserved
 
-HEEDED = "AMENT", "FAST", "LD_", "PATH", "PYTHONPATH", "RCUTILS", "RMW", "ROS"  # by programs
+HEEDED = "AMENT", "LD_", "PATH", "PYTHON", "RMW"  # as a program starts and imports
 
 
 def heeded(environment):
-    """What programs heed of an environment, but for the domain, which is other at each start."""
-    names = (name for name in environment if name.startswith(HEEDED) and name != "ROS_DOMAIN_ID")
-    return {name: environment[name] for name in names}
+    """What of an environment a program that is forked would not heed any more."""
+    return {name: environment[name] for name in environment if name.startswith(HEEDED)}
 
 
 USUAL = heeded(os.environ)  # that of the server that forks, as no test has changed it yet
 OPTION = {False: "-p", True: "-r"}
 TIMEOUT = 120.0  # [s] for whatever is waited for: machines are shared, discovery has a long tail
 CONFIG = Path(__file__).parents[2] / "config"
-EXAMPLES = Path(__file__).parents[2] / "examples"
 # above 101, ports may be taken by others
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
@@ -88,8 +86,12 @@ def executable(name):
 
 def command(name):
     """How an executable of the package, or an example, is started."""
-    example = EXAMPLES / f"{name}.py"
-    return [sys.executable, example] if example.is_file() else [executable(name)]
+    return [sys.executable, example(name)] if example(name).is_file() else [executable(name)]
+
+
+def example(name):
+    """File of an example; there may be none."""
+    return EXAMPLES / f"{name}.py"
 
 
 class World:
@@ -113,12 +115,12 @@ class World:
         self.executor.add_node(self.node)
 
     def start(self, name, *arguments):
-        """Start an executable of the package; its output is `log(name)`."""
-        is_usual = heeded(self.environment) == USUAL
-        if name not in PROGRAMS or not is_usual or installation():
+        """Start an executable of the package, or an example; its output is `log(name)`."""
+        is_ours = example(name).is_file() or (name in PROGRAMS and not installation())
+        if not is_ours or heeded(self.environment) != USUAL:
             return self.run(name, *command(name), *arguments)
         self.log_file(name).write_text("")
-        self.processes[name] = Forked(name, arguments, self.log_file(name), self.domain)
+        self.processes[name] = Forked(name, arguments, self.log_file(name), self.environment)
         return self.processes[name]
 
     def run(self, name, *words, **how):
