@@ -111,6 +111,7 @@ $(SBOM)/set-up:
 
 ## longer tests than CI has time for
 soak: $(TOOLS)
+	$(PIP) --constraint bench/requirements.txt numba
 	$(BIN)/python -m pytest -m soak
 
 ## as in a ROS workspace: build without a warning, and each node, started from there
