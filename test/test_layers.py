@@ -65,12 +65,10 @@ def imported(file, when_run=False):
 
 
 def _imported(file, when_run):
-    tree = ast.parse(file.read_text())
-    checked = [
-        n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.dump(n.test)
-    ]
+    nodes = [*ast.walk(ast.parse(file.read_text()))]
+    checked = [n for n in nodes if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.dump(n.test)]
     skipped = {inner for outer in checked for inner in ast.walk(outer)} if when_run else set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if node in skipped:
             continue
         if isinstance(node, ast.Import):
