@@ -187,8 +187,7 @@ class Task:
         impulses: Any = self.climber.force_and_moment(motion.impulse)
         all_of_it = np.stack([motion.time, *impulses, motion.way, motion.pose[:, 2]])
         ends = np.array([window[[0, -1]] for window in self.windows[kind]], np.intp).reshape(-1, 2)
-        changes: Array = all_of_it[:, ends[:, 1]] - all_of_it[:, ends[:, 0]]
-        return changes
+        return all_of_it[:, ends[:, 1]] - all_of_it[:, ends[:, 0]]
 
 
 def _windows(motion: RecordedMotion, cut: Cut) -> Windows:

@@ -144,8 +144,7 @@ def gravity_ahead(motion: RecordedMotion, climber: Climber, site: Site) -> Array
     """Gravity along the heading (n,) [m/s²]."""
     x, y, heading = motion.pose.T
     s_x, s_y = site.wall.along(climber.inclination, x, y)
-    along: Array = GRAVITY * (s_x * np.cos(heading) + s_y * np.sin(heading))
-    return along
+    return GRAVITY * (s_x * np.cos(heading) + s_y * np.sin(heading))
 
 
 def _impulses(motion: RecordedMotion, window: Indices, column: int, resisted: Array) -> Array:
@@ -211,5 +210,4 @@ def integral(values: Array, time: Array) -> Array:
     """Integral from the first time to each one, by the trapezoidal rule."""
     from scipy.integrate import cumulative_trapezoid  # slow to import
 
-    found: Array = cumulative_trapezoid(values, time, axis=0, initial=0)
-    return found
+    return cumulative_trapezoid(values, time, axis=0, initial=0)

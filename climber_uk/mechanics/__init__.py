@@ -48,11 +48,9 @@ def transpose(matrix: Array) -> Array:
 
 def times(matrix: Array, vector: Array) -> Array:
     """Matrices (..., m, n) times vectors (..., n)."""
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product
+    return (matrix @ vector[..., None])[..., 0]
 
 
 def solve(matrix: Array, vector: Array) -> Array:
     """Solutions (..., n) of matrices (..., n, n) for right-hand sides (..., n)."""
-    solution: Array = np.linalg.solve(matrix, vector[..., None])[..., 0]
-    return solution
+    return np.linalg.solve(matrix, vector[..., None])[..., 0]

@@ -126,8 +126,7 @@ class Climber:
     @cached_property
     def weight_along_wall(self) -> float:
         """m g_t, the part of the weight that pulls along -y [N]."""
-        weight: float = self.mass * GRAVITY * sin(self.inclination * DEGREE)
-        return weight
+        return self.mass * GRAVITY * sin(self.inclination * DEGREE)
 
     @property
     def falls(self) -> bool:
@@ -137,8 +136,7 @@ class Climber:
     @cached_property
     def gravity_into_wall(self) -> float:
         """g_n of a flat wall, below 0 where it pulls the climber off [m/s²]."""
-        gravity: float = GRAVITY * cos(self.inclination * DEGREE)
-        return gravity
+        return GRAVITY * cos(self.inclination * DEGREE)
 
     @cached_property
     def inertial(self) -> tuple[float, float, float, float]:

@@ -282,8 +282,7 @@ class UkTorqueController(ManagedNode):
 
     def now(self) -> int:
         """Time of the node's clock [ns]; 0 while there is none."""
-        now: int = self.get_clock().now().nanoseconds
-        return now
+        return self.get_clock().now().nanoseconds
 
     def publish(self, answer: Answer | None) -> None:
         """Report what has changed, and publish an answer if there is one."""
