@@ -51,6 +51,11 @@ def times(matrix: Array, vector: Array) -> Array:
     return (matrix @ vector[..., None])[..., 0]
 
 
+def cross(u: Array, v: Array) -> Array:
+    """Cross products (...) of vectors (..., 2)."""
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+
 def solve(matrix: Array, vector: Array) -> Array:
     """Solutions (..., n) of matrices (..., n, n) for right-hand sides (..., n)."""
     return np.linalg.solve(matrix, vector[..., None])[..., 0]

@@ -26,7 +26,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import State
-from climber_uk.messages.names import wheel_joints
+from climber_uk.messages.names import WheelJoints
 
 if TYPE_CHECKING:
     from climber_uk.mechanics.reference import Reference
@@ -99,9 +99,8 @@ def transform(odometry: Odometry) -> TransformStamped:
     return message
 
 
-def wheel_torques(torques: Array, stamp: int, left_joint: str, right_joint: str) -> JointState:
+def wheel_torques(torques: Array, stamp: int, joints: WheelJoints) -> JointState:
     """Message of torques (2,) (right, left) [N m]; `stamp` is that of the odometry they answer."""
-    joints = wheel_joints(left_joint, right_joint)
     message = JointState(name=joints.all)
     message.effort = joints.torques(*left_right(torques))
     message.header.stamp = time(stamp)
@@ -182,8 +181,7 @@ def diagnostics(
 def progress(name: str, values: Mapping[str, Any], stamp: int) -> DiagnosticArray:
     """Progress of the node `name`: its `state` as the message, what else there is by name."""
     numbers = {key: value for key, value in values.items() if key != "state"}
-    message = diagnostics(name, DiagnosticStatus.OK, values["state"], numbers, stamp)
-    return message
+    return diagnostics(name, DiagnosticStatus.OK, values["state"], numbers, stamp)
 
 
 def parameters(values: Mapping[str, object], node: str, stamp: int) -> ParameterEvent:

@@ -92,11 +92,8 @@ class WallOdometry(ClimberNode):
 
     def on_joints(self, message: JointState) -> None:
         """Take the wheels' angles, once the IMU's sample of the same time is there."""
-        names = self.names
         try:
-            angles = reading_sensors.wheel_angles(
-                message, names.left_wheel_joint, names.right_wheel_joint
-            )
+            angles = reading_sensors.wheel_angles(message, self.names.wheels)
             stamp = reading_sensors.stamp_of(message)
         except ValueError as error:
             self.report(JOINTS, "refused", str(error))
@@ -108,27 +105,25 @@ class WallOdometry(ClimberNode):
 
     def on_imu(self, message: Imu) -> None:
         """Take yaw rate and specific force, turned into the climber's frame."""
-        try:
-            sample = reading_sensors.imu(message, self.frames.imu_frame or self.names.base_frame)
-        except ValueError as error:
-            self.report(IMU, "refused", str(error))
+        frame = self.frames.imu_frame or self.names.base_frame
+        sample = self.checked(IMU, reading_sensors.imu, message, frame)
+        if sample is None:
             return
-        self.report(IMU, "")
         self.localizer.on_imu(sample.stamp, sample.yaw_rate, *self.frames.force(*sample.force))
         if self.waiting is not None and not self.localizer.imu.is_due(self.waiting[0]):
             self.go_on()
 
     def on_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Take the parts of a pose that are measured."""
-        try:
-            pose = reading_sensors.pose(message, self.frames.pose_frame or self.names.odom_frame)
-            fix = self.frames.fix(Fix(*pose))
-        except ValueError as error:
-            self.report(POSE, "refused", str(error))
-            return
-        self.report(POSE, "")
-        self.localizer.on_fix(fix)
-        self.tell_remarks()
+        fix = self.checked(POSE, self.read_fix, message)
+        if fix is not None:
+            self.localizer.on_fix(fix)
+            self.tell_remarks()
+
+    def read_fix(self, message: PoseWithCovarianceStamped) -> Fix:
+        """Fix of a message, in odom_frame; `ValueError` if it is unfit."""
+        pose = reading_sensors.pose(message, self.frames.pose_frame or self.names.odom_frame)
+        return self.frames.fix(Fix(*pose))
 
     def lose_patience(self) -> None:
         """Go on without the IMU where its sample has not come."""
