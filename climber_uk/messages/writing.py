@@ -90,12 +90,14 @@ def odometry_numbers(state: State) -> tuple[float, ...]:
     return x, y, math.sin(heading / 2), math.cos(heading / 2), speed, slip, yaw_rate
 
 
-def transform(odometry: Odometry) -> TransformStamped:
-    """Transform of an odometry's pose."""
-    message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
-    position = odometry.pose.pose.position
-    message.transform.translation = Vector3(x=position.x, y=position.y)
-    message.transform.rotation = odometry.pose.pose.orientation
+def transform(pose: Sequence[float], stamp: int, frame: str, child_frame: str) -> TransformStamped:
+    """Transform to `child_frame`, whose `pose` (3,) is x, y [m], heading [rad] in `frame`."""
+    x, y, heading = pose
+    message = TransformStamped(child_frame_id=child_frame)
+    message.header.stamp = time(stamp)
+    message.header.frame_id = frame
+    message.transform.translation = Vector3(x=x, y=y)
+    message.transform.rotation = quaternion(heading)
     return message
 
 

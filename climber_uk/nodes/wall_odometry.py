@@ -7,13 +7,7 @@ none: a controller then waits.
 import math
 
 import numpy as np
-from geometry_msgs.msg import (
-    PoseStamped,
-    PoseWithCovarianceStamped,
-    Quaternion,
-    TransformStamped,
-    Vector3,
-)
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
@@ -160,7 +154,6 @@ class WallOdometry(ClimberNode):
             writing.planar_covariance(located.pose_covariance),
             writing.planar_covariance(twist),
         )
-
         if self.is_map_due(located.stamp):
             self.publish_map(located)
 
@@ -169,14 +162,10 @@ class WallOdometry(ClimberNode):
         motion = located.motion
         output = np.array([motion.x, motion.y, motion.heading])
         x, y, angle = between(self.localizer.estimate.mean[:3], output)
-        sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
-        self.map_to_odom.publish(located.stamp, x, y, sine, cosine)
+        self.map_to_odom.publish(located.stamp, x, y, math.sin(angle / 2), math.cos(angle / 2))
         if self.transform is not None and self.transform.get_subscription_count():
-            message = TransformStamped(child_frame_id=self.names.odom_frame)
-            message.header.frame_id = self.frames.map_frame
-            message.header.stamp = writing.time(located.stamp)
-            message.transform.translation = Vector3(x=x, y=y)
-            message.transform.rotation = Quaternion(z=sine, w=cosine)
+            frames = self.frames.map_frame, self.names.odom_frame
+            message = writing.transform((x, y, angle), located.stamp, *frames)
             self.transform.publish(TFMessage(transforms=[message]))
 
     def tell_remarks(self) -> None:

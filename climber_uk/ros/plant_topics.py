@@ -83,8 +83,8 @@ class PlantTopics:
         if self.truth.is_heard:
             self.truth.publish(now, *writing.odometry_numbers(robot.state))
         if self.transform is not None and self.transform.get_subscription_count():
-            names = self.names
-            odometry = writing.odometry(robot.state, now, names.odom_frame, names.base_frame)
-            self.transform.publish(TFMessage(transforms=[writing.transform(odometry)]))
+            frames = self.names.odom_frame, self.names.base_frame
+            transform = writing.transform(robot.state.pose.tolist(), now, *frames)
+            self.transform.publish(TFMessage(transforms=[transform]))
         if self.is_due(now):
             self.pressure.publish(now, float(robot.pressure))
