@@ -232,10 +232,6 @@ class Climber:
         """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
         return pack(*self.rim_rates(state.motion))
 
-    def torque_bounds(self, state: State) -> tuple[Bounds, Bounds]:
-        """Lowest and highest torque [N m] of the right wheel, and of the left one, each (...)."""
-        return self.bounds(state.motion)
-
     def rolling_acceleration(self, state: State, torques: Array, direction: Array | float) -> Array:
         """q̈ of the climber that rolls without side slip under `torques`, (..., 3).
 

@@ -4,7 +4,7 @@ Inactive, it answers with its safe output: a climber on a wall needs torques at 
 """
 
 import numpy as np
-from geometry_msgs.msg import TwistStamped, Vector3Stamped, WrenchStamped
+from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.subscription import Subscription
@@ -104,19 +104,16 @@ class UkTorqueController(ManagedNode):
         self.joints = self.names.wheels
         zeros = self.joints.rates(0.0, 0.0)
         torques = JointState(name=self.joints.all, velocity=zeros, effort=zeros)
-        self.torques = Output(self.publisher(JointState, TORQUES), torques, writing.WHEEL_COMMAND)
+        self.torques = self.output(TORQUES, torques, writing.WHEEL_COMMAND)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         zero, base_frame = (0.0, 0.0, 0.0), self.names.base_frame
         twist = TwistStamped()
         twist.header.frame_id = base_frame
-        self.twist = Output(self.publisher(TwistStamped, "cmd_vel"), twist, writing.TWIST)
-        error = self.publisher(Vector3Stamped, "~/tracking_error")
-        self.error = Output(error, writing.vector(zero, 0, base_frame), writing.VECTOR)
-        wrench = writing.wrench(zero, 0, base_frame)
-        force = self.publisher(WrenchStamped, private(FORCE))
-        self.force = Output(force, wrench, writing.WRENCH)
-        disturbance = self.publisher(WrenchStamped, "~/disturbance")
-        self.disturbance = Output(disturbance, wrench, writing.WRENCH)
+        self.twist = self.output("cmd_vel", twist, writing.TWIST)
+        vector, wrench = (of(zero, 0, base_frame) for of in (writing.vector, writing.wrench))
+        self.error = self.output("~/tracking_error", vector, writing.VECTOR)
+        self.force = self.output(private(FORCE), wrench, writing.WRENCH)
+        self.disturbance = self.output("~/disturbance", wrench, writing.WRENCH)
         self.setpoint: SuctionSetpoint | None = None
         if (suction := self.parameters.read(SuctionOptions, "least_suction.")).enabled:
             climber = self.parameters.read(Climber)

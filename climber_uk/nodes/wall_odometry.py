@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
-from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
 from climber_uk.localization import models
@@ -21,7 +20,6 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading_sensors, writing
 from climber_uk.messages.topics import IMU, JOINTS, LOCALIZATION, ODOMETRY, POSE
-from climber_uk.ros.output import Output
 from climber_uk.ros.running import (
     BEST_EFFORT,
     PUBLISH_PERIOD,
@@ -61,10 +59,10 @@ class WallOdometry(ClimberNode):
 
         names = self.names
         odometry = writing.odometry(NOWHERE, 0, names.odom_frame, names.base_frame)
-        self.odometry = Output(self.publisher(Odometry, ODOMETRY), odometry, writing.LOCATED)
+        self.odometry = self.output(ODOMETRY, odometry, writing.LOCATED)
         here = PoseStamped()
         here.header.frame_id = self.frames.map_frame
-        self.map_to_odom = Output(self.publisher(PoseStamped, "~/map_to_odom"), here, PLANAR_POSE)
+        self.map_to_odom = self.output("~/map_to_odom", here, PLANAR_POSE)
         self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
         self.is_map_due = Throttle(PUBLISH_PERIOD)
         self.subscription(JointState, JOINTS, self.on_joints, BEST_EFFORT)

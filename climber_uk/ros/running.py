@@ -6,7 +6,7 @@ import re
 import signal
 import sys
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -30,10 +30,12 @@ from rclpy.utilities import remove_ros_args
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading, writing
 from climber_uk.messages.names import Names
+from climber_uk.messages.reading import STAMP
 from climber_uk.messages.topics import CLOCK, DIAGNOSTICS
 from climber_uk.parameters.declaration import QOS, parameter, parameters
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.leaving import LONGEST_END, leave
+from climber_uk.ros.output import Output
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import in_words, printable
@@ -186,6 +188,12 @@ class ClimberNode(Node):
     def publisher(self, kind: type, topic: str, qos: QoSProfile = SENT) -> Publisher:
         """Publisher whose QoS the parameters `qos_overrides.<topic>.publisher.*` override."""
         return self._overridden(partial(self.create_publisher, kind, topic, qos))
+
+    def output(
+        self, topic: str, message: Any, numbers: Iterable[str], stamp: tuple[str, str] = STAMP
+    ) -> Output:
+        """Topic of messages that differ from `message` in their stamp and `numbers` only."""
+        return Output(self.publisher(type(message), topic), message, numbers, stamp)
 
     def subscription(
         self,
