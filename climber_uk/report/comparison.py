@@ -46,5 +46,5 @@ class Comparison:
         return cls(name, sign, bound)
 
     def holds(self, values: Any) -> Any:
-        """Whether values of the metric (...) are so; nan is not, but by !=."""
+        """Whether values of the metric (...) compare so, which nan does by != only."""
         return OPERATORS[self.operator](values, self.bound)
