@@ -173,7 +173,9 @@ def first_sentence(kind: type) -> str:
 def row(prefix: str, field: "dataclasses.Field[Any]") -> str:
     """Line of the table for a field."""
     rule = field.metadata
-    values = [bound.replace(">=", "≥").replace("<=", "≤") for bound in bounds(rule)]
+    values = [
+        bound.replace(">=", "≥").replace("<=", "≤").replace("!=", "≠") for bound in bounds(rule)
+    ]
     values += [f"`{choice}`" for choice in rule["choices"] or ()]
     default = str(field.default).lower() if isinstance(field.default, bool) else field.default
     cells = (

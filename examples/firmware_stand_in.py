@@ -61,10 +61,8 @@ class FirmwareStandIn(ClimberNode):
         self.parameters.declare(Board)
         plant_parts.declare(self.parameters)
         self.parameters.refuse_unknown()
-        self.board, self.options = (
-            self.parameters.read(Board),
-            self.parameters.read(SimulationOptions),
-        )
+        self.board = self.parameters.read(Board)
+        self.options = self.parameters.read(SimulationOptions)
         parts = plant_parts.parts(self.parameters)
         self.robot = SimulatedRobot(parts, self.options.initial_state, self.options.control_period)
         self.torque = self.board.motor_constant * self.board.gear_ratio  # [N m] at a wheel for 1 A

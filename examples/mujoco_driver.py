@@ -111,11 +111,10 @@ class MujocoDriver(ClimberNode):
 
     def fit(self, message: JointState, stamp: int) -> Torques:
         """Command of a message, torques or rates; `ValueError` if it is none."""
-        values, names = message.velocity if self.takes_speeds else message.effort, self.names
+        values = message.velocity if self.takes_speeds else message.effort
         fields = reading.JointFields(*divmod(stamp, SECOND), values, message.name)
-        wheels = names.left_wheel_joint, names.right_wheel_joint
         what: reading.Told = "velocities" if self.takes_speeds else "efforts"
-        return reading.wheel_torques(fields, *wheels, what)
+        return reading.wheel_torques(fields, self.names.wheels, what)
 
     def follow_clock(self) -> None:
         """Let the time pass that has passed on the wall clock."""

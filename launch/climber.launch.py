@@ -108,16 +108,9 @@ def described(
         for name in nodes
     ]
     seen = viewers(time, namespace, config, prefix) if on["rviz"] else []
+    ours = qos(namespace) if on["sim"] else []
     recorder = ExecuteProcess(
-        cmd=[
-            "ros2",
-            "bag",
-            "record",
-            "--all",
-            "--storage",
-            "mcap",
-            *(qos(namespace) if on["sim"] else []),
-        ],
+        cmd=["ros2", "bag", "record", "--all", "--storage", "mcap", *ours],
         name="recorder",
         output="screen",
         prefix=prefix,

@@ -58,24 +58,27 @@ def name(file):
 MODULES = {name(file) for file in PACKAGE.rglob("*.py")}
 
 
-@cache
 def imported(file, when_run=False):
     """Modules that a file imports; those that only type checkers see too, unless `when_run`."""
-    return [*_imported(file, when_run)]
+    return [module for module, is_run in _imported(file) if is_run or not when_run]
 
 
-def _imported(file, when_run):
-    nodes = [*ast.walk(ast.parse(file.read_text()))]
-    checked = [n for n in nodes if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.dump(n.test)]
-    skipped = {inner for outer in checked for inner in ast.walk(outer)} if when_run else set()
-    for node in nodes:
-        if node in skipped:
-            continue
+@cache
+def _imported(file):
+    return [*_imported_in(ast.parse(file.read_text()))]
+
+
+def _imported_in(tree, is_run=True):
+    """Modules that are imported, each with whether a run sees that too."""
+    for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            yield from ((alias.name, is_run) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             inner = [f"{node.module}.{alias.name}" for alias in node.names]
-            yield from [m for m in inner if m in MODULES] or [node.module]
+            yield from ((m, is_run) for m in [m for m in inner if m in MODULES] or [node.module])
+        elif not isinstance(node, ast.expr):  # in which nothing is imported
+            is_checked = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+            yield from _imported_in(node, is_run and not is_checked)
 
 
 def is_ros(module):

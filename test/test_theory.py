@@ -28,16 +28,15 @@ def prose(file, text):
     """What of a file may cite: docstrings and comments of Python, Markdown without its code."""
     if file.suffix == ".md":
         return CODE.sub("", text)
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    comments = [token.string for token in tokens if token.type == tokenize.COMMENT]
-    docstrings = [
-        node.value.value
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Expr)
-        and isinstance(node.value, ast.Constant)
-        and isinstance(node.value.value, str)
-    ]
-    return "\n".join(docstrings + comments)
+    found, begins = [], True  # whether a statement does
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            found.append(token.string)
+        elif begins and token.type == tokenize.STRING:
+            found.append(ast.literal_eval(token.string))
+        if token.type not in (tokenize.COMMENT, tokenize.NL):
+            begins = token.type in (tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
+    return "\n".join(found)
 
 
 def unresolved(file, text):

@@ -117,7 +117,7 @@ def _campaign(tree: Any, directory: Path, instead: dict[str, int]) -> Campaign:
     for name in own:
         names.check_drawn(name, shared)
     scenario = Scenario(shared, size.duration, size.backend)
-    return Campaign(base, size, scenario, own, tuple(Limit.read(text) for text in limits))
+    return Campaign(base, size, scenario, own, tuple(Limit.read(str(text)) for text in limits))
 
 
 def _size(given: dict[str, Any]) -> Size:

@@ -1,14 +1,12 @@
 """Metrics of a run, and the limits within which it succeeds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from climber_uk.closed_loop.outcome import Outcome
 from climber_uk.mechanics import Array
-from climber_uk.report.comparison import OPERATORS, parse
+from climber_uk.report.comparison import Comparison
 
 METRICS: dict[str, tuple[str, Callable[[Outcome], Array]]] = {
     "rms_distance": ("m", lambda outcome: outcome.rms),
@@ -24,30 +22,18 @@ METRICS: dict[str, tuple[str, Callable[[Outcome], Array]]] = {
 }
 
 
-@dataclass(frozen=True)
-class Limit:
-    """A bound that a metric must keep."""
+class Limit(Comparison):
+    """A bound that a metric must keep, as max_distance < 0.05."""
 
-    metric: str
-    comparison: str
-    bound: float
-
-    @classmethod
-    def read(cls, text: Any) -> "Limit":
-        """Limit of a text like 'max_distance < 0.05'; raises `ValueError` if it is none."""
-        return cls(*parse(str(text), METRICS))
+    metrics = METRICS
 
     def __str__(self) -> str:
-        return f"{self.metric} {self.comparison} {self.bound:.12g}"
-
-    def holds(self, values: Array) -> Any:
-        """Whether values (n,) of the metric keep the bound; nan does not."""
-        return OPERATORS[self.comparison](values, self.bound)
+        return f"{self.metric} {self.operator} {self.bound:.12g}"
 
     def excess(self, values: Array) -> Array:
         """Excess (n,) of values (n,) over the bound; infinite for nan."""
         over = values - self.bound
-        over = {"<": over, ">": -over}.get(self.comparison[0], np.abs(over))
+        over = {"<": over, ">": -over}.get(self.operator[0], np.abs(over))
         return np.where(np.isnan(over), np.inf, over)
 
 

@@ -86,8 +86,7 @@ class Store:
     def row(self, run: int) -> dict[str, object]:
         """Row of a run: number, values drawn, metrics, verdict."""
         table = self._table(run // PART)
-        row: dict[str, object] = table.slice(run % PART, 1).to_pylist()[0]
-        return row
+        return table.slice(run % PART, 1).to_pylist()[0]
 
     def _table(self, number: int, names: Sequence[str] | None = None) -> pa.Table:
         path = self._path(number)

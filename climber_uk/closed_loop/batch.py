@@ -114,11 +114,9 @@ class Loops:
         controllers = pressure_gauge.controllers(
             self.law, self._climbers(course, ticks), course.period, self.gauge
         )
-        by_tick = (
-            *(self._noise(ticks), self._climbers(course, ticks)),
-            *(controllers, _targets(course, ticks)),
-        )
-        for tick, given in enumerate(zip(*by_tick, strict=True)):
+        climbers, targets = self._climbers(course, ticks), _targets(course, ticks)
+        by_tick = zip(self._noise(ticks), climbers, controllers, targets, strict=True)
+        for tick, given in enumerate(by_tick):
             time = tick * course.period
             yield Given(SECOND + round(time * SECOND), time, *given)
 

@@ -90,8 +90,7 @@ class MotionSeen:
     @cached_property
     def time(self) -> Array:
         """Time (n,) [s] since the first stamp."""
-        time: Array = (self.stamp - self.stamp[:1]) / SECOND
-        return time
+        return (self.stamp - self.stamp[:1]) / SECOND
 
     @cached_property
     def period(self) -> float:

@@ -87,11 +87,10 @@ class DriverNode(ClimberNode):
 
     def on_joints(self, message: JointState) -> None:
         """Keep the wheels' rates, if they are told; nobody has to."""
-        wheels = self.names.left_wheel_joint, self.names.right_wheel_joint
         stamp = reading.nanoseconds(message.header.stamp)
         fields = reading.JointFields(*divmod(stamp, SECOND), message.velocity, message.name)
         with suppress(ValueError):
-            right, left = reading.wheel_torques(fields, *wheels, "velocities")
+            right, left = reading.wheel_torques(fields, self.names.wheels, "velocities")
             self.turning.append(WheelRates(stamp, right, left))
 
     def on_odometry(self, message: Odometry, info: dict[str, int]) -> None:
@@ -118,9 +117,9 @@ class DriverNode(ClimberNode):
 
     def message(self, command: WheelCommand, stamp: int) -> JointState:
         """Message of a command that answers the odometry of `stamp` [ns]."""
-        left, right = self.names.left_wheel_joint, self.names.right_wheel_joint
-        message = writing.wheel_torques(command.torques, stamp, left, right)
-        message.velocity = self.names.wheels.rates(*writing.left_right(command.rates))
+        joints = self.names.wheels
+        message = writing.wheel_torques(command.torques, stamp, joints)
+        message.velocity = joints.rates(*writing.left_right(command.rates))
         return message
 
     def decide(self, message: Odometry, stamp: int) -> WheelCommand | None:

@@ -157,14 +157,12 @@ class Steps:
         since = self.measured - delay
         last = np.clip(np.searchsorted(self.times, since, "right") - 1, 0, None)
         left = np.exp(-np.maximum(0.0, since - self.times[last]) / time_constant)
-        reached: Array = self.rates[last] + (before[last] - self.rates[last]) * left
-        return reached
+        return self.rates[last] + (before[last] - self.rates[last]) * left
 
     def gains(self, reached: Array) -> Array:
         """Both speeds (2,) by the rate that a servo has reached, where that has settled."""
         reached, speeds = reached[self.steady], self.speeds[self.steady]
-        gains: Array = reached @ speeds / (reached @ reached)
-        return gains
+        return reached @ speeds / (reached @ reached)
 
 
 def respond_to_speeds(motion: MotionSeen, trial: TrialRecord, climber: Climber) -> Response:
@@ -252,8 +250,7 @@ def response_of(seen: Evidence) -> Response | None:
     kept = vars(seen)
     if "response" not in kept:
         kept["response"] = respond(seen.motion, seen.trial, seen.climber)
-    found: Response = kept["response"]
-    return found
+    return kept["response"]
 
 
 def _cosine(a: Array, b: Array) -> float:

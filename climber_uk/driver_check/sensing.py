@@ -176,8 +176,7 @@ def near(value: float, wanted: float) -> bool:
 def at(motion: MotionSeen, values: Array, stamps: Times) -> Array:
     """Values (n,) of odometry at other stamps."""
     since = (stamps - motion.stamp[0]) / SECOND
-    found: Array = np.interp(since, motion.time, values)
-    return found
+    return np.interp(since, motion.time, values)
 
 
 def angle_between(vectors: Array, others: Array) -> float:

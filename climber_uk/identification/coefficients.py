@@ -162,5 +162,4 @@ def _interval(squares: Array, most: Array) -> Array:
     variance = squares.sum(axis=0)
     ratio = variance**2 / np.maximum((squares**2).sum(axis=0), NOTHING)
     freedom = np.clip(3 * ratio - 2, 1, most)
-    half: Array = stdtrit(freedom, QUANTILE) * np.sqrt(variance)
-    return half
+    return stdtrit(freedom, QUANTILE) * np.sqrt(variance)

@@ -36,7 +36,8 @@ from climber_uk.identification.integral_equations import (
     Site,
     drive_equations,
     friction_load,
-    wheel_equations,
+    heading_equations,
+    way_equations,
     yaw_equations,
 )
 from climber_uk.identification.lateness import DELAYS, Columns, lateness
@@ -86,7 +87,7 @@ def identify(
     slips = any(lack.kind == WAY and not lack.fits for lack in lacks(found, motion, climber))
     if YAW in fits:
         pushing = climber if slips else replace(climber, wheel_radius=found["wheel_radius"])
-        of_kept = replace(task, windows=kept.windows).equations[YAW]
+        of_kept = replace(task, windows=kept.windows).equations(YAW)
         found = replace(found, resisted=resisted(of_kept, pushing, task.noise(YAW)))
     found = with_scrub(found, columns, climber, slips)
     found = replace(found, lacks=tuple(lacks(found, motion, climber)))
@@ -100,8 +101,8 @@ def predicted(
     task = Task(motion, climber, site, _windows(motion, cut))
     columns = _columns(task.extent)
     fits = {
-        kind: WindowFit.standardised(each, columns[kind], task.noise(kind))
-        for kind, each in task.equations.items()
+        kind: WindowFit.standardised(task.equations(kind), columns[kind], task.noise(kind))
+        for kind in task.kinds
     }
     values, widths, sought = parameters(fits, columns, climber)
     none = np.zeros_like(widths.white)
@@ -124,15 +125,13 @@ class Task:
         yawing = [YAW] if len(self.windows[YAW]) >= LEAST_WINDOWS else []
         return [DRIVE, *yawing, *([] if self.motion.wheel_angles is None else [WAY, HEADING])]
 
-    @property
-    def equations(self) -> dict[str, list[Equations]]:
-        """Equations of each window, by kind."""
-        found = {DRIVE: drive_equations(self.motion, self.climber, self.site, self.windows[DRIVE])}
-        if YAW in self.kinds:
-            found[YAW] = yaw_equations(self.motion, self.windows[YAW])
-        if WAY in self.kinds:
-            found[WAY], found[HEADING] = wheel_equations(self.motion, self.windows[WAY])
-        return found
+    def equations(self, kind: str) -> list[Equations]:
+        """Equations of one kind in each of its windows."""
+        motion, windows = self.motion, self.windows[kind]
+        if kind == DRIVE:
+            return drive_equations(motion, self.climber, self.site, windows)
+        made_of = {YAW: yaw_equations, WAY: way_equations, HEADING: heading_equations}
+        return made_of[kind](motion, windows)
 
     @property
     def extent(self) -> Extent:
@@ -156,9 +155,9 @@ class Task:
 
     def fitted(self, columns: Columns) -> tuple["Task", dict[str, WindowFit]]:
         """The task with the windows that were kept (see `Misfit.strange`), and fits by kind."""
-        equations, windows, fits = self.equations, dict(self.windows), {}
+        windows, fits = dict(self.windows), {}
         for kind, own in columns.items():
-            fits[kind], kept = _fitted(equations[kind], own, self.noise(kind))
+            fits[kind], kept = _fitted(self.equations(kind), own, self.noise(kind))
             windows[kind] = [self.windows[kind][number] for number in kept]
         return replace(self, windows=windows), fits
 
@@ -187,8 +186,7 @@ class Task:
         impulses: Any = self.climber.force_and_moment(motion.impulse)
         all_of_it = np.stack([motion.time, *impulses, motion.way, motion.pose[:, 2]])
         ends = np.array([window[[0, -1]] for window in self.windows[kind]], np.intp).reshape(-1, 2)
-        changes: Array = all_of_it[:, ends[:, 1]] - all_of_it[:, ends[:, 0]]
-        return changes
+        return all_of_it[:, ends[:, 1]] - all_of_it[:, ends[:, 0]]
 
 
 def _windows(motion: RecordedMotion, cut: Cut) -> Windows:

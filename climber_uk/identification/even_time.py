@@ -14,8 +14,7 @@ LEAST_LAG = 1e-5  # [s]
 def gaps(time: Array) -> NDArray[np.bool_]:
     """Whether there is a gap between each time and the next (n - 1,)."""
     steps = np.diff(time)
-    missing: NDArray[np.bool_] = steps > max(GAP, MISSING * float(np.median(steps)))
-    return missing
+    return steps > max(GAP, MISSING * float(np.median(steps)))
 
 
 def rate(time: Array, gone: Array, smoothing: float) -> Array:
@@ -27,8 +26,7 @@ def rate(time: Array, gone: Array, smoothing: float) -> Array:
             return np.gradient(values, step) if len(values) > 1 else 0 * values
         from scipy.signal import savgol_filter  # slow to import
 
-        smooth: Array = savgol_filter(values, 2 * half + 1, 3, deriv=1, delta=step)
-        return smooth
+        return savgol_filter(values, 2 * half + 1, 3, deriv=1, delta=step)
 
     return _evenly(time, gone, slope)
 
@@ -43,8 +41,7 @@ def lagging(time: Array, values: Array, lag: float) -> Array:
     def filtered(even: Array, step: float) -> Array:
         decay, ratio = np.exp(-step / lag), lag / step
         line = [1 - ratio * (1 - decay), ratio * (1 - decay) - decay]
-        late: Array = even[0] + lfilter(line, [1, -decay], even - even[0])
-        return late
+        return even[0] + lfilter(line, [1, -decay], even - even[0])
 
     return _evenly(time, values, filtered)
 

@@ -16,7 +16,7 @@ from climber_uk.identification.estimation import CUT, LEAST_WINDOWS, SITE, predi
 from climber_uk.identification.identified import DRIVE, NAMES, YAW, Identified
 from climber_uk.identification.integral_equations import Site, integral
 from climber_uk.identification.recorded_motion import RecordedMotion
-from climber_uk.mechanics import Array, unpack
+from climber_uk.mechanics import Array, cross, unpack
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import sign, sin
 from climber_uk.mechanics.shapes import Circle, Ellipse, Lemniscate, Line, Shape
@@ -124,8 +124,8 @@ def _shapes(size: float) -> Iterator[tuple[str, Shape]]:
 def _sharpest(shape: Shape) -> float:
     """Least radius of its bends [m]: below the half track, the wheels inside would roll back."""
     _, slope, curving, *_ = shape.derivatives(np.linspace(0, shape.length, 1000))
-    bend = np.abs(slope[..., 0] * curving[..., 1] - slope[..., 1] * curving[..., 0])
-    return float((np.linalg.norm(slope, axis=-1) ** 3 / np.maximum(bend, 1e-9)).min())
+    bend = np.maximum(np.abs(cross(slope, curving)), 1e-9)
+    return float((np.linalg.norm(slope, axis=-1) ** 3 / bend).min())
 
 
 def _law(shape: Shape, ramp_time: float, limits: ExcitationLimits) -> RestToRest:

@@ -84,5 +84,4 @@ def weak_mean(time: Array, values: Array, order: int) -> Array:
     """
     weight = np.polynomial.Polynomial([0, 0, 1, -2, 1], time[[0, -1]], (0, 1))
     share = (-1) ** order * weight.deriv(order)(time) if order else weight(time)
-    mean: Array = np.trapezoid(share * values.T, time) / np.trapezoid(weight(time), time)
-    return mean
+    return np.trapezoid(share * values.T, time) / np.trapezoid(weight(time), time)

@@ -113,8 +113,8 @@ def plant_of(options: argparse.Namespace, doubtful: list[str]) -> dict[str, Any]
     return parameters_of(PLANT, options, doubtful) if its.keys() & names_of(PLANT) else {}
 
 
-def main() -> None:
-    """Identify, or plan."""
+def parse() -> argparse.Namespace:
+    """Options of the command line."""
     parser = Parser("identify", __doc__)
     parser.add_argument("bag", type=Path, nargs="?", help="rosbag2 directory, MCAP or sqlite3")
     parser.add_argument("--params", type=Path, help="parameter file of the nodes as they are")
@@ -137,6 +137,12 @@ def main() -> None:
     options = parser.arguments()
     if (options.bag is None) == (options.plan is None):
         parser.error("want a bag, or --plan")
+    return options
+
+
+def main() -> None:
+    """Identify, or plan."""
+    options = parse()
     untold: list[str] = []
     written = list(filter(None, (options.output, options.json, options.figure, options.plan)))
     with failing_in_a_line("identify") as doubtful:

@@ -120,17 +120,14 @@ def yaw_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Eq
     return found
 
 
-def wheel_equations(
-    motion: RecordedMotion, windows: Sequence[Indices]
-) -> tuple[list[Equations], list[Equations]]:
-    """Way = r (φR + φL)/2 and heading = r/d (φR - φL)/2 in each window."""
-    assert motion.wheel_angles is not None
-    right, left = motion.wheel_angles.T
-    both = (motion.way, (right + left) / 2), (motion.pose[:, 2], (right - left) / 2)
-    way, heading = (
-        [_of_wheels(motion.time[w], gone[w], angle[w]) for w in windows] for gone, angle in both
-    )
-    return way, heading
+def way_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
+    """Way = r (φR + φL)/2 in each window, where wheel angles are known."""
+    return _of_wheels(motion, windows, motion.way, (1.0, 1.0))
+
+
+def heading_equations(motion: RecordedMotion, windows: Sequence[Indices]) -> list[Equations]:
+    """Heading = r/d (φR - φL)/2 in each window, where wheel angles are known."""
+    return _of_wheels(motion, windows, motion.pose[:, 2], (1.0, -1.0))
 
 
 def friction_load(motion: RecordedMotion, climber: Climber, site: Site) -> Array:
@@ -144,8 +141,7 @@ def gravity_ahead(motion: RecordedMotion, climber: Climber, site: Site) -> Array
     """Gravity along the heading (n,) [m/s²]."""
     x, y, heading = motion.pose.T
     s_x, s_y = site.wall.along(climber.inclination, x, y)
-    along: Array = GRAVITY * (s_x * np.cos(heading) + s_y * np.sin(heading))
-    return along
+    return GRAVITY * (s_x * np.cos(heading) + s_y * np.sin(heading))
 
 
 def _impulses(motion: RecordedMotion, window: Indices, column: int, resisted: Array) -> Array:
@@ -195,10 +191,18 @@ def _twice_integrated(
     )
 
 
-def _of_wheels(time: Array, gone: Array, angle: Array) -> Equations:
-    lacking = integral(_shapes(time), time)
-    one = np.ones((len(time), 1))
-    return Equations(one, (angle - angle[0])[:, None], gone - gone[0], lacking, 1)
+def _of_wheels(
+    motion: RecordedMotion, windows: Sequence[Indices], gone: Array, signs: tuple[float, float]
+) -> list[Equations]:
+    """Of `gone` (n,), by half the sum of the wheels' angles with these `signs`."""
+    assert motion.wheel_angles is not None
+    angle, found = motion.wheel_angles @ np.array(signs) / 2, []
+    for window in windows:
+        time, since = motion.time[window], window[0]
+        one, turned = np.ones((len(time), 1)), (angle[window] - angle[since])[:, None]
+        lacking = integral(_shapes(time), time)
+        found.append(Equations(one, turned, gone[window] - gone[since], lacking, 1))
+    return found
 
 
 def _shapes(time: Array) -> Array:
@@ -208,8 +212,11 @@ def _shapes(time: Array) -> Array:
 
 
 def integral(values: Array, time: Array) -> Array:
-    """Integral from the first time to each one, by the trapezoidal rule."""
-    from scipy.integrate import cumulative_trapezoid  # slow to import
+    """Integral of values (n,) or (n, k) from the first time (n,) to each, by the trapezoidal rule.
 
-    found: Array = cumulative_trapezoid(values, time, axis=0, initial=0)
-    return found
+    scipy's takes more than twice as long for the few values of a window, and a search for lateness
+    needs it ten thousand times.
+    """
+    steps, total = np.diff(time).reshape(-1, *[1] * (values.ndim - 1)), np.zeros(values.shape)
+    np.cumsum(steps * (values[1:] + values[:-1]) / 2.0, axis=0, out=total[1:])
+    return total

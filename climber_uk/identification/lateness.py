@@ -20,7 +20,8 @@ DELAYS, LAGS = (0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2), (0.0, 0.02, 0.04, 
 SURE = 4.0  # standard deviations, above which a delay is significant
 EVALUATIONS = 60
 
-EquationsAt = Callable[[float, float], Mapping[str, Sequence[Equations]]]  # of delay and lag
+# of delay and lag, then of the kind
+EquationsAt = Callable[[float, float], Callable[[str], Sequence[Equations]]]
 
 
 def lateness(
@@ -37,7 +38,7 @@ def lateness(
     def cost(late: Sequence[float]) -> float:
         equations = equations_at(*np.abs(late).tolist())
         return sum(
-            WindowFit.standardised(equations[kind], columns[kind], fit.noise).cost
+            WindowFit.standardised(equations(kind), columns[kind], fit.noise).cost
             for kind, fit in fits.items()
         )
 

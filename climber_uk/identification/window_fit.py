@@ -59,8 +59,7 @@ class Misfit:
         usual = np.maximum(MEDIAN * np.median(np.abs(self.found), axis=0), self.noise + SLIGHT)
         worst = np.max(np.abs(self.found) / usual, axis=1)
         limit = np.quantile(worst, 1 - FEW)
-        strange: NDArray[np.bool_] = worst > max(STRANGE, limit)
-        return strange
+        return worst > max(STRANGE, limit)
 
     @property
     def ratio(self) -> float:
@@ -120,8 +119,7 @@ class WindowFit:
             weighted = weights[:, None] * self.design
             found = _inverse(weighted.T @ self.design) @ (weighted.T @ self.target)
             weights = _weights(self.target - self.design @ found)
-        coefficients: Array = found
-        return coefficients
+        return found
 
     @cached_property
     def residuals(self) -> Array:
@@ -150,8 +148,7 @@ class WindowFit:
         rows = self.design, self._weights, self.residuals
         g = self._by_window(lambda J, w, r: J.T @ (w * r), *rows)
         rest = self.information.sum(axis=0) - self.information
-        changes: Array = (_inverse(rest) @ g[..., None])[..., 0]
-        return changes
+        return (_inverse(rest) @ g[..., None])[..., 0]
 
     def deviation(self, number: int) -> float:
         """Standard deviation of a coefficient, by differences of the windows or by noise."""
@@ -183,10 +180,7 @@ class WindowFit:
 
         `slopes` (p, c) are their derivatives by the coefficients.
         """
-        moved: Array = (np.abs(self.pulls @ slopes.T) * self.misfit.excess[:, None]).sum(
-            axis=(0, 1)
-        )
-        return moved
+        return (np.abs(self.pulls @ slopes.T) * self.misfit.excess[:, None]).sum(axis=(0, 1))
 
     def _white(self) -> Array:
         """Standard deviation (q,) of the white part of residuals, from their differences."""
@@ -210,8 +204,7 @@ class WindowFit:
 
 
 def _weights(residuals: Array) -> Array:
-    weights: Array = 1 / np.sqrt(1 + (residuals / CLEAR) ** 2)
-    return weights
+    return 1 / np.sqrt(1 + (residuals / CLEAR) ** 2)
 
 
 def _inverse(matrix: Array) -> Array:

@@ -151,8 +151,7 @@ def gravity(state: Array, late: Late, along_wall: float) -> Array:
     """Specific force (2,) of the weight forwards, to the left [m/s²]; `along_wall` is g_t."""
     heading = earlier_heading(state, late)
     exact = np.array([along_wall * math.sin(heading), along_wall * math.cos(heading)])
-    biased: Array = exact + state[FORCE_BIASES]
-    return biased
+    return exact + state[FORCE_BIASES]
 
 
 def gravity_jacobian(state: Array, late: Late, along_wall: float) -> Array:

@@ -48,11 +48,14 @@ def transpose(matrix: Array) -> Array:
 
 def times(matrix: Array, vector: Array) -> Array:
     """Matrices (..., m, n) times vectors (..., n)."""
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def cross(u: Array, v: Array) -> Array:
+    """Cross products (...) of vectors (..., 2)."""
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
 def solve(matrix: Array, vector: Array) -> Array:
     """Solutions (..., n) of matrices (..., n, n) for right-hand sides (..., n)."""
-    solution: Array = np.linalg.solve(matrix, vector[..., None])[..., 0]
-    return solution
+    return np.linalg.solve(matrix, vector[..., None])[..., 0]

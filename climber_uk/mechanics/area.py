@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, cross
 from climber_uk.mechanics.waypoint_file import blocks, read_text, read_waypoint_text
 
 MOST_CORNERS = 300  # to look at them takes a time that grows with their square
@@ -131,10 +131,10 @@ class Area:
         )
         for corner in (begin, end):
             apart = np.minimum(apart, _distance(corner, start, way))
-        crosses = _cross(way, extent)
+        crosses = cross(way, extent)
         gap = begin - start
         with np.errstate(divide="ignore", invalid="ignore"):
-            t, u = _cross(gap, extent) / crosses, _cross(gap, way) / crosses
+            t, u = cross(gap, extent) / crosses, cross(gap, way) / crosses
         # parallel ones that touch are no distance apart
         is_across: Any = np.abs(crosses) > 1e-12 * np.hypot(*np.moveaxis(way, -1, 0))
         meets = is_across & (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
@@ -198,10 +198,10 @@ def _refuse_crossings(rings: Sequence[Array]) -> None:
     way = end - begin
     for edge in range(len(begin) - 1):
         later = slice(edge + 1, None)
-        crosses = _cross(way[edge], way[later])
+        crosses = cross(way[edge], way[later])
         gap = begin[later] - begin[edge]
         with np.errstate(divide="ignore", invalid="ignore"):
-            t, u = _cross(gap, way[later]) / crosses, _cross(gap, way[edge]) / crosses
+            t, u = cross(gap, way[later]) / crosses, cross(gap, way[edge]) / crosses
         inner = 1e-9, 1 - 1e-9  # edges may touch
         meet = (t > inner[0]) & (t < inner[1]) & (u > inner[0]) & (u < inner[1])
         if meet.any():
@@ -223,7 +223,3 @@ def _distance(points: Array, begin: Array, way: Array) -> Array:
     square = np.maximum((way**2).sum(axis=-1), 1e-300)
     share = np.clip(((points - begin) * way).sum(axis=-1) / square, 0.0, 1.0)
     return np.hypot(*np.moveaxis(points - begin - share[..., None] * way, -1, 0))
-
-
-def _cross(u: Array, v: Array) -> Array:
-    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])

@@ -126,8 +126,7 @@ class Climber:
     @cached_property
     def weight_along_wall(self) -> float:
         """m g_t, the part of the weight that pulls along -y [N]."""
-        weight: float = self.mass * GRAVITY * sin(self.inclination * DEGREE)
-        return weight
+        return self.mass * GRAVITY * sin(self.inclination * DEGREE)
 
     @property
     def falls(self) -> bool:
@@ -137,8 +136,7 @@ class Climber:
     @cached_property
     def gravity_into_wall(self) -> float:
         """g_n of a flat wall, below 0 where it pulls the climber off [m/s²]."""
-        gravity: float = GRAVITY * cos(self.inclination * DEGREE)
-        return gravity
+        return GRAVITY * cos(self.inclination * DEGREE)
 
     @cached_property
     def inertial(self) -> tuple[float, float, float, float]:
@@ -233,10 +231,6 @@ class Climber:
     def wheel_rates(self, state: State) -> Array:
         """Turning rates (v ± d ω) / r of the wheels (right, left), (..., 2) [rad/s]."""
         return pack(*self.rim_rates(state.motion))
-
-    def torque_bounds(self, state: State) -> tuple[Bounds, Bounds]:
-        """Lowest and highest torque [N m] of the right wheel, and of the left one, each (...)."""
-        return self.bounds(state.motion)
 
     def rolling_acceleration(self, state: State, torques: Array, direction: Array | float) -> Array:
         """q̈ of the climber that rolls without side slip under `torques`, (..., 3).

@@ -98,13 +98,6 @@ def anywhere(condition: Any) -> Any:
     return namespace(condition) is not np or bool(condition.any())
 
 
-def either(condition: Any, these: tuple[Any, Any], those: tuple[Any, Any]) -> tuple[Any, Any]:
-    """`select` of two numbers by one condition."""
-    if condition is True or condition is False or isinstance(condition, np.bool_):
-        return these if condition else those
-    return select(condition, these[0], those[0]), select(condition, these[1], those[1])
-
-
 SMALL_ANGLE = 0.03  # [rad] below which a few terms of the series give sine and cosine
 # of x², as many as it takes up to an eighth of half a turn
 COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(7)]

@@ -9,6 +9,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,10 @@ class Preview:
         for name in ("pose", "velocity", "acceleration"):
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} of a point is not finite")
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        return self.times, self.pose, self.velocity, self.acceleration
 
     def check_heading(self) -> None:
         """Raise `ValueError` unless every point moves along its heading, forwards or backwards.
@@ -103,12 +108,7 @@ class Preview:
         """Preview of the last `points` points, or of all if there are fewer."""
         if len(self.times) <= points:
             return self
-        return Preview(
-            self.times[-points:],
-            self.pose[-points:],
-            self.velocity[-points:],
-            self.acceleration[-points:],
-        )
+        return Preview(*(array[-points:] for array in self._arrays))
 
     def goes_on_with(self, newer: "Preview", tolerance: float) -> bool:
         """Whether `newer` begins within `tolerance` [m, rad] of where this one is by then."""
@@ -122,12 +122,8 @@ class Preview:
     def continued(self, newer: "Preview", since: int) -> "Preview":
         """Preview of this one's points from `since` [ns] on, then all of `newer`."""
         old = slice(*np.searchsorted(self.times, [since, newer.times[0]]))
-        return Preview(
-            times=np.concatenate([self.times[old], newer.times]),
-            pose=np.concatenate([self.pose[old], newer.pose]),
-            velocity=np.concatenate([self.velocity[old], newer.velocity]),
-            acceleration=np.concatenate([self.acceleration[old], newer.acceleration]),
-        )
+        both = zip(self._arrays, newer._arrays, strict=True)
+        return Preview(*(np.concatenate([before[old], after]) for before, after in both))
 
 
 def _derivatives(coefficients: list[float], t: float) -> tuple[float, float, float, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, cross
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Shape
 from climber_uk.mechanics.trajectory import Trajectory
@@ -47,7 +47,7 @@ def summary(trajectory: Trajectory, half_track: float | None = None) -> Summary:
 
     def curvature(s: Array) -> Array:
         _, p_1, p_2, _ = path.derivatives(s)
-        return np.abs(_cross(p_1, p_2)) / _size(p_1) ** 3
+        return np.abs(cross(p_1, p_2)) / _size(p_1) ** 3
 
     def speed(reference: Reference) -> Array:
         return np.abs(reference.speed)
@@ -130,8 +130,3 @@ def _highest(f: Callable[[Array], Array], x: Array, values: Array) -> tuple[floa
 def _size(vectors: Array) -> Array:
     """Length (...) of vectors (..., 2)."""
     return np.hypot(vectors[..., 0], vectors[..., 1])
-
-
-def _cross(u: Array, v: Array) -> Array:
-    """Cross product (...) of vectors (..., 2)."""
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]

@@ -39,10 +39,9 @@ class TimeLaw(Protocol):
 
 
 def _rate() -> float:
-    rate: float = parameter(
+    return parameter(
         1.0, "", "path parameter a second: rad/s for round shapes, m/s for others", above=0
     )
-    return rate
 
 
 @parameters

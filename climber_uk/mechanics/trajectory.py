@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, cross
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.shapes import Shape
@@ -52,7 +52,10 @@ class Trajectory:
             )
 
     def _refuse_absurd(self) -> None:
-        """Also where the law is none for this path."""
+        """Raise `ValueError` for a path too far off, too small or too long in time.
+
+        So does a law whose table is of another path; `ArithmeticError` where numbers overflow.
+        """
         course = self.course
         places = course.derivatives(np.linspace(0.0, course.length, LOOKS))[0]
         extent = float(np.ptp(places, axis=0).max())
@@ -107,9 +110,9 @@ class Trajectory:
         forwards = p_1 * np.asarray(self.course.gear(s))[..., None]
         heading = np.arctan2(forwards[..., 1:], forwards[..., :1]) + np.pi * self.reverse_gear
         square = np.sum(p_1**2, axis=-1, keepdims=True)
-        curvature = _cross(p_1, p_2) / square  # dθ/ds
+        curvature = cross(p_1, p_2)[..., None] / square  # dθ/ds
         curvature_1 = (  # by s
-            _cross(p_1, p_3) / square
+            cross(p_1, p_3)[..., None] / square
             - 2 * curvature * np.sum(p_1 * p_2, axis=-1, keepdims=True) / square
         )
         yaw_rate = curvature * s_1
@@ -120,8 +123,3 @@ class Trajectory:
             acceleration=np.concatenate([acceleration, yaw_acceleration], axis=-1),
             jerk=jerk,
         )
-
-
-def _cross(u: Array, v: Array) -> Array:
-    """Cross product (..., 1) of vectors (..., 2)."""
-    return u[..., :1] * v[..., 1:] - u[..., 1:] * v[..., :1]

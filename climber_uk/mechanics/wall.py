@@ -16,15 +16,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Protocol
 
 from climber_uk.mechanics.climber import DEGREE, GRAVITY, Climber
-from climber_uk.mechanics.elementary import (
-    anywhere,
-    cos,
-    everywhere,
-    select,
-    sin,
-    sqrt,
-    with_sign_of,
-)
+from climber_uk.mechanics.elementary import cos, everywhere, select, sin, sqrt, with_sign_of
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.parameters.declaration import parameter, parameters
 from climber_uk.parameters.registry import Variants
@@ -66,12 +58,11 @@ class Plane(Wall):
 class Cylinder(Wall):
     """A tank or a pipe with a horizontal axis along x; y runs around it."""
 
-    radius: float = parameter(2.0, "m", "radius R: > 0 inside the cylinder, < 0 on its outside")
+    radius: float = parameter(
+        2.0, "m", "radius R: > 0 inside the cylinder, < 0 on its outside", nonzero=True
+    )
 
     flat: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        _check_radius(self.radius)
 
     def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
@@ -87,12 +78,11 @@ class Cylinder(Wall):
 class Tank(Wall):
     """A tank or a hull whose axis is along y: upright where `inclination` is 90."""
 
-    radius: float = parameter(5.0, "m", "radius R: > 0 inside the tank, < 0 on its outside")
+    radius: float = parameter(
+        5.0, "m", "radius R: > 0 inside the tank, < 0 on its outside", nonzero=True
+    )
 
     flat: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        _check_radius(self.radius)
 
     def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
@@ -114,14 +104,10 @@ class Cone(Wall):
     """
 
     distance: float = parameter(
-        5.0, "m", "from the origin to the apex: > 0 it is uphill, < 0 downhill"
+        5.0, "m", "from the origin to the apex: > 0 it is uphill, < 0 downhill", nonzero=True
     )
 
     flat: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        if anywhere(self.distance == 0):
-            raise ValueError("distance=0.0 must not be 0 [m]")
 
     def _to_apex(self, x: Any, y: Any) -> tuple[Any, Any, Any]:
         """Direction (e_x, e_y) to the apex, and how far it is [m]."""
@@ -148,12 +134,11 @@ class Cone(Wall):
 class Sphere(Wall):
     """A spherical tank or bulb."""
 
-    radius: float = parameter(5.0, "m", "radius R: > 0 inside the sphere, < 0 on its outside")
+    radius: float = parameter(
+        5.0, "m", "radius R: > 0 inside the sphere, < 0 on its outside", nonzero=True
+    )
 
     flat: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        _check_radius(self.radius)
 
     def along(self, inclination: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """See `Wall`."""
@@ -230,11 +215,6 @@ def _turned(inclination: Any, ahead: Any, angle: Any) -> tuple[Any, Any]:
     """
     into = cos(inclination * DEGREE)
     return ahead * cos(angle) - into * sin(angle), into * cos(angle) + ahead * sin(angle)
-
-
-def _check_radius(radius: Any) -> None:
-    if anywhere(radius == 0):
-        raise ValueError("radius=0.0 must not be 0 [m]")
 
 
 WALLS = Variants[type[Wall]](

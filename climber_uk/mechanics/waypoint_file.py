@@ -185,7 +185,7 @@ def _columns(
             names = _shortened(_split(bare, mark), 2)
             if len(names) == len(first) and {"x", "y"} <= {_name(name) for name in names}:
                 return _named("comment", names), lines
-    if len(first) == 2 or len(first) < 2:
+    if len(first) <= 2:
         return _Columns(2), lines
     raise ValueError(
         f"line {number}: {len(first)} columns without a header: "

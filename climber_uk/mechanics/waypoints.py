@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from climber_uk.mechanics import Array
+from climber_uk.mechanics import Array, cross
 from climber_uk.mechanics.elementary import Derivatives, compose
 from climber_uk.mechanics.rounding import Rounded, rounded
 from climber_uk.mechanics.slowing import Slowed, SpeedLimits, slowed
@@ -269,7 +269,7 @@ class SlowedPath:
         middle = (cells[:-1] + cells[1:]) / 2
         p_1, p_2 = self.path.curve(middle, 1), self.path.curve(middle, 2)
         speed, rho = np.hypot(*p_1.T), self.slowed.slowness(middle)
-        bend = np.abs(p_1[:, 0] * p_2[:, 1] - p_1[:, 1] * p_2[:, 0]) / speed**2
+        bend = np.abs(cross(p_1, p_2)) / speed**2
         most = [np.argsort(what)[-STATIONS:] for what in (speed / rho, bend / rho, bend / speed)]
         s = self._from_start(self.slowed.parameter(middle[np.unique(np.concatenate(most))]))
         return np.union1d(s, np.linspace(0.0, self.length, STATIONS))

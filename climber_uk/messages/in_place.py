@@ -73,8 +73,7 @@ class NumberReader:
         """Numbers, then strings, in the order of their paths; `ValueError` if it is no message."""
         contents = self._layouts.of(data)
         if contents is None:
-            fields: tuple[Any, ...] = self._of_message(self._layouts.deserialized(data))
-            return fields
+            return self._of_message(self._layouts.deserialized(data))
         row, texts = contents
         numbers: tuple[Any, ...] = np.frombuffer(data, row).tolist()[0]
         return numbers + texts

@@ -14,7 +14,7 @@ import numpy as np
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.elementary import arctan2, sqrt
 from climber_uk.mechanics.quantities import Motion, State, Torques
-from climber_uk.messages.names import listed, wheel_joints
+from climber_uk.messages.names import WheelJoints, listed
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Duration, Time
@@ -40,6 +40,12 @@ def check_stamp(stamp: int) -> None:
     """Raise `ValueError` for a stamp [ns] that no answer could have: nanosec may be 4e9."""
     if not -LAST_STAMP <= stamp <= LAST_STAMP:
         raise ValueError(f"stamp {stamp / SECOND:.0f} must be within ± 2**31 [s]")
+
+
+def check_frame(frame: str, wanted: str, name: str = "frame_id") -> None:
+    """Raise `ValueError` naming the field of a message unless it has the frame that is wanted."""
+    if frame != wanted:
+        raise ValueError(f"{name}={frame!r} must be {wanted!r}")
 
 
 class OdometryFields(NamedTuple):
@@ -113,19 +119,13 @@ def motion(message: "Odometry", odom_frame: str, base_frame: str) -> Motion:
 def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
     """State of a message in `odom_frame`; with its side slip, unlike its `motion`."""
     fields = OdometryFields.of(message)
-    x, y, heading, cosine, sine, v_x, yaw_rate = motion_of(fields, odom_frame, base_frame)
-    velocity = v_x * cosine - fields.v_y * sine, v_x * sine + fields.v_y * cosine, yaw_rate
-    return State(np.array([x, y, heading]), np.array(velocity))
+    return State.moving(motion_of(fields, odom_frame, base_frame), fields.v_y)
 
 
 def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motion:
     """Motion of the climber in `odom_frame`, the wall's, from a twist in `base_frame`."""
-    for name, frame, wanted in (
-        ("frame_id", fields.frame, odom_frame),
-        ("child_frame_id", fields.child_frame, base_frame),
-    ):
-        if frame != wanted:
-            raise ValueError(f"{name}={frame!r} must be {wanted!r}")
+    check_frame(fields.frame, odom_frame)
+    check_frame(fields.child_frame, base_frame, "child_frame_id")
     _, _, x, y, _, q_x, q_y, q_z, q_w, v_x, v_y, yaw_rate, _, _ = fields
     check_stamp(fields.stamp)
     heading = heading_of(q_x, q_y, q_z, q_w)
@@ -137,19 +137,12 @@ def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motio
 Told = Literal["efforts", "velocities"]
 
 
-def wheel_torques(
-    fields: JointFields,
-    left_joint: str,
-    right_joint: str,
-    what: Told = "efforts",
-) -> Torques:
+def wheel_torques(fields: JointFields, joints: WheelJoints, what: Told = "efforts") -> Torques:
     """Torques [N m] of the sides, or their rates [rad/s]: `what` the fields' values are.
 
     The torque of a side is the sum of its wheels', its rate their mean.
     """
-    is_mean = {"efforts": False, "velocities": True}[what]
     names, values = list(fields.names), list(fields.values)
-    joints = wheel_joints(left_joint, right_joint)
     if names != joints.all and sorted(names) != sorted(joints.all):
         raise ValueError(f"names {names} must be {listed(joints.all)}")
     if len(values) != len(names):
@@ -158,7 +151,7 @@ def wheel_torques(
         raise ValueError(f"{what} {[float(value) for value in values]} must be finite")
     told = dict(zip(names, values, strict=True))
     left, right = (sum(told[name] for name in side) for side in joints)
-    if is_mean:
+    if what == "velocities":
         return Torques(right / len(joints.right), left / len(joints.left))
     return Torques(right, left)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.messages.reading import LARGEST
+from climber_uk.messages.reading import LARGEST, check_frame
 
 if TYPE_CHECKING:
     from nav_msgs.msg import Path
@@ -47,8 +47,7 @@ def message_points(message: "Path", odom_frame: str) -> Array:
 
 
 def _check(frame: str, number: int, odom_frame: str) -> None:
-    if frame != odom_frame:
-        raise ValueError(f"frame_id={frame!r} must be {odom_frame!r}")
+    check_frame(frame, odom_frame)
     if not 2 <= number <= MOST_POSES:
         raise ValueError(f"{number} pose(s), want 2 to {MOST_POSES}")
 

@@ -6,8 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from climber_uk.mechanics import Array
-from climber_uk.messages.names import wheel_joints
-from climber_uk.messages.reading import check_size, check_stamp, heading_of, nanoseconds
+from climber_uk.messages.names import WheelJoints
+from climber_uk.messages.reading import (
+    check_frame,
+    check_size,
+    check_stamp,
+    heading_of,
+    nanoseconds,
+)
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -54,18 +60,11 @@ def stamp_of(message: "Imu | JointState | PoseWithCovarianceStamped") -> int:
     return stamp
 
 
-def check_frame(frame: str, wanted: str) -> None:
-    """Raise `ValueError` unless it is the frame that is wanted."""
-    if frame != wanted:
-        raise ValueError(f"frame_id={frame!r} must be {wanted!r}")
-
-
-def wheel_angles(message: "JointState", left_joint: str, right_joint: str) -> tuple[float, float]:
+def wheel_angles(message: "JointState", joints: WheelJoints) -> tuple[float, float]:
     """Angles of the right and the left side's wheels [rad]; other joints may be there, too."""
     names, angles = list(message.name), list(message.position)
     if len(angles) != len(names):
         raise ValueError(f"{len(angles)} positions of {len(names)} names")
-    joints = wheel_joints(left_joint, right_joint)
     for joint in joints.all:
         if names.count(joint) != 1:
             raise ValueError(f"names {names} must have {joint!r} once")

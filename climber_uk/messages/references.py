@@ -17,7 +17,14 @@ from climber_uk.mechanics.preview import Preview
 from climber_uk.messages import writing
 from climber_uk.messages.cdr_layout import Layout
 from climber_uk.messages.in_place import Layouts, serialized
-from climber_uk.messages.reading import STAMP, check_size, check_stamp, heading_of, nanoseconds
+from climber_uk.messages.reading import (
+    STAMP,
+    check_frame,
+    check_size,
+    check_stamp,
+    heading_of,
+    nanoseconds,
+)
 
 PARTS = "transforms", "velocities", "accelerations"  # of a point
 TRANSFORM = "translation.x", "translation.y", *(f"rotation.{axis}" for axis in "xyzw")
@@ -104,23 +111,16 @@ def preview(message: MultiDOFJointTrajectory, odom_frame: str) -> Preview:
         parts = [getattr(point, part) for part in PARTS]
         if any(len(part) != 1 for part in parts):
             raise ValueError(f"point {number} must have one transform, velocity and acceleration")
-        (transform,), (velocity,), (acceleration,) = parts
-        rows.append(
-            (
-                *get_transform(transform),
-                *get_twist(velocity),
-                *get_twist(acceleration),
-                *get_since(point),
-            )
-        )
+        (transform,), *twists = parts
+        rates = (rate for (twist,) in twists for rate in get_twist(twist))
+        rows.append((*get_transform(transform), *rates, *get_since(point)))
     header = message.header
     return _preview(nanoseconds(header.stamp), header.frame_id, rows, odom_frame)
 
 
 def _preview(start: int, frame: str, rows: list[Row], odom_frame: str) -> Preview:
     """Preview of points from `start` [ns] on."""
-    if frame != odom_frame:
-        raise ValueError(f"frame_id={frame!r} must be {odom_frame!r}")
+    check_frame(frame, odom_frame)
     poses = [[x, y, heading_of(*rotation)] for x, y, *rotation in (row[:6] for row in rows)]
     velocities, accelerations = [row[6:9] for row in rows], [row[9:12] for row in rows]
     check_size(pose=poses, velocity=velocities, acceleration=accelerations)

@@ -26,7 +26,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import State
-from climber_uk.messages.names import wheel_joints
+from climber_uk.messages.names import WheelJoints
 
 if TYPE_CHECKING:
     from climber_uk.mechanics.reference import Reference
@@ -90,18 +90,19 @@ def odometry_numbers(state: State) -> tuple[float, ...]:
     return x, y, math.sin(heading / 2), math.cos(heading / 2), speed, slip, yaw_rate
 
 
-def transform(odometry: Odometry) -> TransformStamped:
-    """Transform of an odometry's pose."""
-    message = TransformStamped(header=odometry.header, child_frame_id=odometry.child_frame_id)
-    position = odometry.pose.pose.position
-    message.transform.translation = Vector3(x=position.x, y=position.y)
-    message.transform.rotation = odometry.pose.pose.orientation
+def transform(pose: Sequence[float], stamp: int, frame: str, child_frame: str) -> TransformStamped:
+    """Transform to `child_frame`, whose `pose` (3,) is x, y [m], heading [rad] in `frame`."""
+    x, y, heading = pose
+    message = TransformStamped(child_frame_id=child_frame)
+    message.header.stamp = time(stamp)
+    message.header.frame_id = frame
+    message.transform.translation = Vector3(x=x, y=y)
+    message.transform.rotation = quaternion(heading)
     return message
 
 
-def wheel_torques(torques: Array, stamp: int, left_joint: str, right_joint: str) -> JointState:
+def wheel_torques(torques: Array, stamp: int, joints: WheelJoints) -> JointState:
     """Message of torques (2,) (right, left) [N m]; `stamp` is that of the odometry they answer."""
-    joints = wheel_joints(left_joint, right_joint)
     message = JointState(name=joints.all)
     message.effort = joints.torques(*left_right(torques))
     message.header.stamp = time(stamp)
@@ -182,8 +183,7 @@ def diagnostics(
 def progress(name: str, values: Mapping[str, Any], stamp: int) -> DiagnosticArray:
     """Progress of the node `name`: its `state` as the message, what else there is by name."""
     numbers = {key: value for key, value in values.items() if key != "state"}
-    message = diagnostics(name, DiagnosticStatus.OK, values["state"], numbers, stamp)
-    return message
+    return diagnostics(name, DiagnosticStatus.OK, values["state"], numbers, stamp)
 
 
 def parameters(values: Mapping[str, object], node: str, stamp: int) -> ParameterEvent:

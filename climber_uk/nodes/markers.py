@@ -76,29 +76,19 @@ class Markers(ClimberNode):
         if not self.is_due(stamp):
             return
         odom_frame, base_frame = self.names.odom_frame, self.names.base_frame
-        state = self.read(ODOMETRY, message, lambda m: reading.state(m, odom_frame, base_frame))
+        state = self.checked(ODOMETRY, reading.state, message, odom_frame, base_frame)
         if state is not None:
             if stamp < self.last_stamp:
                 self.trace.clear()
             self.last_stamp = stamp
             self.markers.publish(self.drawing(stamp, state.pose).array)
 
-    def read(self, topic: str, message: Any, convert: Callable[[Any], T]) -> T | None:
-        """Data that `convert` makes of a message; None, and a report, if it is unfit."""
-        try:
-            data = convert(message)
-        except ValueError as error:
-            self.report(topic, "refused", str(error))
-            return None
-        self.report(topic, "")
-        return data
-
     def read_latest(self, topic: str, stamp: int, convert: Callable[[Any], T]) -> T | None:
         """Data of a topic's latest message; None if it is more than `AGE` from `stamp` [ns]."""
         message = self.latest.get(topic)
         if message is None or abs(stamp - reading.nanoseconds(message.header.stamp)) > AGE:
             return None
-        return self.read(topic, message, convert)
+        return self.checked(topic, convert, message)
 
     def drawing(self, stamp: int, pose: Array) -> Drawing:
         """Drawing at `stamp` [ns] of a climber at `pose` (3,)."""
@@ -123,7 +113,7 @@ class Markers(ClimberNode):
         message, odom_frame = self.latest.get(REFERENCE), self.names.odom_frame
         if message is None:
             return
-        preview = self.read(REFERENCE, message, lambda m: references.preview(m, odom_frame))
+        preview = self.checked(REFERENCE, references.preview, message, odom_frame)
         desired = preview.at(stamp) if preview is not None else None
         if desired is not None:
             drawing.outline(REFERENCE, desired.pose, self.options.half_track, VIOLET)
@@ -131,9 +121,8 @@ class Markers(ClimberNode):
     def draw_arrows(self, drawing: Drawing, stamp: int, pose: Array) -> None:
         """Draw torques at the wheels, and drive and lateral force at the centre."""
         names, options = self.names, self.options
-        left, right = names.left_wheel_joint, names.right_wheel_joint
         torques = self.read_latest(
-            TORQUES, stamp, lambda m: reading.wheel_torques(reading.JointFields.of(m), left, right)
+            TORQUES, stamp, lambda m: reading.wheel_torques(reading.JointFields.of(m), names.wheels)
         )
         if torques is not None:
             for side, torque in zip((-1, 1), torques, strict=True):

@@ -131,38 +131,34 @@ class PlantSimulator(ClimberNode):
 
     def on_push(self, message: WrenchStamped) -> None:
         """Let a push act from the message's stamp on, or from now if that is 0 or past."""
-        try:
-            wrench = reading.wrench(message, self.names.odom_frame, self.names.base_frame)
-        except ValueError as error:
-            self.report(PUSH, "refused", str(error))
-            return
-        self.report(PUSH, "")
-        begin = reading.nanoseconds(message.header.stamp) or self.time.stamp
-        self.pushes.add(begin, Push(*wrench))
+        frames = self.names.odom_frame, self.names.base_frame
+        wrench = self.checked(PUSH, reading.wrench, message, *frames)
+        if wrench is not None:
+            begin = reading.nanoseconds(message.header.stamp) or self.time.stamp
+            self.pushes.add(begin, Push(*wrench))
 
     def on_setpoint(self, message: FluidPressure) -> None:
         """Set the pump, from now on until the setpoint is too old."""
-        try:
-            if self.exclusive:
-                self.check_alone(SETPOINT)
-            pressure = reading.pressure(message)
-        except ValueError as error:
-            self.report(SETPOINT, "refused", str(error))
-            return
-        self.report(SETPOINT, "")
-        self.setpoints.add(self.time.stamp, pressure)
+        pressure = self.checked(SETPOINT, self.read_setpoint, message)
+        if pressure is not None:
+            self.setpoints.add(self.time.stamp, pressure)
+
+    def read_setpoint(self, message: FluidPressure) -> float:
+        """Pressure [Pa] of a message that is to be obeyed; `ValueError` if it is not."""
+        if self.exclusive:
+            self.check_alone(SETPOINT)
+        return reading.pressure(message)
 
     def on_torques(self, serialized: bytes) -> None:
         """Let a command act from now on; in lock-step only if it answers the last odometry."""
-        names, stamp, told = self.names, None, NO_TORQUES
+        stamp, told = None, NO_TORQUES
         try:
             fields = reading.JointFields(*self.read_torques(serialized))
             stamp = fields.stamp
             if self.exclusive:
                 self.check_alone(TORQUES)
-            wheels = names.left_wheel_joint, names.right_wheel_joint
             what: reading.Told = "velocities" if self.take_speeds else "efforts"
-            told = reading.wheel_torques(fields, *wheels, what)
+            told = reading.wheel_torques(fields, self.names.wheels, what)
             self.report(TORQUES, "")
         except ValueError as error:
             self.report(TORQUES, f"refused, {self.instead} instead", str(error))

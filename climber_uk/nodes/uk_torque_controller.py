@@ -4,7 +4,7 @@ Inactive, it answers with its safe output: a climber on a wall needs torques at 
 """
 
 import numpy as np
-from geometry_msgs.msg import TwistStamped, Vector3Stamped, WrenchStamped
+from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.subscription import Subscription
@@ -21,6 +21,7 @@ from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import ADHESION, Alarm, Attachment, Grip
 from climber_uk.mechanics.climber import Climber, most_pressure
+from climber_uk.mechanics.preview import Preview
 from climber_uk.mechanics.quantities import Motion
 from climber_uk.mechanics.reference import tracking_error
 from climber_uk.messages import reading, reading_sensors, writing
@@ -99,24 +100,20 @@ class UkTorqueController(ManagedNode):
         self.first_z: float | None = None  # [m] of odometry, off the wall
 
         self.read_odometry = NumberReader(Odometry, *reading.ODOMETRY)
-        self.read_reference = PreviewReader()
-        joints = self.names.wheels
-        self.wheels = len(joints.left), len(joints.right)
-        zeros = joints.rates(0.0, 0.0)
-        torques = JointState(name=joints.all, velocity=zeros, effort=zeros)
-        self.torques = Output(self.publisher(JointState, TORQUES), torques, writing.WHEEL_COMMAND)
+        self.read_preview = PreviewReader()
+        self.joints = self.names.wheels
+        zeros = self.joints.rates(0.0, 0.0)
+        torques = JointState(name=self.joints.all, velocity=zeros, effort=zeros)
+        self.torques = self.output(TORQUES, torques, writing.WHEEL_COMMAND)
         self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         zero, base_frame = (0.0, 0.0, 0.0), self.names.base_frame
         twist = TwistStamped()
         twist.header.frame_id = base_frame
-        self.twist = Output(self.publisher(TwistStamped, "cmd_vel"), twist, writing.TWIST)
-        error = self.publisher(Vector3Stamped, "~/tracking_error")
-        self.error = Output(error, writing.vector(zero, 0, base_frame), writing.VECTOR)
-        wrench = writing.wrench(zero, 0, base_frame)
-        force = self.publisher(WrenchStamped, private(FORCE))
-        self.force = Output(force, wrench, writing.WRENCH)
-        disturbance = self.publisher(WrenchStamped, "~/disturbance")
-        self.disturbance = Output(disturbance, wrench, writing.WRENCH)
+        self.twist = self.output("cmd_vel", twist, writing.TWIST)
+        vector, wrench = (of(zero, 0, base_frame) for of in (writing.vector, writing.wrench))
+        self.error = self.output("~/tracking_error", vector, writing.VECTOR)
+        self.force = self.output(private(FORCE), wrench, writing.WRENCH)
+        self.disturbance = self.output("~/disturbance", wrench, writing.WRENCH)
         self.setpoint: SuctionSetpoint | None = None
         if (suction := self.parameters.read(SuctionOptions, "least_suction.")).enabled:
             climber = self.parameters.read(Climber)
@@ -218,28 +215,26 @@ class UkTorqueController(ManagedNode):
 
     def on_reference(self, serialized: bytes) -> None:
         """Check and keep a reference; answer an odometry that waits for it."""
-        try:
-            if self.exclusive:
-                self.check_alone(REFERENCE)
-            if len(serialized) > LARGEST_REFERENCE:
-                raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
-            preview = self.read_reference(serialized, self.names.odom_frame)
-            preview.check_heading()
-        except ValueError as error:
-            self.report(REFERENCE, "refused", str(error))
-            return
-        self.report(REFERENCE, "")
-        self.publish(self.controller.on_reference(self.now(), preview))
+        preview = self.checked(REFERENCE, self.read_reference, serialized)
+        if preview is not None:
+            self.publish(self.controller.on_reference(self.now(), preview))
+
+    def read_reference(self, serialized: bytes) -> Preview:
+        """Preview of a message; `ValueError` unless it can be followed."""
+        if self.exclusive:
+            self.check_alone(REFERENCE)
+        if len(serialized) > LARGEST_REFERENCE:
+            raise ValueError(f"{len(serialized)} bytes must be <= {LARGEST_REFERENCE}")
+        preview = self.read_preview(serialized, self.names.odom_frame)
+        preview.check_heading()
+        return preview
 
     def on_pressure(self, message: FluidPressure) -> None:
         """Give the controller the measured pressure difference."""
-        try:
-            expected = self.parameters.read(Climber).suction_pressure
-            pressure = reading.pressure(message, most_pressure(expected))
-        except ValueError as error:
-            self.report(PRESSURE, "refused", str(error))
+        most = most_pressure(self.parameters.read(Climber).suction_pressure)
+        pressure = self.checked(PRESSURE, reading.pressure, message, most)
+        if pressure is None:
             return
-        self.report(PRESSURE, "")
         if self.setpoint is not None:
             self.setpoint.measure(pressure, self.now())
         if pressure != self.pressure:
@@ -255,25 +250,15 @@ class UkTorqueController(ManagedNode):
 
     def on_joints(self, message: JointState) -> None:
         """Compare odometry with the wheels' angles."""
-        names = self.names
-        try:
-            angles = reading_sensors.wheel_angles(
-                message, names.left_wheel_joint, names.right_wheel_joint
-            )
-        except ValueError as error:
-            self.report(JOINTS, "refused", str(error))
-            return
-        self.report(JOINTS, "")
-        self.controller.on_encoders(*angles)
+        angles = self.checked(JOINTS, reading_sensors.wheel_angles, message, self.joints)
+        if angles is not None:
+            self.controller.on_encoders(*angles)
 
     def on_battery(self, message: BatteryState) -> None:
         """Stop at a low charge or voltage."""
-        try:
-            self.controller.stops.see_battery(*reading_sensors.battery(message))
-        except ValueError as error:
-            self.report(BATTERY, "refused", str(error))
-            return
-        self.report(BATTERY, "")
+        battery = self.checked(BATTERY, reading_sensors.battery, message)
+        if battery is not None:
+            self.controller.stops.see_battery(*battery)
 
     def look(self) -> None:
         """Publish the safe output if odometry or reference have stopped."""
@@ -282,8 +267,7 @@ class UkTorqueController(ManagedNode):
 
     def now(self) -> int:
         """Time of the node's clock [ns]; 0 while there is none."""
-        now: int = self.get_clock().now().nanoseconds
-        return now
+        return self.get_clock().now().nanoseconds
 
     def publish(self, answer: Answer | None) -> None:
         """Report what has changed, and publish an answer if there is one."""
@@ -335,15 +319,14 @@ class UkTorqueController(ManagedNode):
 
         Wheels of a side share its torque, and turn at the same rate.
         """
-        (right, left), (lefts, rights) = answer.wheels, self.wheels
+        right, left = answer.wheels
         right_rate, left_rate = self.controller.law.climber.rim_rates(answer.speeds)
-        rates = [left_rate] * lefts + [right_rate] * rights
-        torques = [left / lefts] * lefts + [right / rights] * rights
-        self.torques.publish(answer.stamp, rates, torques)
+        torques = self.joints.torques(left, right)
+        self.torques.publish(answer.stamp, self.joints.rates(left_rate, right_rate), torques)
         if self.options.publish_cmd_vel:
             self.twist.publish(answer.stamp, *answer.speeds)
         if self.options.effort_commands:
-            is_left_first = self.options.effort_order == "left_right"
+            is_left_first, lefts = self.options.effort_order == "left_right", len(self.joints.left)
             ordered = torques if is_left_first else torques[lefts:] + torques[:lefts]
             self.efforts.publish(Float64MultiArray(data=ordered))
 

@@ -7,14 +7,7 @@ none: a controller then waits.
 import math
 
 import numpy as np
-from geometry_msgs.msg import (
-    PoseStamped,
-    PoseWithCovarianceStamped,
-    Quaternion,
-    TransformStamped,
-    Vector3,
-)
-from nav_msgs.msg import Odometry
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from sensor_msgs.msg import Imu, JointState
 
 from climber_uk.localization import models
@@ -27,7 +20,6 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading_sensors, writing
 from climber_uk.messages.topics import IMU, JOINTS, LOCALIZATION, ODOMETRY, POSE
-from climber_uk.ros.output import Output
 from climber_uk.ros.running import (
     BEST_EFFORT,
     PUBLISH_PERIOD,
@@ -67,10 +59,10 @@ class WallOdometry(ClimberNode):
 
         names = self.names
         odometry = writing.odometry(NOWHERE, 0, names.odom_frame, names.base_frame)
-        self.odometry = Output(self.publisher(Odometry, ODOMETRY), odometry, writing.LOCATED)
+        self.odometry = self.output(ODOMETRY, odometry, writing.LOCATED)
         here = PoseStamped()
         here.header.frame_id = self.frames.map_frame
-        self.map_to_odom = Output(self.publisher(PoseStamped, "~/map_to_odom"), here, PLANAR_POSE)
+        self.map_to_odom = self.output("~/map_to_odom", here, PLANAR_POSE)
         self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
         self.is_map_due = Throttle(PUBLISH_PERIOD)
         self.subscription(JointState, JOINTS, self.on_joints, BEST_EFFORT)
@@ -92,11 +84,8 @@ class WallOdometry(ClimberNode):
 
     def on_joints(self, message: JointState) -> None:
         """Take the wheels' angles, once the IMU's sample of the same time is there."""
-        names = self.names
         try:
-            angles = reading_sensors.wheel_angles(
-                message, names.left_wheel_joint, names.right_wheel_joint
-            )
+            angles = reading_sensors.wheel_angles(message, self.names.wheels)
             stamp = reading_sensors.stamp_of(message)
         except ValueError as error:
             self.report(JOINTS, "refused", str(error))
@@ -108,27 +97,25 @@ class WallOdometry(ClimberNode):
 
     def on_imu(self, message: Imu) -> None:
         """Take yaw rate and specific force, turned into the climber's frame."""
-        try:
-            sample = reading_sensors.imu(message, self.frames.imu_frame or self.names.base_frame)
-        except ValueError as error:
-            self.report(IMU, "refused", str(error))
+        frame = self.frames.imu_frame or self.names.base_frame
+        sample = self.checked(IMU, reading_sensors.imu, message, frame)
+        if sample is None:
             return
-        self.report(IMU, "")
         self.localizer.on_imu(sample.stamp, sample.yaw_rate, *self.frames.force(*sample.force))
         if self.waiting is not None and not self.localizer.imu.is_due(self.waiting[0]):
             self.go_on()
 
     def on_pose(self, message: PoseWithCovarianceStamped) -> None:
         """Take the parts of a pose that are measured."""
-        try:
-            pose = reading_sensors.pose(message, self.frames.pose_frame or self.names.odom_frame)
-            fix = self.frames.fix(Fix(*pose))
-        except ValueError as error:
-            self.report(POSE, "refused", str(error))
-            return
-        self.report(POSE, "")
-        self.localizer.on_fix(fix)
-        self.tell_remarks()
+        fix = self.checked(POSE, self.read_fix, message)
+        if fix is not None:
+            self.localizer.on_fix(fix)
+            self.tell_remarks()
+
+    def read_fix(self, message: PoseWithCovarianceStamped) -> Fix:
+        """Fix of a message, in odom_frame; `ValueError` if it is unfit."""
+        pose = reading_sensors.pose(message, self.frames.pose_frame or self.names.odom_frame)
+        return self.frames.fix(Fix(*pose))
 
     def lose_patience(self) -> None:
         """Go on without the IMU where its sample has not come."""
@@ -165,7 +152,6 @@ class WallOdometry(ClimberNode):
             writing.planar_covariance(located.pose_covariance),
             writing.planar_covariance(twist),
         )
-
         if self.is_map_due(located.stamp):
             self.publish_map(located)
 
@@ -174,14 +160,10 @@ class WallOdometry(ClimberNode):
         motion = located.motion
         output = np.array([motion.x, motion.y, motion.heading])
         x, y, angle = between(self.localizer.estimate.mean[:3], output)
-        sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
-        self.map_to_odom.publish(located.stamp, x, y, sine, cosine)
+        self.map_to_odom.publish(located.stamp, x, y, math.sin(angle / 2), math.cos(angle / 2))
         if self.transform is not None and self.transform.get_subscription_count():
-            message = TransformStamped(child_frame_id=self.names.odom_frame)
-            message.header.frame_id = self.frames.map_frame
-            message.header.stamp = writing.time(located.stamp)
-            message.transform.translation = Vector3(x=x, y=y)
-            message.transform.rotation = Quaternion(z=sine, w=cosine)
+            frames = self.frames.map_frame, self.names.odom_frame
+            message = writing.transform((x, y, angle), located.stamp, *frames)
             self.transform.publish(TFMessage(transforms=[message]))
 
     def tell_remarks(self) -> None:

@@ -123,5 +123,4 @@ class PrintedSystem:
 def _pseudo_inverse(B: Array) -> Array:
     """B⁺ of B with full row rank, as A M^(-1/2) has; `np.linalg.pinv` takes 3 times as long."""
     left, singular, right = np.linalg.svd(B, full_matrices=False)
-    product: Array = transpose(right.conj()) / singular[..., None, :] @ transpose(left.conj())
-    return product
+    return transpose(right.conj()) / singular[..., None, :] @ transpose(left.conj())

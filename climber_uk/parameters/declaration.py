@@ -23,6 +23,7 @@ def parameter(
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    nonzero: bool = False,
     choices: Collection[str] | None = None,
     plausible: tuple[float, float] | None = None,
     formerly: str = "",
@@ -31,7 +32,8 @@ def parameter(
 ) -> Any:
     """Declare a dataclass field as a parameter, with its unit and description.
 
-    `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive; a size out of the
+    `above` is an exclusive lower bound, `at_least` and `at_most` are inclusive, a `nonzero` number
+    may have either sign, as a radius seen from either side; a size out of the
     range `plausible` is doubted, not refused; a name that it had `formerly` is still taken;
     `runtime` marks what a running node may change, `is_path` the name of a file, which in a
     parameter file is relative to that. `parameters` makes the class.
@@ -44,6 +46,7 @@ def parameter(
             "above": above,
             "at_least": at_least,
             "at_most": at_most,
+            "nonzero": nonzero,
             "choices": choices,
             "plausible": plausible,
             "formerly": formerly,
@@ -100,6 +103,8 @@ def check_value(field: "dataclasses.Field[Any]", value: Any) -> None:
         _check_number(rule, said, number, unit)
         if isinstance(field.default, float):
             _check_size(rule, said, abs(float(number)), unit)
+    if rule["nonzero"] and np.any(value == 0):
+        raise ValueError(f"{field.name}=0.0 must not be 0{unit}")
 
 
 def _shown(value: Any) -> str:
@@ -111,7 +116,8 @@ def _shown(value: Any) -> str:
 def bounds(rule: Mapping[str, Any]) -> list[str]:
     """Bounds of a `parameter`, in words."""
     signs = {"above": ">", "at_least": ">=", "at_most": "<="}
-    return [f"{sign} {rule[name]:g}" for name, sign in signs.items() if rule[name] is not None]
+    said = [f"{sign} {rule[name]:g}" for name, sign in signs.items() if rule[name] is not None]
+    return said + ["!= 0"] * rule["nonzero"]
 
 
 def _check_number(rule: Mapping[str, Any], said: str, value: Any, unit: str) -> None:

@@ -103,8 +103,8 @@ def _fastest_law(
     }
 
 
-def main() -> None:
-    """Check a path."""
+def parse() -> argparse.Namespace:
+    """Options of the command line."""
     parser = Parser("check_path", __doc__)
     parser.add_argument("--params", type=Path, required=True, help="parameter file of the nodes")
     parser.add_argument(
@@ -152,7 +152,12 @@ def main() -> None:
         help="that are drawn of the posterior (default: 1000)",
     )
     parser.add_argument(*("--output", "-o"), type=Path, help="directory for a picture and numbers")
-    options = parser.arguments()
+    return parser.arguments()
+
+
+def main() -> None:
+    """Check a path."""
+    options = parse()
     with failing_in_a_line("check_path") as remarks:
         changes = dict(map(read_argument, options.param))
         trajectory, climber, contact, wall = read(options.params, changes, remarks)

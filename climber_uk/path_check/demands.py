@@ -15,7 +15,7 @@ from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.demand import STANDS, demanded
 from climber_uk.mechanics.elementary import wrapped
-from climber_uk.mechanics.quantities import Wrench
+from climber_uk.mechanics.quantities import Speeds, Wrench
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import PLANE, Wall
@@ -144,10 +144,7 @@ def reserves(
     (right, left), lateral, across, into_wall = demand[:4]
     slip = contact.slip_margin(climber, into_wall, (right / radius, left / radius), lateral, across)
     tip = contact.tip_margin(climber, into_wall, demand.along_wall)
-    rates = (
-        (speed + climber.half_track * yaw_rate) / radius,
-        (speed - climber.half_track * yaw_rate) / radius,
-    )
+    rates = climber.rim_rates(Speeds(speed, yaw_rate))
     motors = _motors(climber, (right, left), rates)
     loads = contact.wheel_loads(climber, contact.wheel_load(climber, into_wall), across)
     tips = tip + 0 * np.asarray(slip)

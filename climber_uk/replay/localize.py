@@ -22,8 +22,8 @@ from climber_uk.replay import localization_figure
 from climber_uk.replay.localized import Localized, localized
 from climber_uk.replay.recorded_sensors import RecordedSensors, read_sensors
 from climber_uk.report.export_tum import lines
-from climber_uk.report.outputs import failing_in_a_line, output
-from climber_uk.system.command_line import Parser, printable
+from climber_uk.report.outputs import failing_in_a_line, output, parser_for_bag
+from climber_uk.system.command_line import printable
 
 MOST_REMARKS = 10  # that are printed
 
@@ -75,8 +75,7 @@ def table(sensors: RecordedSensors, found: Localized) -> str:
 
 def main() -> None:
     """Localize the climber of a bag."""
-    parser = Parser("localize", __doc__)
-    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
+    parser = parser_for_bag("localize", __doc__, "localization")
     parser.add_argument("--params", type=Path, help="parameter file with the node's parameters")
     parser.add_argument(
         *("--parameter", "-p"),
@@ -84,12 +83,6 @@ def main() -> None:
         default=[],
         metavar="NAME:=VALUE",
         help="a parameter of the node; may be repeated",
-    )
-    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
-    parser.add_argument(
-        *("--output", "-o"),
-        type=Path,
-        help="directory (default: a new one, localization, in the bag or beside it)",
     )
     options = parser.arguments()
     namespace = options.namespace.strip("/")

@@ -45,7 +45,7 @@ class Estimates:
     """Estimates at n times."""
 
     mean: Array  # (n, 12) as in `localization.models`
-    covariance: Array  # (n, 12, 10)
+    covariance: Array  # (n, 12, 12)
 
     @classmethod
     def of(cls, estimates: Sequence[Estimate]) -> "Estimates":

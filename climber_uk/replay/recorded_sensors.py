@@ -119,8 +119,7 @@ def _take(
         found.true.append((reading_sensors.stamp_of(message), true.x, true.y, true.heading))
         return
     if name == JOINTS:
-        joints = names.left_wheel_joint, names.right_wheel_joint
-        angles = reading_sensors.wheel_angles(message, *joints)
+        angles = reading_sensors.wheel_angles(message, names.wheels)
         stamp = reading_sensors.stamp_of(message)
         found.encoders.append((stamp, lambda it: it.on_encoders(stamp, *angles)))
     elif name == IMU:

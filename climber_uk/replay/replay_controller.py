@@ -20,9 +20,9 @@ from climber_uk.parameters.parameter_file import read_argument, refuse_unknown
 from climber_uk.replay.recorded_controller import TOPICS, RecordedController
 from climber_uk.replay.replay import DEFAULTS, Replay
 from climber_uk.replay.torque_comparison import Comparison, compare, summary, table, write_csv
-from climber_uk.report.outputs import failing_in_a_line, output
+from climber_uk.report.outputs import failing_in_a_line, output, parser_for_bag
 from climber_uk.report.plotting import plt, saved
-from climber_uk.system.command_line import Parser, between, printable
+from climber_uk.system.command_line import between, printable
 
 
 def replayed(options: argparse.Namespace, remarks: list[str]) -> Comparison:
@@ -34,7 +34,7 @@ def replayed(options: argparse.Namespace, remarks: list[str]) -> Comparison:
     file = None
     if options.params:
         file = read_parameters(options.params, f"{namespace}/{CONTROLLER}", remarks)
-    given = dict(read_argument(argument) for argument in options.parameter)
+    given = dict(map(read_argument, options.parameter))
     refuse_unknown(given, DEFAULTS, "the control law")
 
     def choose(recorded: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,9 +77,7 @@ def draw(found: Comparison, path: Path) -> None:
 
 def main() -> None:
     """Print the comparison and write its files."""
-    parser = Parser("replay_controller", __doc__)
-    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
-    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
+    parser = parser_for_bag("replay_controller", __doc__, "replay")
     parser.add_argument("--params", type=Path, help="parameter file (default: as recorded)")
     parser.add_argument(
         *("-p", "--parameter"),
@@ -87,11 +85,6 @@ def main() -> None:
         default=[],
         metavar="NAME:=VALUE",
         help="change one",
-    )
-    parser.add_argument(
-        *("--output", "-o"),
-        type=Path,
-        help="directory (default: a new one, replay, in the bag or beside it)",
     )
     parser.add_argument(
         "--fail-above",

@@ -16,9 +16,9 @@ from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics import Array
 from climber_uk.report.figures import STYLE, thinned
-from climber_uk.report.outputs import failing_in_a_line, output
+from climber_uk.report.outputs import failing_in_a_line, output, parser_for_bag
 from climber_uk.report.plotting import plt
-from climber_uk.system.command_line import Parser, between, printable
+from climber_uk.system.command_line import between, printable
 
 SIZE, DPI = (8.0, 4.2), 90  # [in]
 FORMATS = "webp", "gif"
@@ -120,14 +120,7 @@ def write(run: RecordedRun, path: Path, seconds: float, rate: float) -> int:
 
 def main() -> None:
     """Write a film of each run of a bag."""
-    parser = Parser("animate_bag", __doc__)
-    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
-    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
-    parser.add_argument(
-        *("--output", "-o"),
-        type=Path,
-        help="directory (default: a new one, film, in the bag or beside it)",
-    )
+    parser = parser_for_bag("animate_bag", __doc__, "film")
     parser.add_argument("--format", choices=FORMATS, default=FORMATS[0], help="of the file")
     parser.add_argument(
         "--seconds",

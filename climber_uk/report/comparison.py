@@ -4,7 +4,8 @@ import math
 import operator
 import re
 from collections.abc import Callable, Collection
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
     "<=": operator.le,
@@ -17,18 +18,33 @@ OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
 FORM = re.compile(r"\s*(\w+)\s*([<>=!]+)\s*(\S+)\s*")
 
 
-def parse(text: str, metrics: Collection[str]) -> tuple[str, str, float]:
-    """Name of a metric, operator and bound; raises `ValueError` saying what is wrong."""
-    match = FORM.fullmatch(text)
-    if match is None or match[2] not in OPERATORS:
-        raise ValueError(f"{text!r} must be a metric, one of {' '.join(OPERATORS)}, a number")
-    name, sign, number = match.groups()
-    if name not in metrics:
-        raise ValueError(f"{text!r}: {name} is none of {', '.join(metrics)}")
-    try:
-        bound = float(number)
-    except ValueError:
-        bound = math.nan
-    if not math.isfinite(bound):  # with nan every comparison fails, so that nothing would
-        raise ValueError(f"{text!r}: {number} must be a finite number")
-    return name, sign, bound
+@dataclass(frozen=True)
+class Comparison:
+    """A metric's name, an operator and a finite number in SI units."""
+
+    metric: str
+    operator: str
+    bound: float
+
+    metrics: ClassVar[Collection[str]]  # names that there are
+
+    @classmethod
+    def read(cls, text: str) -> Self:
+        """Comparison of a text; raises `ValueError` saying what is wrong with it."""
+        match = FORM.fullmatch(text)
+        if match is None or match[2] not in OPERATORS:
+            raise ValueError(f"{text!r} must be a metric, one of {' '.join(OPERATORS)}, a number")
+        name, sign, number = match.groups()
+        if name not in cls.metrics:
+            raise ValueError(f"{text!r}: {name} is none of {', '.join(cls.metrics)}")
+        try:
+            bound = float(number)
+        except ValueError:
+            bound = math.nan
+        if not math.isfinite(bound):  # with nan every comparison fails, so that nothing would
+            raise ValueError(f"{text!r}: {number} must be a finite number")
+        return cls(name, sign, bound)
+
+    def holds(self, values: Any) -> Any:
+        """Whether values of the metric (...) compare so, which nan does by != only."""
+        return OPERATORS[self.operator](values, self.bound)

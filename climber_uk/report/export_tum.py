@@ -14,8 +14,8 @@ from climber_uk.bags.run_reader import NoRunError, RunReader
 from climber_uk.bags.topics import TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
-from climber_uk.report.outputs import failing_in_a_line, output
-from climber_uk.system.command_line import Parser, printable
+from climber_uk.report.outputs import failing_in_a_line, output, parser_for_bag
+from climber_uk.system.command_line import printable
 
 Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
 
@@ -61,15 +61,7 @@ def lines(poses: Poses) -> str:
 
 def main() -> None:
     """Write the trajectories of a bag."""
-    parser = Parser("export_tum", __doc__)
-    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
-    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
-    parser.add_argument(
-        *("--output", "-o"),
-        type=Path,
-        help="directory (default: a new one, tum, in the bag or beside it)",
-    )
-    options = parser.arguments()
+    options = parser_for_bag("export_tum", __doc__, "tum").arguments()
     with (
         failing_in_a_line("export_tum") as remarks,
         output(options.bag, "tum", options.output) as directory,

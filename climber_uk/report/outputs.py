@@ -13,10 +13,23 @@ from pathlib import Path
 from tempfile import TemporaryFile, gettempdir
 
 from climber_uk.bags.connection import one_line
-from climber_uk.system.command_line import in_words
+from climber_uk.system.command_line import Parser, in_words
 
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # a disk, somebody's share of it, or a limit
 UNREADABLE = 2  # exit status: a bag or a parameter file that is not to be read, a wrong argument
+
+
+def parser_for_bag(tool: str, description: str | None, name: str) -> Parser:
+    """Parser of a tool that reads one climber of a bag, and writes into `output` of this `name`."""
+    parser = Parser(tool, description)
+    parser.add_argument("bag", type=Path, help="rosbag2 directory or file, MCAP or sqlite3")
+    parser.add_argument("--namespace", default="", help="of the climber (default: none)")
+    parser.add_argument(
+        *("--output", "-o"),
+        type=Path,
+        help=f"directory (default: a new one, {name}, in the bag or beside it)",
+    )
+    return parser
 
 
 @contextmanager

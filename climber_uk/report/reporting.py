@@ -75,7 +75,7 @@ def parser(name: str, description: str | None) -> Parser:
 
 def _condition(text: str) -> Condition:
     try:
-        return Condition.parse(text)
+        return Condition.read(text)
     except ValueError as error:
         raise ArgumentTypeError(str(error)) from None
 

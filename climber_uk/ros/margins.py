@@ -1,11 +1,8 @@
 """Slip and tip margin of a climber (§7), on ~/margins and in diagnostics."""
 
-from geometry_msgs.msg import Vector3Stamped
-
 from climber_uk.mechanics.adhesion import MAX_MARGIN, Alarm
 from climber_uk.messages import writing
 from climber_uk.messages.topics import MARGINS, private
-from climber_uk.ros.output import Output
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 
 STATUS_LEVELS = writing.OK, writing.WARN, writing.ERROR
@@ -17,8 +14,7 @@ class Margins:
     def __init__(self, node: ClimberNode, alarm: Alarm) -> None:
         self.node, self.alarm = node, alarm
         margins = writing.vector((0.0, 0.0, 0.0), 0, node.names.base_frame)
-        publisher = node.publisher(Vector3Stamped, private(MARGINS[0]))
-        self.topic = Output(publisher, margins, writing.VECTOR)
+        self.topic = node.output(private(MARGINS[0]), margins, writing.VECTOR)
         self.is_due = Throttle(PUBLISH_PERIOD)
         self.last = self.lowest = self.unpublished = MAX_MARGIN, MAX_MARGIN  # slip, tip
         self.level = 0  # of the alarm, as published last

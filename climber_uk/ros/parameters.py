@@ -111,8 +111,7 @@ class NodeParameters:
                 self._kept[prefix, kind] = kind(**values)
             except ValueError as error:
                 raise ValueError(f"{prefix}{error}") from None
-        kept: T = self._kept[prefix, kind]
-        return kept
+        return self._kept[prefix, kind]
 
     def refuse_unknown(self, defaults: str = "") -> None:
         """Raise `ValueError` if a parameter was given that is not declared: it is misspelt.

@@ -67,8 +67,7 @@ class PlantTime:
             self.log.info(f"time does not run until {options.wait_for} listens")
             node.create_timer(LOOK_PERIOD, self.check_listener, clock=WALL_CLOCK)
         if options.simulated_time:
-            publisher = node.publisher(ClockMessage, CLOCK)
-            self.topic = Output(publisher, ClockMessage(), (), ("clock.sec", "clock.nanosec"))
+            self.topic = node.output(CLOCK, ClockMessage(), (), ("clock.sec", "clock.nanosec"))
             node.create_timer(ASK_AGAIN, self.ask_again, clock=WALL_CLOCK)
             if options.real_time_factor > 0:
                 pace = max(self.pace / SECOND, SHORTEST)

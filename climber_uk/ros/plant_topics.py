@@ -3,9 +3,7 @@
 import math
 
 import numpy as np
-from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import FluidPressure, Imu, JointState
+from sensor_msgs.msg import FluidPressure, JointState
 
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import writing, writing_sensors
@@ -38,21 +36,19 @@ class PlantTopics:
         odometry = writing.odometry(NO_STATE, 0, names.odom_frame, names.base_frame)
         self.odometry: Output | None = None
         if options.publish_odometry:
-            self.odometry = Output(node.publisher(Odometry, ODOMETRY), odometry, writing.ODOMETRY)
-        self.truth = Output(node.publisher(Odometry, TRUTH), odometry, writing.ODOMETRY)
-        self.joints = Output(node.publisher(JointState, JOINTS), state, writing.JOINT_STATE)
+            self.odometry = node.output(ODOMETRY, odometry, writing.ODOMETRY)
+        self.truth = node.output(TRUTH, odometry, writing.ODOMETRY)
+        self.joints = node.output(JOINTS, state, writing.JOINT_STATE)
         self.imu = self.pose = None
         if sensors.imu.errors.enabled:
             variances = sensors.imu.yaw_rate_variance, sensors.imu.force_variance
             sample = writing_sensors.imu(names.base_frame, *variances)
-            self.imu = Output(node.publisher(Imu, IMU), sample, writing_sensors.IMU)
+            self.imu = node.output(IMU, sample, writing_sensors.IMU)
         if (fixes := sensors.fixes.errors).period > 0:
             variances = fixes.position_noise**2, fixes.heading_noise**2
             pose = writing_sensors.pose(names.odom_frame, *variances)
-            publisher = node.publisher(PoseWithCovarianceStamped, POSE)
-            self.pose = Output(publisher, pose, writing_sensors.POSE)
-        pressure = node.publisher(FluidPressure, PRESSURE)
-        self.pressure = Output(pressure, FluidPressure(), ["fluid_pressure"])
+            self.pose = node.output(POSE, pose, writing_sensors.POSE)
+        self.pressure = node.output(PRESSURE, FluidPressure(), ["fluid_pressure"])
         has_tf = TFMessage and options.publish_tf
         self.transform = node.publisher(TFMessage, "/tf") if has_tf else None
 
@@ -83,8 +79,8 @@ class PlantTopics:
         if self.truth.is_heard:
             self.truth.publish(now, *writing.odometry_numbers(robot.state))
         if self.transform is not None and self.transform.get_subscription_count():
-            names = self.names
-            odometry = writing.odometry(robot.state, now, names.odom_frame, names.base_frame)
-            self.transform.publish(TFMessage(transforms=[writing.transform(odometry)]))
+            frames = self.names.odom_frame, self.names.base_frame
+            transform = writing.transform(robot.state.pose.tolist(), now, *frames)
+            self.transform.publish(TFMessage(transforms=[transform]))
         if self.is_due(now):
             self.pressure.publish(now, float(robot.pressure))

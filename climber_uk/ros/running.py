@@ -6,10 +6,10 @@ import re
 import signal
 import sys
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -30,10 +30,12 @@ from rclpy.utilities import remove_ros_args
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading, writing
 from climber_uk.messages.names import Names
+from climber_uk.messages.reading import STAMP
 from climber_uk.messages.topics import CLOCK, DIAGNOSTICS
 from climber_uk.parameters.declaration import QOS, parameter, parameters
 from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros.leaving import LONGEST_END, leave
+from climber_uk.ros.output import Output
 from climber_uk.ros.parameters import NodeParameters
 from climber_uk.ros.transport import use_udp
 from climber_uk.system.command_line import in_words, printable
@@ -42,6 +44,8 @@ from climber_uk.system.signals import on_end
 # else the first message type would have the generator of message types loaded, and its parser
 sys.modules.setdefault("rosidl_generator_py.generate_py_impl", None)  # type: ignore[arg-type]
 
+T = TypeVar("T")
+P = ParamSpec("P")
 RELIABLE = QoSProfile(depth=10)
 # kept for slow subscribers: a recorder may be held up for half a second
 SENT = QoSProfile(depth=1000)
@@ -132,13 +136,11 @@ class ClimberNode(Node):
         return super().create_subscription(kind, topic, callback, *rest, **options)
 
     def _take_time(self, take: Callable[[Any], None], message: Any) -> None:
-        try:
+        def take_checked() -> None:
             reading.check_stamp(reading.nanoseconds(message.clock))
             take(message)
-        except ValueError as error:
-            self.report(CLOCK, "refused", str(error))
-            return
-        self.report(CLOCK, "")
+
+        self.checked(CLOCK, take_checked)
 
     def on_parameters(self) -> None:
         """Called when parameters have changed."""
@@ -187,6 +189,12 @@ class ClimberNode(Node):
         """Publisher whose QoS the parameters `qos_overrides.<topic>.publisher.*` override."""
         return self._overridden(partial(self.create_publisher, kind, topic, qos))
 
+    def output(
+        self, topic: str, message: Any, numbers: Iterable[str], stamp: tuple[str, str] = STAMP
+    ) -> Output:
+        """Topic of messages that differ from `message` in their stamp and `numbers` only."""
+        return Output(self.publisher(type(message), topic), message, numbers, stamp)
+
     def subscription(
         self,
         kind: type,
@@ -221,6 +229,18 @@ class ClimberNode(Node):
         _, before = self._unlogged.get(subject, ("", -1))
         self._unlogged[subject] = clipped(detail), before + 1
         self._log(subject)
+
+    def checked(
+        self, subject: str, read: Callable[P, T], *arguments: P.args, **options: P.kwargs
+    ) -> T | None:
+        """What `read` makes of a message; None, and a report, if it raises `ValueError`."""
+        try:
+            found = read(*arguments, **options)
+        except ValueError as error:
+            self.report(subject, "refused", str(error))
+            return None
+        self.report(subject, "")
+        return found
 
     def _log(self, subject: str) -> None:
         """Log how things are with a subject, unless there have been too many lines on it."""

@@ -9,7 +9,6 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.adhesion import Attachment
 from climber_uk.mechanics.climber import Climber
 from climber_uk.messages.topics import SETPOINT
-from climber_uk.ros.output import Output
 from climber_uk.ros.running import PUBLISH_PERIOD, ClimberNode, Throttle
 
 PRESSURE_AGE = SECOND // 2  # [ns] of a measured pressure, above which that of now is not known
@@ -27,9 +26,7 @@ class SuctionSetpoint:
     ) -> None:
         self.node, self.options = node, options
         self.least = LeastSuction(options, climber, attachment)
-        self.topic = Output(
-            node.publisher(FluidPressure, SETPOINT), FluidPressure(), ["fluid_pressure"]
-        )
+        self.topic = node.output(SETPOINT, FluidPressure(), ["fluid_pressure"])
         self.is_due = Throttle(PUBLISH_PERIOD)
         self.mode = Mode.WAITING
         self.measured: float | None = None  # [Pa] pressure

@@ -140,8 +140,7 @@ class WheelEncoders:
             self._exact = angles
         if errors.resolution == 0:
             return self._turned
-        counted: Array = errors.resolution * np.floor(self._turned / errors.resolution)
-        return counted
+        return errors.resolution * np.floor(self._turned / errors.resolution)
 
 
 class PoseFix(NamedTuple):

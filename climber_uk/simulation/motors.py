@@ -3,7 +3,7 @@
 τ̇ = (τ* - τ) / T   of motors that take torques τ*
 u̇ = (u* - u) / T   of a servo that takes rates u* of the wheels
 
-within the motor's torque-speed curve (`Climber.torque_bounds`).
+within the motor's torque-speed curve (`Climber.bounds`).
 """
 
 import math
@@ -93,5 +93,5 @@ class Motors:
 
 def _within_bounds(climber: Climber, wheels: State, torques: Array) -> Array:
     right, left = torques.tolist()
-    right_bounds, left_bounds = climber.torque_bounds(wheels)
+    right_bounds, left_bounds = climber.bounds(wheels.motion)
     return np.array([clipped(right, *right_bounds), clipped(left, *left_bounds)])

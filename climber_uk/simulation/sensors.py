@@ -177,13 +177,8 @@ class Odometer:
         if self.sensors.is_ideal:
             return state
         noise = self._random.normal(size=5).tolist()
-        noisy, aside = self.sensors.corrupted(state.motion, noise), float(state.side_slip)
-        velocity = [
-            noisy.speed * noisy.cosine - aside * noisy.sine,
-            noisy.speed * noisy.sine + aside * noisy.cosine,
-            noisy.yaw_rate,
-        ]
-        return State(np.array([noisy.x, noisy.y, noisy.heading]), np.array(velocity))
+        noisy = self.sensors.corrupted(state.motion, noise)
+        return State.moving(noisy, float(state.side_slip))
 
 
 class DeadReckoning:

@@ -135,7 +135,7 @@ def test_no_torque_is_beyond_its_limit_by_as_little_as_rounding(
         held = np.repeat(held[:, None], 3, axis=1)
     of = ControlInput(at.motion, Torques(*held), Wrench(drive, turn), PERIOD)
     for wheels in law.command(of, PAPER.at(0.0).target).wheels, law.braking(of, Braking(5.0, 5.0)):
-        bounds = climber.torque_bounds(at)
+        bounds = climber.bounds(at.motion)
         for torque, before, (low, high) in zip(wheels, held, bounds, strict=True):
             assert np.all(np.abs(torque) <= limit)
             assert np.all((low <= torque) & (torque <= high))
@@ -168,7 +168,7 @@ def test_a_control_law_of_forces_has_prediction_disturbance_and_limits_around_it
             moved = np.add(acting, now.disturbance)
             at = model.predict(climber, now.motion, *moved, options.lookahead(PERIOD))
         wanted = np.subtract(other.wrench(climber, target, at), now.disturbance)
-        acting = climber.saturate(*wanted, *climber.torque_bounds(START))[:2]
+        acting = climber.saturate(*wanted, *climber.bounds(START.motion))[:2]
     assert command.demanded == pytest.approx(tuple(wanted), abs=1e-12)
     assert command.lateral == pytest.approx(
         climber.mass * at.speed * at.yaw_rate + climber.weight_along_wall * at.cosine

@@ -62,7 +62,7 @@ def test_gains_are_found_under_other_friction(law):
     assert np.diag(gains) == pytest.approx([1.0, 1.0], rel=0.05)
 
 
-@pytest.mark.parametrize(
+IMPERFECT = pytest.mark.parametrize(
     "sensors",
     [
         Sensors(odometry_source="wheels", encoder_resolution=0.006),
@@ -72,6 +72,9 @@ def test_gains_are_found_under_other_friction(law):
     ],
     ids=["encoders", "noise"],
 )
+
+
+@IMPERFECT
 def test_gains_are_found_with_imperfect_sensors(sensors):
     seen = tried(RIGHT, sensors=sensors)
     assert np.diag(response_of(seen).gains) == pytest.approx([1.0, 1.0], rel=0.1)
@@ -198,16 +201,7 @@ def test_a_board_whose_speeds_are_others_is_told(factor):
     assert found["gain"].values["drive"] == pytest.approx(factor, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    "sensors",
-    [
-        Sensors(odometry_source="wheels", encoder_resolution=0.006),
-        Sensors(
-            position_noise=5e-4, heading_noise=1e-3, speed_noise=5e-3, yaw_rate_noise=1e-2, seed=1
-        ),
-    ],
-    ids=["encoders", "noise"],
-)
+@IMPERFECT
 def test_a_board_that_takes_speeds_passes_with_imperfect_sensors(sensors):
     found = checks.report(by_speeds(sensors=sensors))
     assert not report.has_failed(found)

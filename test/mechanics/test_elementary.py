@@ -79,14 +79,6 @@ def test_a_sign_is_the_same_for_many_that_share_it(values):
     np.testing.assert_array_equal(got, [math.copysign(2.0, value) for value in values])
 
 
-def test_one_of_two_pairs_is_chosen_for_each():
-    these, those = (1.0, 2.0), (3.0, 4.0)
-    assert elementary.either(True, these, those) == these
-    assert elementary.either(False, these, those) == those
-    chosen = elementary.either(np.array([True, False]), these, those)
-    np.testing.assert_array_equal(chosen, [[1.0, 3.0], [2.0, 4.0]])
-
-
 @pytest.mark.parametrize(
     ("before", "now", "time", "turn"),
     [

@@ -19,7 +19,7 @@ def test_what_is_told_of_the_sides_is_read_in_any_order(number, left, right, see
         pairs = list(zip(joints.all, told(left, right), strict=True))
         seed.shuffle(pairs)
         names, values = zip(*pairs, strict=True)
-        read = reading.wheel_torques(reading.JointFields(0, 0, values, names), *SIDES[number], what)
+        read = reading.wheel_torques(reading.JointFields(0, 0, values, names), joints, what)
         assert read == pytest.approx((right, left))
 
 
@@ -34,4 +34,4 @@ def test_joints_that_are_missing_or_twice_there_are_refused(left, right):
 def test_a_message_without_all_of_them_is_refused_by_name():
     fields = reading.JointFields(0, 0, [1.0, 2.0], ["lf", "rf"])
     with pytest.raises(ValueError, match="must be 'lf', 'lr', 'rf' and 'rr'"):
-        reading.wheel_torques(fields, *SIDES[2])
+        reading.wheel_torques(fields, wheel_joints(*SIDES[2]))

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from climber_uk.messages import reading_sensors
+from climber_uk.messages.names import wheel_joints
 
 NAN = math.nan
 
@@ -47,7 +48,7 @@ POSE = {
     },
 }
 READ = {
-    "joints": (JOINTS, lambda m: reading_sensors.wheel_angles(m, "left", "right")),
+    "joints": (JOINTS, lambda m: reading_sensors.wheel_angles(m, wheel_joints("left", "right"))),
     "imu": (IMU, lambda m: reading_sensors.imu(m, "imu_link")),
     "pose": (POSE, lambda m: reading_sensors.pose(m, "map")),
 }

@@ -25,6 +25,7 @@ from world import TIMEOUT
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.messages import reading, writing
+from climber_uk.messages.names import Names
 
 pytestmark = pytest.mark.nodes
 
@@ -239,9 +240,7 @@ def test_the_controller_survives_whatever_it_is_told_and_follows_again(
 
 
 def good_torques(now, torque=1.0):
-    return writing.wheel_torques(
-        np.array([torque, torque]), now, "left_wheel_joint", "right_wheel_joint"
-    )
+    return writing.wheel_torques(np.array([torque, torque]), now, Names().wheels)
 
 
 @HOW_MANY

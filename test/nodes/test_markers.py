@@ -13,6 +13,7 @@ from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.reference import Reference
 from climber_uk.messages import reading, writing
+from climber_uk.messages.names import Names
 from climber_uk.ros.running import PUBLISH_PERIOD
 
 pytestmark = pytest.mark.nodes
@@ -45,9 +46,7 @@ class Told:
         state = State.rolling(np.array([1.0, 2.0, 0.0]), 0.1, 0.0)
         return {
             "reference": writing.reference(points, stamp, odom, base),
-            "wheel_torques": writing.wheel_torques(
-                np.array([2.0, -1.0]), stamp, "left_wheel_joint", "right_wheel_joint"
-            ),
+            "wheel_torques": writing.wheel_torques(np.array([2.0, -1.0]), stamp, Names().wheels),
             "uk_torque_controller/constraint_force": writing.wrench((60.0, -20.0, 0), stamp, base),
             "uk_torque_controller/margins": writing.vector((2.0, 9.0, 300.0), stamp, base),
             "odom": writing.odometry(state, stamp, odom, base),

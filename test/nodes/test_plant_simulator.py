@@ -17,6 +17,7 @@ from world import TIMEOUT
 
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading, writing
+from climber_uk.messages.names import Names
 
 pytestmark = pytest.mark.nodes
 
@@ -24,7 +25,7 @@ LEFT, RIGHT = "left_wheel_joint", "right_wheel_joint"
 
 
 def torques(right, left, stamp=0):
-    return writing.wheel_torques(np.array([right, left]), stamp, LEFT, RIGHT)
+    return writing.wheel_torques(np.array([right, left]), stamp, Names().wheels)
 
 
 def stamp(message):

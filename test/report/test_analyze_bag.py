@@ -122,7 +122,7 @@ def test_a_table_a_page_csv_and_json_are_made(bags, run, tmp_path):
 )
 def test_a_condition_says_what_failed(bags, condition, failure):
     (first,), _ = read_runs(bags / "first", Topics())
-    said = Condition.parse(condition).failure(Column("a", "bag", Case(first)))
+    said = Condition.read(condition).failure(Column("a", "bag", Case(first)))
     assert said == (failure and f"a: {failure}")
 
 
