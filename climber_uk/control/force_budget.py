@@ -28,8 +28,8 @@ SPENT = 0.95  # of it, from which it is used up
 MORE = 0.2  # of the friction, by which each push after the first is stronger
 FIRST_PAUSE, PAUSE = 0.16, 0.05  # [s] from one to the next, for which nothing drives
 ECHO = 1.1  # [s] after the very first one, in which an answer comes that is late
-# of the friction, that is pushed against meanwhile, once it rests; and for a time [s] before the next
-# push, as motors are lazy
+# of the friction, that is pushed against meanwhile, once it rests; and for a time [s] before the
+# next push, as motors are lazy
 HELD, LOADED, LOADS = 0.6, 0.95, 0.03
 MOVES_NOTHING = 0.85  # of it, up to which a push surely has ended
 LATE = 0.02  # [s] after a push has ended, from which on a motion that begins comes too late
