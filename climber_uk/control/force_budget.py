@@ -239,8 +239,12 @@ class ForceBudget:
         return command._replace(wheels=wheels, lost=lost)
 
     def _stronger(self, climber: Climber, push: float) -> float:
-        """A push [N] that is as strong as its turn asks for: a reference may begin too slowly."""
-        if self.paused is not None or not self.pushes or abs(push) <= self._holds(climber):
+        """A push [N] that is as strong as its turn asks for: a reference may begin too slowly.
+
+        Soon after a fault it is not: what was wrong may be so still.
+        """
+        is_push = self.paused is None and self.pushes > 0 and abs(push) > self._holds(climber)
+        if self.is_doubted or not is_push:
             return push
         least = (1 + MORE * self.pushes) * climber.seal_friction
         return math.copysign(max(least, abs(push)), push)
