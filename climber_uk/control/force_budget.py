@@ -4,7 +4,8 @@ A seal that sticks looks like odometry that is late, or stuck: torque is given, 
 told. The climber may move in truth, at a speed that is the excess force's integral over the mass.
 So that speed is bounded. Where it is used up, the climber is let come to rest, as its seal makes
 it; then it is pushed again, a little more. A seal that sticks breaks loose by that, and what was
-told too late shows while nothing drives.
+told too late shows while nothing drives. A push of a reference that begins slowly would be spent on
+little more than the known friction: each is as strong as it may be on its own account.
 """
 
 import math
@@ -19,14 +20,17 @@ from climber_uk.mechanics.quantities import Torques, Wrench
 
 FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
 GROWS = 1.4  # from one push to the next
-MOST, PUSHES = 1.1, 6  # times what is allowed, and pushes, after which it is stalled
+MOST, PUSHES = 0.1, 6  # [m/s] beyond what is allowed, and pushes, after which it is stalled
 # [m/s] of a reference that goes on while the climber stops, and pushes, after which it is stalled
 STOPPED, STOPPED_PUSHES = 0.05, 1
 TRIED = 2  # pushes, from which on a climber off its path is stalled
-SPENT = 0.8  # of it, from which it is used up
-FIRST_PAUSE, PAUSE = 0.18, 0.05  # [s] from one to the next, for which nothing drives
+SPENT = 0.95  # of it, from which it is used up
+MORE = 0.2  # of the friction, by which each push after the first is stronger
+FIRST_PAUSE, PAUSE = 0.16, 0.05  # [s] from one to the next, for which nothing drives
 ECHO = 1.1  # [s] after the very first one, in which an answer comes that is late
-HELD = 0.8  # of the friction, that is pushed against meanwhile, once it rests
+# of the friction, that is pushed against meanwhile, once it rests; and for a time [s] before the
+# next push, as motors are lazy
+HELD, LOADED, LOADS = 0.6, 0.95, 0.03
 MOVES_NOTHING = 0.85  # of it, up to which a push surely has ended
 LATE = 0.02  # [s] after a push has ended, from which on a motion that begins comes too late
 MEMORY = 0.1  # [s] in which friction is learnt
@@ -61,6 +65,7 @@ class ForceBudget:
         self._astray = 0.0  # [rad] that its heading may be off
         self.pushes = 0  # without an answer
         self.paused: float | None = None  # [s] for which nothing drives
+        self._loads = False  # before the next push
         self._still = 0.0  # [s] for which it rests after a push, as far as its torques tell
         self._pushed = 0.0  # [s] since it should move by the last push
         self._wanted, self._allowed = 0.0, math.inf  # [m/s]
@@ -83,7 +88,7 @@ class ForceBudget:
         """Speed [m/s] that may be given now."""
         is_first = self.is_gentle and self.pushes == 0 and self._slid <= KNOWN
         first = FIRST if is_first else self.first
-        return min(first * GROWS**self.pushes, MOST * self._allowed)
+        return min(first * GROWS**self.pushes, self._allowed + MOST)
 
     def learn(self, climber: Climber, observed: Observed) -> None:
         """Learn what resists turning: what scrubs, all of it while it turns, either way alike.
@@ -168,11 +173,12 @@ class ForceBudget:
         if self.paused is not None:
             self.paused += time
             pause = FIRST_PAUSE if self.pushes == 1 else PAUSE
-            pause = ECHO if self.listens else pause
-            if self.paused > pause + observed.reaction and self.speed == 0:
+            pause = (ECHO if self.listens else pause) + observed.reaction
+            self._loads = self.paused > pause
+            if self.paused > pause + LOADS and self.speed == 0:
                 self.is_new, self.paused = False, None
         elif abs(self.speed) > SPENT * self.most:
-            self.paused, self.pushes = 0.0, self.pushes + 1
+            self.paused, self._loads, self.pushes = 0.0, False, self.pushes + 1
         return self.unanswered if self.pushes > self._most_pushes else None
 
     @property
@@ -209,8 +215,10 @@ class ForceBudget:
             asked - lost for asked, lost in zip(command.demanded, command.lost, strict=True)
         )
         push = force - weight
+        stronger = self._stronger(climber, push)
         if self.paused is not None:
-            held = HELD * min(climber.seal_friction, self._holds(climber))
+            share = LOADED if self._loads else HELD
+            held = share * min(climber.seal_friction, self._holds(climber))
             most = 0.0 if self.speed else held
             lowest, highest = -most, most
         else:
@@ -221,13 +229,25 @@ class ForceBudget:
             to_force = climber.driven_mass / period
             lowest = -holds - to_force * max(self.most + speed, 0.0)
             highest = holds + to_force * max(self.most - speed, 0.0)
-        cut = push - min(max(push, lowest), highest)
+        push_given = min(max(stronger, lowest), highest)
         turned = moment - self._turning(climber, moment, period)
-        if abs(cut) + abs(turned) <= CUT:
+        if push_given == push and abs(turned) <= CUT:
             return command
+        cut = push - push_given
         lost = Wrench(command.lost.force + cut, command.lost.moment + turned)
-        wheels = law.torques(force - cut, moment - turned, ahead)
+        wheels = law.torques(weight + push_given, moment - turned, ahead)
         return command._replace(wheels=wheels, lost=lost)
+
+    def _stronger(self, climber: Climber, push: float) -> float:
+        """A push [N] that is as strong as its turn asks for: a reference may begin too slowly.
+
+        Soon after a fault it is not: what was wrong may be so still.
+        """
+        is_push = self.paused is None and self.pushes > 0 and abs(push) > self._holds(climber)
+        if self.is_doubted or not is_push:
+            return push
+        least = (1 + MORE * self.pushes) * climber.seal_friction
+        return math.copysign(max(least, abs(push)), push)
 
     def _turning(self, climber: Climber, moment: float, period: float) -> float:
         """A moment [N m], or what of it is given while no turn is told: none in a pause."""

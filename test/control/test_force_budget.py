@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from climbs import PERIOD, Climb
 from test_lies import frozen
+from test_reversals import Odd
 
 from climber_uk.control.control_law import Command, ControlInput
 from climber_uk.control.force_budget import BREAKS_LOOSE, FIRST, ForceBudget
@@ -31,6 +32,33 @@ def test_odometry_that_is_stuck_from_the_start_stalls_and_lets_nothing_run_away(
     assert "pushes moved nothing" in climb.controller.detail
     assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
     assert climb.fastest(climb.time - 0.5) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("direction", "friction", "mass", "lag"),
+    [
+        pytest.param(math.pi / 2, 1.3, 1.2, 0.02, id="uphill, lazy"),
+        pytest.param(math.pi / 2, 1.13, 1.2, 0.0, id="uphill", marks=pytest.mark.soak),
+        pytest.param(-math.pi / 2, 1.3, 0.85, 0.02, id="downhill, lazy", marks=pytest.mark.soak),
+        pytest.param(math.pi, 1.4, 1.0, 0.02, id="across, lazy", marks=pytest.mark.soak),
+    ],
+)
+def test_a_seal_that_holds_more_than_believed_breaks_loose_however_slowly_its_reference_begins(
+    direction, friction, mass, lag
+):
+    """A push of what the reference asks for alone would be spent before it is strong enough."""
+    slowly = {"shape": "line", "line.length": 1.0, "line.direction": direction}
+    slowly |= {"time_law": "rest_to_rest", "rest_to_rest.rate": 0.06, "rest_to_rest.ramp_time": 4.0}
+    climb, acting = Climb(planner=slowly, truth=Odd(friction, mass).true), np.zeros(2)
+
+    def lazy(_, torques):
+        nonlocal acting
+        acting = acting + (torques - acting) * (1 - np.exp(-PERIOD / lag) if lag else 1.0)
+        return acting
+
+    climb.run(4.0, motors=lazy)
+    assert not climb.controller.guard.faults
+    assert climb.fastest(3.5) > 0.02
 
 
 @pytest.mark.parametrize(
