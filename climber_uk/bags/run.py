@@ -73,7 +73,7 @@ class RecordedRun:
     def rates(self) -> Array:
         """Speeds (n, 3) forwards, to the left [m/s], about z [rad/s]: the twist, else by poses."""
         twist, by_pose = self.odometry.values[:, 3:], body_rates(self.time, self.pose, REACH)
-        is_known = np.isfinite(twist).all(axis=0)
+        is_known = np.asarray(np.isfinite(twist).all(axis=0))
         is_known[:2] &= not self.is_twist_of_the_wall
         # zeros though it moves; to the side, the driver's zero may be truer than noisy poses
         are_zeros = ~twist.any(axis=0) & (np.abs(by_pose).max(axis=0) > LEAST)
