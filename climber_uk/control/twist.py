@@ -101,7 +101,7 @@ class TwistCheck:
         # by twist while the pose stands [m]
         self._alone = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         self._unlike = Unlike(), Unlike()  # of the same two
-        self._aside = 0.0  # [m] by pose, to the left
+        self._aside = 0.0, 0.0  # [m] by pose, to the left, and the squares of its steps [m²]
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
         """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
@@ -118,7 +118,8 @@ class TwistCheck:
             (left * pose + forward, left * twist + way),
             (left * yaw_by_pose + turned, left * yaw_by_twist + rim),
         )
-        self._aside = left * self._aside + aside
+        sideways, squares = self._aside
+        self._aside = left * sideways + aside, left * squares + aside * aside
         drive, yaw = self._products
         self._products = _summed(left, drive, forward, way), _summed(left, yaw, turned, rim)
         drive_sums, yaw_sums = self._smooth
@@ -172,8 +173,10 @@ class TwistCheck:
     def sideways(self, largest: float) -> str:
         """By how much it goes to the side, in words, if by more than `largest` [m]; else ''."""
         (ahead, _), (turned, _) = self._distances  # what scrubs turns about another point
-        is_far = abs(self._aside) - abs(ahead) - abs(turned) > largest
-        return f"it goes sideways, by {self._aside:.2f} m" if is_far else ""
+        aside, squares = self._aside
+        is_far = abs(aside) - abs(ahead) - abs(turned) > largest
+        is_leap = aside * aside <= AT_LEAST * squares  # as a fix corrects it
+        return f"it goes sideways, by {aside:.2f} m" if is_far and not is_leap else ""
 
     def trouble(self, largest: float) -> tuple[str, bool]:
         """What is wrong if they differ by more than `largest` [m], and whether a sign is."""

@@ -94,3 +94,11 @@ def test_what_turns_about_another_point_than_its_centre_does_not_go_sideways(asi
     for last, motion in itertools.pairwise(motions):
         check.add(last, motion, TIME, 0.3)
     assert bool(check.sideways(LARGEST)) is is_far
+
+
+def test_a_pose_that_leaps_aside_does_not_go_that_way():
+    check = TwistCheck()
+    at = [Motion(x, 0.0, math.pi / 2, 0.0, 1.0, 0.0, 0.0) for x in (0.0, 0.0, 0.1, 0.1, 0.1)]
+    for last, motion in itertools.pairwise(at):
+        check.add(last, motion, TIME, 0.3)
+        assert not check.sideways(LARGEST)
