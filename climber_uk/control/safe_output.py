@@ -21,7 +21,6 @@ NOTHING = 0.05  # of the weight: a drive that is let go
 FALLS = 0.1  # [m/s] by which it may get faster without a torque, if its seal holds it
 LATEST = 0.6  # [s] that a torque may act after it was sent: none acts this long after the last
 LESS = 0.5  # times as much of the weight is carried, where what carries it drives it
-MOST_CARRIED = 4.0  # times the believed weight
 LETS_GO = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
 # what moves, but in doubt and with a polarity that nobody knows, is shaken a little to find it out
 SHAKEN = 0.02  # [m/s] of a rim, above which it is
@@ -128,7 +127,7 @@ class SafeOutput:
         """Carry less, or again more, of what coasts and gets faster up, or down: of its weight."""
         weight, climber = law.weight(motion), law.climber
         if weight * motion.speed <= 0:
-            self._carries = min(MOST_CARRIED, self._carries / LESS)
+            self._carries = min(1.0, self._carries / LESS)
             return
         most = 2 * climber.max_wheel_torque / climber.wheel_radius  # more of it has no effect
         self._carries = LESS * min(self._carries, most / abs(weight))

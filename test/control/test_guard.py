@@ -431,10 +431,3 @@ def test_a_heading_that_is_a_right_angle_off_lets_nothing_run_away(turn, source)
     climb = Climb(**{"observer.velocity_source": source}).run(8.0, odometry=told)  # 6 to 20 m/s
     assert Mode.HEADING_WRONG in climb.modes
     assert climb.fastest() < 1.4
-
-
-def test_a_weight_that_is_believed_far_too_low_does_not_fall_in_the_safe_output():
-    climb = Climb(mass=2.3, seal_friction_coefficient=0.0, truth=lambda it: replace(it, mass=5.0))
-    climb.controller.enable(False)
-    climb.run(3.0)  # kg for pounds: 11 m/s after three seconds, if no more than that is carried
-    assert climb.fastest() < 0.5
