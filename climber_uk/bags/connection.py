@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 CDR = "cdr"
@@ -42,7 +42,7 @@ class StorageFile(Protocol):
 
 
 def readable(found: Iterable[tuple[Connection, str]], lose: Lose) -> Iterator[Connection]:
-    """Yield those of a file's topics, each with its encoding, that can be read.
+    """Yield those of a file's topics, each with its encoding, that can be read, by full names.
 
     `lose` gets a line on the others: an unprintable name, another encoding than CDR.
     """
@@ -53,8 +53,8 @@ def readable(found: Iterable[tuple[Connection, str]], lose: Lose) -> Iterator[Co
             lose(f"a topic that cannot be called so is left out: {topic!r:.60}")
         elif encoding != CDR:
             others[encoding].append(topic)
-        else:
-            yield connection
+        else:  # recorders other than rosbag2's may leave out the slash
+            yield replace(connection, topic=f"/{topic.removeprefix('/')}")
     for encoding, topics in others.items():
         lose(f"{listed(topics)} left out: encoded as {encoding or 'nothing'}, not {CDR}")
 

@@ -26,6 +26,7 @@ OFTEN, SELDOM = 0.2, 1.0
 # correlation of twist and poses' rates, and metres or radians of way, from which on a ratio of them
 # counts, and the highest that is taken for noise or slip
 ALIKE, LEAST_WAY, MOST_RATIO = 0.9, 0.1, 1.4
+FITS = 0.05  # times the squares of misfits of another explanation: it is the right one
 MISSING = 3.0  # typical times from one odometry to the next, above which the speed is unknown
 SLIP_REACH = 0.25  # [s] as `REACH`, for the speed to the side: slow, and hidden by noise of poses
 
@@ -72,7 +73,8 @@ class RecordedRun:
     def rates(self) -> Array:
         """Speeds (n, 3) forwards, to the left [m/s], about z [rad/s]: the twist, else by poses."""
         twist, by_pose = self.odometry.values[:, 3:], body_rates(self.time, self.pose, REACH)
-        is_known = np.isfinite(twist).all(axis=0)
+        is_known = np.asarray(np.isfinite(twist).all(axis=0))
+        is_known[:2] &= not self.is_twist_of_the_wall
         # zeros though it moves; to the side, the driver's zero may be truer than noisy poses
         are_zeros = ~twist.any(axis=0) & (np.abs(by_pose).max(axis=0) > LEAST)
         are_zeros[1] &= are_zeros[0]
@@ -82,6 +84,19 @@ class RecordedRun:
     def travelled(self) -> float:
         """Distance travelled by the centre [m]: ∫ |v| dt, or by poses where these contradict it."""
         return self._chords(OFTEN) if self.contradiction else self._integral(self.rates[:, 0])
+
+    @cached_property
+    def is_twist_of_the_wall(self) -> bool:
+        """Whether the twist's x and y are along the wall's axes, not the climber's."""
+        by_pose, twist = (
+            body_rates(self.time, self.pose, REACH)[:, :2],
+            self.odometry.values[:, 3:5],
+        )
+        way, heading = self.time[-1] * np.abs(by_pose[:, 0]).mean(), self.pose[:, 2]
+        cosine, sine = np.cos(heading), np.sin(heading)
+        turned = np.stack([by_pose[:, 0] * cosine, by_pose[:, 0] * sine], axis=1)
+        of_body, of_wall = (np.nansum((twist - it) ** 2) for it in (by_pose, turned))
+        return bool(way > LEAST_WAY and of_wall < FITS * of_body)
 
     @cached_property
     def contradiction(self) -> str:
@@ -96,6 +111,8 @@ class RecordedRun:
     def wrong_twist(self) -> list[str]:
         """What a twist has that is a multiple of its poses' rates, or not finite, in words."""
         found, by_pose = [], body_rates(self.time, self.pose, REACH)
+        if self.is_twist_of_the_wall:
+            return ["linear.x and linear.y are along the wall's axes, not the climber's"]
         for name, column, turn in (("linear.x", 3, 0), ("angular.z", 5, 2)):
             twist, rate = self.odometry.values[:, column], by_pose[:, turn]
             is_known = np.isfinite(twist)

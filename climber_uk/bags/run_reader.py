@@ -29,6 +29,7 @@ from climber_uk.messages.names import Names
 from climber_uk.parameters.parameter_file import Values
 
 TOLERANCE = 1.0  # [s] by which a stamp may be off the odometry's and still be of its clock
+FAR = 0.05  # [m] that is not driven without a reference unless somebody else drives
 NOTHING = TimeSeries.of([])
 # parameters that are taken from the bag if those that are given in their place have none
 RECORDED_DEFAULTS = "left_wheel_joint", "right_wheel_joint", "adhesion"
@@ -134,6 +135,7 @@ class RunReader:
         known = np.flatnonzero(np.isfinite(reference[:, 0]))
         if len(known):
             first, last = known[0], known[-1]
+            self.note_without_reference(whole, int(first), int(last))
             odometry = odometry.within(whole.stamps[first], whole.stamps[last])
             reference = reference[first : last + 1]
         elif len(whole) > 1 and any(len(part.arrivals) for part in collected.reference):
@@ -184,6 +186,20 @@ class RunReader:
             behind = np.interp(stamps - begin, delays.stamps - begin, delays.values[:, 0])
             stamps = stamps - np.round(behind * SECOND).astype(np.int64)
         return poses_at(collected.reference, stamps)
+
+    def note_without_reference(self, odometry: TimeSeries, first: int, last: int) -> None:
+        """Note how far it went before the first and after the last message with a reference."""
+        places = odometry.values[:, :2]
+        for number, when, there, way in (
+            (first, "before", first, places[:first]),
+            (len(places) - 1 - last, "after", last, places[last:]),
+        ):
+            far = max(np.hypot(*(way - places[there]).T), default=0.0)
+            if far > FAR:
+                self.bag.lose(
+                    f"{self.topic(topics.ODOMETRY)}: {number} of {len(places)} messages left out, "
+                    f"{when} those with a reference: it went {far:.3g} m away in them"
+                )
 
     def series(self, collected: Collected, name: str) -> TimeSeries:
         """The fit messages of a topic; notes how many are left out, and why."""

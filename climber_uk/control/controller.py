@@ -291,11 +291,16 @@ class Controller:
         return (Mode.WHEELS_DIFFER, detail) if detail else None
 
     def _check_twist(self, observed: Observed) -> Trouble | None:
-        """Trouble if the twist is not the pose's rate; notices one that is zero while that goes."""
+        """Trouble if the heading is not that of the way, or the twist not the pose's rate.
+
+        Notices a twist that is zero while the pose goes.
+        """
         before, after, largest = observed.before, observed.after, self.safety.max_twist_error
+        self._twist.add(before, after, observed.time, self._law.climber.half_track)
+        if sideways := self._twist.sideways(largest):
+            return Mode.HEADING_WRONG, sideways
         if self.estimator.observer.velocity_source == "pose":
             return None
-        self._twist.add(before, after, observed.time, self._law.climber.half_track)
         self._without_twist = self._twist.missing(largest)
         detail, is_sign = self._twist.trouble(largest)
         if not detail:

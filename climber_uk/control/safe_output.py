@@ -20,6 +20,7 @@ COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe o
 NOTHING = 0.05  # of the weight: a drive that is let go
 FALLS = 0.1  # [m/s] by which it may get faster without a torque, if its seal holds it
 LATEST = 0.6  # [s] that a torque may act after it was sent: none acts this long after the last
+LESS = 0.5  # times as much of the weight is carried, where what carries it drives it
 LETS_GO = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
 # what moves, but in doubt and with a polarity that nobody knows, is shaken a little to find it out
 SHAKEN = 0.02  # [m/s] of a rim, above which it is
@@ -55,6 +56,7 @@ class SafeOutput:
         """Forget since when it brakes, or coasts."""
         self.end()
         self._coasts_until = 0  # [ns]
+        self._carries = 1.0  # share of the weight that is believed, less where that lifts it
         self._way = 1  # -1 if the speed was known last to go against its torques
 
     def end(self) -> None:
@@ -107,6 +109,8 @@ class SafeOutput:
         if stamp < self._coasts_until:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
                 self._is_carried = False
+                self._weigh(law, motion)
+                self._coasts_from = rim
             return self._coast(mode, estimator, law, age)
         if self._is_pushed(stamp, rim, falls):
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
@@ -118,6 +122,15 @@ class SafeOutput:
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
+
+    def _weigh(self, law: ControlLaw, motion: Motion) -> None:
+        """Carry less, or again more, of what coasts and gets faster up, or down: of its weight."""
+        weight, climber = law.weight(motion), law.climber
+        if weight * motion.speed <= 0:
+            self._carries = min(1.0, self._carries / LESS)
+            return
+        most = 2 * climber.max_wheel_torque / climber.wheel_radius  # more of it has no effect
+        self._carries = LESS * min(self._carries, most / abs(weight))
 
     def _falls(self, law: ControlLaw) -> bool:
         """Whether its weight may be more than its seal holds, as is believed or has shown."""
@@ -174,7 +187,7 @@ class SafeOutput:
         way = self._way if knows else 1
         if not self._falls(law) and (mode.doubts_odometry or not self._is_carried or way < 0):
             return _let_go(estimator, age)
-        return _brake(estimator, law, age, Braking(0.0, 0.0, way), None)
+        return _brake(estimator, law, age, Braking(0.0, 0.0, way * self._carries), None)
 
     def _believed(self, mode: Mode, motion: Motion) -> tuple[Motion, tuple[int, int]]:
         """Motion in doubt, with those speeds that follow torques, and their signs.
@@ -213,7 +226,8 @@ class SafeOutput:
             if holds and (mode is Mode.DEAD_WHEEL or is_against):
                 return Braking(0.0, yaw, carries=0.0)
             # nobody knows its heading where odometry is stuck
-            return Braking(drive, yaw, 0.0 if mode is Mode.STALLED and holds else way)
+            carries = 0.0 if mode is Mode.STALLED and holds else way * self._carries
+            return Braking(drive, yaw, carries)
         if falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
             doubtful = doubtful[0] or 1, doubtful[1] or 1
         rims = motion.speed, law.climber.half_track * motion.yaw_rate
@@ -221,7 +235,8 @@ class SafeOutput:
             0.0 if sign or abs(rim) < SHAKEN else _shaking(doubted)
             for sign, rim in zip(doubtful, rims, strict=True)
         )
-        return Braking(rate * doubtful[0], rate * doubtful[1], shaking=(drive, yaw))
+        carries = 0.0 if mode is Mode.HEADING_WRONG and not falls else self._carries
+        return Braking(rate * doubtful[0], rate * doubtful[1], carries, (drive, yaw))
 
 
 def _shaking(doubted: int) -> float:

@@ -37,6 +37,7 @@ class Mode(Enum):
     NO_REFERENCE = "no reference"
     NO_SOLUTION = "no torque can be computed"
     TWIST_WRONG = "twist and pose contradict each other"
+    HEADING_WRONG = "the pose goes another way than it heads"
     SIGN_WRONG = "twist and pose have opposite signs"
     WHEELS_DIFFER = "the wheels turn otherwise than odometry says"
     TOO_FAR = "too far from the reference"
@@ -60,6 +61,7 @@ class Mode(Enum):
             Mode.JUMPED,
             Mode.NO_TWIST,
             Mode.TWIST_WRONG,
+            Mode.HEADING_WRONG,
             Mode.SIGN_WRONG,
             Mode.WHEELS_DIFFER,
         )

@@ -81,7 +81,8 @@ class TwistCheck:
     Compares distances by pose and by twist, summed over the last moments, older ones counting less.
     A sign is wrong where both go opposite ways all the time: of a climber that swings, sums of a
     twist that is a little late do so now and then. A pose that leaps, as a fix corrects it, is no
-    motion, and counts for no more than `LEAPS`.
+    motion, and counts for no more than `LEAPS`. What goes sideways, by more than it goes ahead and
+    its rims turn, has another heading than it tells.
     """
 
     def __init__(self) -> None:
@@ -100,12 +101,14 @@ class TwistCheck:
         # by twist while the pose stands [m]
         self._alone = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         self._unlike = Unlike(), Unlike()  # of the same two
+        self._aside = 0.0, 0.0  # [m] by pose, to the left, and the squares of its steps [m²]
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
         """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
         heading_change = wrapped(motion.heading - last.heading)
         middle = last.heading + heading_change / 2
         forward = (motion.x - last.x) * math.cos(middle) + (motion.y - last.y) * math.sin(middle)
+        aside = (motion.y - last.y) * math.cos(middle) - (motion.x - last.x) * math.sin(middle)
         way = time * (last.speed + motion.speed) / 2
         turned = half_track * heading_change
         rim = half_track * time * (last.yaw_rate + motion.yaw_rate) / 2
@@ -115,6 +118,8 @@ class TwistCheck:
             (left * pose + forward, left * twist + way),
             (left * yaw_by_pose + turned, left * yaw_by_twist + rim),
         )
+        sideways, squares = self._aside
+        self._aside = left * sideways + aside, left * squares + aside * aside
         drive, yaw = self._products
         self._products = _summed(left, drive, forward, way), _summed(left, yaw, turned, rim)
         drive_sums, yaw_sums = self._smooth
@@ -164,6 +169,14 @@ class TwistCheck:
             if is_way and are_alike and twist_2 < TOO_LITTLE * alike:
                 return f"{name} is {twist_2 / alike:.2f} of it"
         return ""
+
+    def sideways(self, largest: float) -> str:
+        """By how much it goes to the side, in words, if by more than `largest` [m]; else ''."""
+        (ahead, _), (turned, _) = self._distances  # what scrubs turns about another point
+        aside, squares = self._aside
+        is_far = abs(aside) - abs(ahead) - abs(turned) > largest
+        is_leap = aside * aside <= AT_LEAST * squares  # as a fix corrects it
+        return f"it goes sideways, by {aside:.2f} m" if is_far and not is_leap else ""
 
     def trouble(self, largest: float) -> tuple[str, bool]:
         """What is wrong if they differ by more than `largest` [m], and whether a sign is."""

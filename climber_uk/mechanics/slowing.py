@@ -20,6 +20,7 @@ LARGEST_CELL_TURN, CONTRAST, HALVINGS = 0.15, 1.25, 24  # [rad], ratio
 FINEST = 2.0**-12  # of the spacing of knots, to which cells are halved for the contrast
 STEEPER = 1.2  # times as fast as foreseen that speed may change, before cells are halved for it
 MOST_CELLS = 800_000  # about 8000 sharp corners
+SLOWEST = 1e6  # times as slow as planned; of far more, squares are lost beside 1
 WITHIN = np.linspace(1e-6, 1 - 1e-6, 9)  # where a cell is looked at: beside ends that turn back
 MARGIN = 1.01  # for what peaks in between
 
@@ -77,7 +78,8 @@ class Slowed:
 def slowed(curve: Any, length: float, closed: bool, spacing: float, limits: SpeedLimits) -> Slowed:
     """s(u) along `curve`, a BSpline of s from 0 to `length`, so slow that the limits hold.
 
-    At no rate it would have to be slower than that within less than `spacing` [m].
+    At no rate it would have to be slower than that within less than `spacing` [m]. Raises
+    `ValueError` with the place of what cannot be looked at.
     """
     from scipy.interpolate import BSpline  # slow to import: for waypoints only
 
@@ -171,6 +173,10 @@ def _look(curve: Any, start: Array, size: Array, limits: SpeedLimits) -> tuple[A
         np.sqrt(bend * (2**0.5 * limits.rate**2 / limits.acceleration)),
     )
     needed = np.maximum(needed, (limits.rate / limits.speed(s)).max(axis=1))
+    if not (needed < SLOWEST).all():
+        x, y = np.round(curve(start[np.argmax(needed)]), 6)
+        least = limits.rate / SLOWEST
+        raise ValueError(f"at ({x:g}, {y:g}) m it must be slower than {least:.3g} m/s, too slow")
     # beside a reversal |p'| is a little above 1, and more so between the places looked at
     excess = np.maximum(np.sqrt(square.max(axis=1)) - 1.0, 0.0)
     return curvature, np.maximum(needed, 1.0 + 1.25 * excess)

@@ -1,6 +1,7 @@
 """Waypoints from a text file, as people, spreadsheets and planners write them."""
 
 import codecs
+import csv
 import math
 import re
 from dataclasses import dataclass, field
@@ -10,10 +11,11 @@ import numpy as np
 from climber_uk.mechanics import Array
 from climber_uk.parameters.text_file import at_home, content_of
 
-COMMENT = re.compile(r"#.*|^\s*(//|%).*")
+COMMENT = re.compile(r"""("[^"]*")|#.*|^\s*(//|%).*""")  # not in quotes
 BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")
 UNIT = re.compile(r"[\[(](.*)[\])]|_((?:mm|cm|m|km|ft|in)(?:/s)?|m?s)$", re.IGNORECASE)
-EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)  # a first line that tells the separator
+EXCEL = re.compile(r"sep=(.?)", re.IGNORECASE)  # a first line that tells the separator
+BESIDE_COMMA = re.compile(r"(^|\s),|,(\s|$)")  # what has blanks beside it is no decimal comma
 LINE_END = re.compile(r"\r\n?")
 METRES = "m", "metre", "meter", "metres", "meters"
 FARTHEST = 1e6  # [m] of the origin; beyond it a path has no millimetres left
@@ -44,9 +46,10 @@ def read_waypoints(file: str) -> tuple[Array, Marks]:
     """Points (n, 2) [m]: one a line, x and y, or more columns of which a header names x and y.
 
     It may name speed, dwell and tag as well, of which cells may be empty.
-    Columns are separated by semicolons, commas, tabs or blanks; with semicolons, numbers may have
-    decimal commas. Empty lines and comments (# … anywhere, // … and % … as lines) are left out.
-    Raises `ValueError` naming the file, the line and what was wanted.
+    Columns are separated by semicolons, tabs, commas or blanks. Numbers may have decimal commas
+    between semicolons or tabs, or in quotes. Empty lines and comments (# … anywhere, // …
+    and % … as lines) are left out. Raises `ValueError` naming the file, the line and what was
+    wanted.
     """
     try:
         return read_waypoint_text(read_text(file))
@@ -94,7 +97,7 @@ def blocks(text: str) -> list[tuple[int, str]]:
         if line.strip():
             block.append(line)
             continue
-        bare = [COMMENT.sub("", row).strip(" \t") for row in block]
+        bare = [_bare(row) for row in block]
         top = next((i for i, row in enumerate(bare) if _has_number(row)), len(block))
         if not found:
             head += block[:top]
@@ -116,19 +119,19 @@ def read_waypoint_text(text: str, first: int = 1) -> tuple[Array, Marks]:
     `first` is the number of its first line.
     """
     lines = list(enumerate(text.split("\n"), start=first))
-    rows = [(n, bare) for n, line in lines if (bare := COMMENT.sub("", line).strip(" \t"))]
+    rows = [(n, bare) for n, line in lines if (bare := _bare(line))]
     if not rows:
         raise ValueError("no points in it: want x and y [m] of a point a line")
     told = EXCEL.fullmatch(rows[0][1]) if len(rows) > 1 else None
     if told:
         rows = rows[1:]
-    separator = told[1] if told else _separator(rows[0][1])
+    separator = (told[1] or "\t") if told else _separator(rows[0][1])
     cells = [(n, _split(row, separator)) for n, row in rows]
     columns, cells = _columns(cells, [line for n, line in lines if n < rows[0][0]], separator)
     if len(cells) < 2:
         raise ValueError(f"{len(cells)} point(s), want >= 2")
     rows_of = [(n, _pick(n, line, columns)) for n, line in cells]
-    is_comma = separator == ";" and any(
+    is_comma = separator is not None and any(
         "," in row.get(name, "") for _, row in rows_of for name in NUMBERS
     )
     points = [[_number(n, row[name], is_comma) for name in "xy"] for n, row in rows_of]
@@ -156,12 +159,24 @@ def _size(line: int, row: dict[str, str], name: str, is_comma: bool, default: fl
     return value
 
 
+def _bare(line: str) -> str:
+    """A line without its comment, and blanks around it."""
+    return COMMENT.sub(r"\1", line).strip(" \t")
+
+
 def _separator(row: str) -> str | None:
-    return next((mark for mark in ";,\t" if mark in row), None)
+    marks = ";,\t" if BESIDE_COMMA.search(row) else ";\t,"
+    return next((mark for mark in marks if mark in row), None)
 
 
 def _split(row: str, separator: str | None) -> list[str]:
-    return [cell.strip().strip("\"'").strip() for cell in row.split(separator)]
+    cells = row.split(separator)
+    if separator and '"' in row:
+        try:
+            cells = next(csv.reader([row], delimiter=separator, skipinitialspace=True))
+        except csv.Error as error:
+            raise ValueError(str(error)) from None
+    return [cell.strip().strip("\"'").strip() for cell in cells]
 
 
 def _shortened(cells: list[str], number: int) -> list[str]:

@@ -174,11 +174,12 @@ def _namespace(name: str) -> str:
 def main() -> None:
     """Do what the command line says."""
     options = parse()
-    on_end(_interrupt)
-    use_udp()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = Node("climber", namespace=options.namespace)
+    node = None
     try:
+        on_end(_interrupt)
+        use_udp()
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        node = Node("climber", namespace=options.namespace)
         is_done, said = DO[options.verb](Operator(node, options.timeout), options.values)
         print(printable(said), file=sys.stdout if is_done else sys.stderr)
         status = 0 if is_done else REFUSED

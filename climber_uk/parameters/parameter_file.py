@@ -35,6 +35,7 @@ ZERO = re.compile(r"[-+]?[0.]+(e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
 LEAST = sys.float_info.min
 DEEPEST = 100  # tables
 MOST = 10_000  # values; rcl takes a time that grows with their square
+NODE_NAME = re.compile(r"/?(\*{1,2}|[a-z_]\w*)(/(\*{1,2}|[a-z_]\w*))*", re.IGNORECASE | re.ASCII)
 NO_ALIAS = "an alias (*) is not taken"
 
 
@@ -101,6 +102,8 @@ def read_sections(path: Path) -> list[Section]:
         name = "/".join(keys[:own])
         if not name:
             raise ValueError(f"{path} is no parameter file: no node's name before {PARAMETERS}")
+        if not NODE_NAME.fullmatch(name):
+            raise ValueError(f"{path} is no parameter file: {name!r} cannot be a node's name")
         if own == len(keys) - 1:
             raise ValueError(
                 f"{path} is no parameter file: {PARAMETERS} of {name} is {value!r}, no table: "
@@ -245,6 +248,8 @@ def _entries(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     try:
         for event in yaml.parse(text, PARSER):
             line = event.start_mark.line + 1  # type: ignore[union-attr]
+            if isinstance(event, yaml.DocumentStartEvent) and event.version == (1, 2):
+                raise ValueError("rcl reads YAML 1.1: leave %YAML out")
             for value in tables.take(event):
                 yield tuple(tables.keys), value
                 tables.keys[-1] = ""

@@ -13,14 +13,18 @@ from typing import Any, ParamSpec, TypeVar
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError  # rclpy exports neither
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.parameter_service import ParameterService
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.service import Service
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
@@ -141,6 +145,29 @@ class ClimberNode(Node):
             take(message)
 
         self.checked(CLOCK, take_checked)
+
+    def create_service(
+        self, kind: type, name: str, callback: Callable[..., Any], **options: Any
+    ) -> Service:
+        """As rclpy, but a request that its parameter services cannot read does not end the node."""
+        if isinstance(getattr(callback, "__self__", None), ParameterService):
+            callback = partial(self._serve, callback)
+        return super().create_service(kind, name, callback, **options)
+
+    def _serve(self, serve: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        try:
+            response = serve(request, response)
+        except (ValueError, TypeError, ParameterException) as error:  # as for a type of 77
+            refused = SetParametersResult(successful=False, reason=in_a_line(error))
+            if isinstance(response, SetParameters.Response):
+                lacking = len(request.parameters) - len(response.results)
+                response.results = [*response.results, *[refused] * lacking]
+            elif isinstance(response, SetParametersAtomically.Response):
+                response.result = refused
+            self.report("request for parameters", "refused", refused.reason)
+            return response
+        self.report("request for parameters", "")
+        return response
 
     def on_parameters(self) -> None:
         """Called when parameters have changed."""

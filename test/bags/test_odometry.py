@@ -320,3 +320,17 @@ def test_seconds_are_not_lost_where_time_is_long(tmp_path):
     np.testing.assert_allclose(run.time, made.time, atol=1e-9)
     assert run.start > 1_700_000_000 * SECOND
     assert (made.messages[0][1], run.distance.max() < 1e-9) == (ODOMETRY, True)
+
+
+def test_a_twist_along_the_axes_of_the_wall_is_said_and_makes_no_way(tmp_path):
+    made = a_run(800)
+    headings = iter(made.pose[:, 2])
+
+    def to_the_wall(sent):
+        speed, heading = sent.twist.twist.linear, next(headings)
+        speed.x, speed.y = speed.x * np.cos(heading), speed.x * np.sin(heading)
+
+    made.edit("odom", to_the_wall)
+    (run,), (line,) = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert evaluate(Case(run))["travelled"] == pytest.approx(WAY, rel=0.01)
+    assert line == "/odom: linear.x and linear.y are along the wall's axes, not the climber's"

@@ -1,5 +1,6 @@
 """Runs from bags of every form: stored, packed, split, named and timed one way or another."""
 
+import re
 import shutil
 
 import numpy as np
@@ -87,6 +88,13 @@ def test_topics_may_have_other_names(tmp_path, rule):
     )
     (run,), _ = read_runs(bag, Topics.parse([rule]))
     assert len(run.time) == len(run.torques) == N
+
+
+def test_topics_may_lack_the_slash_in_front(tmp_path):
+    bag = write(tmp_path / "bag", [(m[0][1:], *m[1:]) for m in a_run(N).messages])
+    (run,), said = read_runs(bag, Topics())
+    assert len(run.time) == len(run.torques) == N
+    assert not said
 
 
 @pytest.mark.parametrize(
@@ -214,6 +222,22 @@ def test_that_a_topic_has_another_clock_is_said(tmp_path):
     assert sorted(said) == [
         f"/{topic}: no message has a time of the odometry's" for topic in sorted(late)
     ]
+
+
+def test_what_is_driven_without_a_reference_is_left_out_and_said(tmp_path):
+    made = Made(400)
+    made.add_odometry()
+    made.add_reference(begin=0.5, end=0.5)
+    stamps = [sent[3].header.stamp for sent in made.messages if sent[0] == "/odom"]
+    for stamp in stamps[200:]:  # a clock that is set forward
+        stamp.sec += 10
+    (run,), said = read_runs(made.write(tmp_path / "bag"), Topics())
+    assert len(run.time) < 200
+    assert len(said) == 2
+    for line, when in zip(said, ("before", "after"), strict=True):
+        assert re.match(
+            rf"/odom: \d+ of 400 messages left out, {when} .* it went 0\.\d+ m away", line
+        )
 
 
 def test_points_are_where_they_were_written(tmp_path):

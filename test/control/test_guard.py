@@ -410,3 +410,24 @@ def test_a_seal_that_holds_less_than_the_weight_lets_nothing_fall_in_the_safe_ou
     climb.run(4.0, motors=late)
     assert Mode.TOO_FAST in climb.modes
     assert climb.fastest() < 0.6
+
+
+@pytest.mark.parametrize("seal", [0.6, 0.0])
+@pytest.mark.parametrize("mass", [50.0, 5000.0])
+def test_a_weight_that_is_believed_far_too_high_is_not_carried_up_the_wall(mass, seal):
+    rubs = {"seal_friction_coefficient": seal}
+    climb = Climb(mass=mass, **rubs, truth=lambda it: replace(it, mass=5.0, yaw_inertia=0.33))
+    climb.run(2.0)  # pounds, grams: 12 and 23 m/s after a second, if all of it is carried
+    assert climb.fastest() < 1.1
+    assert seal == 0 or climb.fastest(since=1.5) < 0.3
+
+
+@pytest.mark.parametrize("turn", [0.5, -0.5])
+@pytest.mark.parametrize("source", ["odometry", "pose"])
+def test_a_heading_that_is_a_right_angle_off_lets_nothing_run_away(turn, source):
+    def told(_, state):  # as of a camera whose axes are others: x and y of its twist as well
+        return State(state.pose + np.array([0.0, 0.0, turn * math.pi]), state.velocity)
+
+    climb = Climb(**{"observer.velocity_source": source}).run(8.0, odometry=told)  # 6 to 20 m/s
+    assert Mode.HEADING_WRONG in climb.modes
+    assert climb.fastest() < 1.4

@@ -1,6 +1,7 @@
 import itertools
 import math
 
+import numpy as np
 import pytest
 
 from climber_uk.control.twist import TwistCheck
@@ -81,3 +82,23 @@ def test_a_twist_that_is_off_by_much_is_told_with_the_length(share):
 def test_a_twist_that_is_off_by_a_little_is_slip():
     found = troubles(on_a_circle(1.0, 0.0, 0.3, lambda v, turn: (1.3 * v, turn)))
     assert set(found) == {("", False)}
+
+
+@pytest.mark.parametrize(("aside", "is_far"), [(0.25, False), (-0.25, False), (0.4, True)])
+def test_what_turns_about_another_point_than_its_centre_does_not_go_sideways(aside, is_far):
+    check, motions = TwistCheck(), []
+    for time in TIME * np.arange(50):
+        x, y = aside * math.cos(time), aside * math.sin(time)
+        cosine, sine = math.cos(time), math.sin(time)  # across the way
+        motions.append(Motion(x, y, float(time), cosine, sine, 0.0, 1.0))
+    for last, motion in itertools.pairwise(motions):
+        check.add(last, motion, TIME, 0.3)
+    assert bool(check.sideways(LARGEST)) is is_far
+
+
+def test_a_pose_that_leaps_aside_does_not_go_that_way():
+    check = TwistCheck()
+    at = [Motion(x, 0.0, math.pi / 2, 0.0, 1.0, 0.0, 0.0) for x in (0.0, 0.0, 0.1, 0.1, 0.1)]
+    for last, motion in itertools.pairwise(at):
+        check.add(last, motion, TIME, 0.3)
+        assert not check.sideways(LARGEST)

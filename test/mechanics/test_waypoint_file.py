@@ -14,6 +14,9 @@ GOOD = {
     "semicolons": "0;1.5\n2;-3.25\n1e-3;4\n",
     "decimal commas": "0;1,5\n2;-3,25\n0,001;4\n",
     "decimal commas after a header": "x;y\r\n0;1,5\r\n2;-3,25\r\n0,001;4\r\n",
+    "decimal commas between tabs": "0\t1,5\n2\t-3,25\n0,001\t4\n",
+    "decimal commas in quotes": 'x,y\n0,"1,5"\n2,"-3,25"\n"0,001",4\n',
+    "a separator in quotes": 'tag,x,y\n"a, # b",0,1.5\n"c",2,-3.25\n,1e-3,4\n',
     "header": "x,y\n0,1.5\n2,-3.25\n1e-3,4\n",
     "capitals, units and quotes": '"X [m]";"Y (m)"\n0;1.5\n2;-3.25\n1e-3;4\n',
     "other order": "y,x\n1.5,0\n-3.25,2\n4,1e-3\n",
@@ -23,6 +26,7 @@ GOOD = {
     "header in a comment, separated otherwise": "# y, x\n1.5 0\n-3.25 2\n4 1e-3\n",
     "units behind underscores": "t_s,x_m,y_m\n0,0,1.5\n1,2,-3.25\n2,1e-3,4\n",
     "a separator told to Excel": "sep=;\nx;y\n0;1,5\n2;-3,25\n0,001;4\n",
+    "a tab told to Excel": "sep=\t\nx\ty\n0\t1,5\n2\t-3,25\n0,001\t4\n",
     "units apart": "y [m] x [m]\n1.5 0\n-3.25 2\n4 1e-3\n",
     "trailing separators": "x,y,\n0,1.5,\n2,-3.25,\n1e-3,4,\n",
     "comments": "# a path\n0 1.5 # start\n\n// on\n2 -3.25\n   \n% end\n1e-3 4\n",
@@ -113,8 +117,8 @@ def test_what_is_no_file_is_said_to_be_none(tmp_path):
 
 def test_speed_dwell_and_tag_of_points_are_read_and_may_be_empty(tmp_path):
     file = tmp_path / "points.csv"
-    file.write_text("tag;x [m];y;speed [m/s];dwell [s]\nphoto 1;0;0;0,5;\n;1;0;;2\n")
+    file.write_text('tag;x [m];y;speed [m/s];dwell [s]\n"photo; #1";0;0;0,5;\n;1;0;;2\n')
     _, marks = read_waypoints(str(file))
-    assert marks.tags == ("photo 1", "")
+    assert marks.tags == ("photo; #1", "")
     np.testing.assert_array_equal(marks.speed, [0.5, np.inf])
     np.testing.assert_array_equal(marks.dwell, [0.0, 2.0])

@@ -219,6 +219,16 @@ def test_points_all_in_one_place_are_refused_in_words(folder, points):
         made(folder, points)
 
 
+@pytest.mark.parametrize("speed", [1e-12, 1e-300])
+def test_a_speed_too_low_to_be_reckoned_with_is_refused_with_the_place(folder, speed):
+    file = folder / "slow.csv"
+    file.write_text(f"x,y,speed\n0,0,\n1,0,{speed}\n1,1,\n")
+    with pytest.raises(
+        ValueError, match=r"slow.csv': at \(.*\) m it must be slower than 2e-07 m/s"
+    ):
+        Waypoints(file=str(file)).at_rate(RATE)
+
+
 def test_a_summary_of_waypoints_has_the_sizes_of_its_path(folder):
     said = summary(Trajectory(made(folder, CASES["lanes"]), RestToRest(rate=RATE)))
     assert 3.3 < said.length < 3.4

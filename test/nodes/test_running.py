@@ -11,6 +11,8 @@ import pytest
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.context import Context
 from world import TIMEOUT, new_domain
 
@@ -19,6 +21,7 @@ from climber_uk.parameters.parameter_files import ParameterFiles
 from climber_uk.ros import running
 
 ODOMETRY = "nav_msgs/msg/Odometry"
+SUFFIX = {SetParameters: "", SetParametersAtomically: "_atomically"}
 
 pytestmark = pytest.mark.nodes
 
@@ -80,6 +83,19 @@ def wait_for_line(do, capfd):
         do()
     (line,) = said.splitlines()
     return line.split("]: ")[1]
+
+
+@pytest.mark.parametrize("kind", [SetParameters, SetParametersAtomically])
+def test_a_request_for_parameters_that_is_none_does_not_end_the_node(node, capfd, kind):
+    value = ParameterValue(type=77)  # of which there is none
+    request = kind.Request(parameters=[Parameter(name="left_wheel_joint", value=value)] * 2)
+    client = node.create_client(kind, f"climber/set_parameters{SUFFIX[kind]}")
+    assert client.wait_for_service(TIMEOUT)
+    answer = client.call_async(request)
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=TIMEOUT)
+    results = getattr(answer.result(), "results", None) or [answer.result().result]
+    assert {result.reason for result in results} == {"77 is not a valid Parameter.Type"}
+    assert "request for parameters: refused (77 is not" in capfd.readouterr().err
 
 
 def test_what_others_told_has_an_end_and_is_safe_to_print(node, capfd):

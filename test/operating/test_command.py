@@ -11,7 +11,7 @@ from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from sensor_msgs.msg import JointState
 
 from climber_uk.messages import writing
-from climber_uk.operating import watching
+from climber_uk.operating import command, watching
 from climber_uk.operating.command import parse
 from climber_uk.planning.progress import Progress
 
@@ -35,6 +35,17 @@ def test_what_means_nothing_is_refused_in_one_line(monkeypatch, capsys, words, l
     assert ended.value.code == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert line in said
+
+
+def test_a_signal_before_the_node_is_there_ends_it_without_a_traceback(monkeypatch, capsys):
+    left = []
+    monkeypatch.setattr("sys.argv", ["climber", "watch"])
+    monkeypatch.setattr(command, "on_end", lambda handler: handler())
+    monkeypatch.setattr(command, "leave", lambda *ended: left.append(ended))
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    assert (ended.value.code, left) == (0, [(0, None)])
+    assert not capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["", "climber_1", "/climber_1", "a/b/"])

@@ -5,7 +5,7 @@ import pytest
 from climber_uk.control.constraints import CONSTRAINTS
 from climber_uk.mechanics.climber import Climber
 from climber_uk.parameters.changed_parameters import write_changed
-from climber_uk.parameters.parameter_file import Values, read_argument, read_file
+from climber_uk.parameters.parameter_file import Values, read_argument, read_file, read_sections
 
 NODE = "/second/uk_torque_controller"
 CONFIG = Path(__file__).parents[2] / "config"
@@ -93,6 +93,16 @@ def test_a_tab_in_a_parameter_file_is_said_in_plain_words(file):
 def test_what_a_file_has_twice_is_refused_by_name(file, text):
     with pytest.raises(ValueError, match=r"has (mass|b\.c) of /\*\*/a twice$"):
         read_file(file(text), "/a")
+
+
+@pytest.mark.parametrize(
+    "start",
+    ["%YAML 1.2\n---\n/**/a:", "/**/a_*:", "a-b:", "/:", "//a:", "a/:", "2a:", "/b:\n  /a:"],
+)
+def test_what_rcl_cannot_read_is_refused_as_the_node_would(file, start):
+    path = file(start + "\n    ros__parameters:\n        mass: 6.0\n")
+    with pytest.raises(ValueError, match=r"cannot be a node's name|rcl reads YAML 1\.1"):
+        read_sections(path)
 
 
 def test_two_sections_of_one_node_are_one(file):
