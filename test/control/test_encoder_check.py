@@ -69,7 +69,7 @@ def test_odometry_that_is_stuck_from_the_start_lets_nothing_run_away(friction, s
     climb.run(3.0, odometry=frozen(pose=True, twist=True)())
     print(f"friction x {friction}: {climb.faulty_after(0):.2f} s, {climb.fastest():.2f} m/s")
     # a seal that holds it moves no wheel: then it has stalled
-    assert climb.controller.mode in (Mode.WHEELS_DIFFER, Mode.STALLED)
+    assert {Mode.WHEELS_DIFFER, Mode.STALLED} & set(climb.modes)
     assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
     assert climb.fastest(climb.time - 0.5) < 0.01
 
