@@ -214,7 +214,7 @@ def refusal(monkeypatch, capsys):
         ("rest_to_rest.laps:=1000000000000", "s, more than 1e+09 s"),
         ("shape:=waypoints rest_to_rest.rate:=1e300", "rate=1e+300 must be of a size from"),
         ("shape:=waypoints waypoints.tolerance:=1e-12", "tolerance=1e-12 must be >= 1e-05 [m]"),
-        ("shape:=waypoints waypoints.max_yaw_rate:=1e-12", "too large or too small"),
+        ("shape:=waypoints waypoints.max_yaw_rate:=1e-12", "m it must be slower than 1.2e-07 m/s"),
         ("shape:=lanes lanes.clearance:=1e12", "m between the clearances"),
         ("shape:=lanes lanes.dwell:=1e12", "s, more than 1e+09 s"),
     ],
@@ -228,7 +228,7 @@ def test_absurd_numbers_are_refused_in_words(refusal, words, said):
     ("text", "said"),
     [
         ("x,y\n0,0\n1,1e300\n", "line 3: point 2 at (1, 1e+300) m is beyond 1e+06 m"),
-        ("x,y,speed\n0,0,1e-300\n1,0,\n", "the path"),
+        ("x,y,speed\n0,0,1e-300\n1,0,\n", "at (0, 0) m it must be slower than 1.2e-07 m/s"),
         ("x,y,dwell\n0,0,\n1,0,1e300\n2,0,\n", "s, more than 1e+09 s"),
     ],
 )
