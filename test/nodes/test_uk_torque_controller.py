@@ -189,10 +189,11 @@ def test_disabled_it_gives_the_safe_output_until_it_is_enabled(world):
     loop.follows()
     assert world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=False)).success
     loop.is_safe()
-    world.wait(
-        lambda: status and "disabled" in status[-1].status[0].message, "word of it in diagnostics"
-    )
-    assert status[-1].status[0].level == DiagnosticStatus.WARN
+
+    def told():
+        return [told for m in status for told in m.status if "disabled" in told.message]
+
+    assert world.wait(told, "word of it in diagnostics")[0].level == DiagnosticStatus.WARN
     status.clear()
     assert world.call(SetBool, f"{NAME}/enable", SetBool.Request(data=True)).success
     loop.follows()

@@ -151,9 +151,10 @@ class World:
 
     def wait(self, condition, what):
         """Spin until `condition()` holds, and return what it gave."""
-        deadline = time.monotonic() + TIMEOUT
+        deadline, longest = time.monotonic() + TIMEOUT, 0.001
         while not (value := condition()):
-            self.spin()
+            self.spin(longest)
+            longest = min(2 * longest, 0.01)  # many answers come at once
             for name, process in self.processes.items():
                 assert process.poll() in (None, 0), f"{name} failed:\n{self.log(name)}"
             if time.monotonic() > deadline:
