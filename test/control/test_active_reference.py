@@ -131,10 +131,8 @@ def test_a_start_3_m_off_is_refused_with_the_distance():
     assert climb.fastest() < 1e-3
 
 
-@slow
-@pytest.mark.parametrize(
-    "turned", [*(pytest.param(turned, marks=pytest.mark.soak) for turned in (0.0, 2.0)), -3.0]
-)
+@pytest.mark.soak  # through the nodes: test/nodes/test_waiting.py
+@pytest.mark.parametrize("turned", [0.0, 2.0, -3.0])
 def test_a_start_3_m_off_that_is_allowed_goes_there_at_the_approach_speed(turned):
     climb = Climb(offset=(2.4, -1.8, turned), max_start_distance=5.0, approach_speed=0.4)
     climb.run(5.0)

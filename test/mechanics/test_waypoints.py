@@ -241,6 +241,7 @@ def test_a_summary_of_waypoints_has_the_sizes_of_its_path(folder):
     assert circle.fastest_yaw_rate == pytest.approx(RATE, rel=0.09)
 
 
+@pytest.mark.soak
 def test_more_sharp_corners_than_can_be_looked_at_are_refused(folder):
     corners = np.arange(14_000)
     lanes = np.c_[corners // 2 % 2, 0.1 * ((corners + 1) // 2)]
