@@ -4,8 +4,8 @@ A seal that sticks looks like odometry that is late, or stuck: torque is given, 
 told. The climber may move in truth, at a speed that is the excess force's integral over the mass.
 So that speed is bounded. Where it is used up, the climber is let come to rest, as its seal makes
 it; then it is pushed again, a little more. A seal that sticks breaks loose by that, and what was
-told too late shows while nothing drives. A push of a reference that begins slowly would be spent on
-little more than the known friction: each is as strong as it may be on its own account.
+told too late shows while nothing drives. A reference that begins slowly asks for hardly more than
+the known friction, so that pushes after the first have a least force of their own.
 """
 
 import math
@@ -25,7 +25,7 @@ MOST, PUSHES = 0.1, 6  # [m/s] beyond what is allowed, and pushes, after which i
 STOPPED, STOPPED_PUSHES = 0.05, 1
 TRIED = 2  # pushes, from which on a climber off its path is stalled
 SPENT = 0.95  # of it, from which it is used up
-MORE = 0.2  # of the friction, by which each push after the first is stronger
+MORE = 0.2  # of the friction, beyond which each push after the first goes, more than the last
 FIRST_PAUSE, PAUSE = 0.16, 0.05  # [s] from one to the next, for which nothing drives
 ECHO = 1.1  # [s] after the very first one, in which an answer comes that is late
 # of the friction, that is pushed against meanwhile, once it rests; and for a time [s] before the
@@ -239,7 +239,7 @@ class ForceBudget:
         return command._replace(wheels=wheels, lost=lost)
 
     def _stronger(self, climber: Climber, push: float) -> float:
-        """A push [N] that is as strong as its turn asks for: a reference may begin too slowly.
+        """A push [N] with at least the force of its number; see `MORE`.
 
         Soon after a fault it is not: what was wrong may be so still.
         """

@@ -124,7 +124,7 @@ class SafeOutput:
         return _let_go(estimator, age)
 
     def _weigh(self, law: ControlLaw, motion: Motion) -> None:
-        """Carry less, or again more, of what coasts and gets faster up, or down: of its weight."""
+        """Carry half as much of the weight if it gets faster upwards, let go; twice, if downwards."""
         weight, climber = law.weight(motion), law.climber
         if weight * motion.speed <= 0:
             self._carries = min(1.0, self._carries / LESS)

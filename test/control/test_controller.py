@@ -479,6 +479,8 @@ def test_the_lap_of_climber_yaml_has_the_margin_that_its_file_tells(duration):
     ]
     assert np.min(margins) > 2.8
     assert climb.off_the_path() < 2e-3
-    assert duration < 57.0 or climb.fastest(since=56.5) < 1e-5  # it creeps home, ever more slowly
+    if duration == 57.0:  # it creeps home, ever more slowly, and rests
+        climb.run(4.0)
+        assert climb.fastest(since=climb.time - 0.5) < 1e-9
     place = climb.trajectory.at(duration).pose
     assert np.hypot(*(climb.state.pose - place)[:2]) < 5e-3

@@ -56,20 +56,23 @@ def test_the_wheel_is_named_and_both_ways_are_told():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [0.5, pytest.param(1.0, marks=pytest.mark.soak), 1.5])
+@pytest.mark.parametrize(
+    ("friction", "seconds"),  # until it does not try again
+    [(0.5, 3.0), pytest.param(1.0, 8.0, marks=pytest.mark.soak), (1.5, 3.0)],
+)
 @pytest.mark.parametrize(
     "scrubs", [False, pytest.param(True, marks=pytest.mark.soak)], ids=["wheels", "tracks"]
 )
-def test_odometry_that_is_stuck_from_the_start_lets_nothing_run_away(friction, scrubs):
+def test_odometry_that_is_stuck_from_the_start_lets_nothing_run_away(friction, seconds, scrubs):
     def truth(it):
         coefficient = friction * it.seal_friction_coefficient
         return replace(it, seal_friction_coefficient=coefficient)
 
     climb = Climb(scrubs=scrubs, truth=truth, **ON)
-    climb.run(3.0, odometry=frozen(pose=True, twist=True)())
+    climb.run(seconds, odometry=frozen(pose=True, twist=True)())
     print(f"friction x {friction}: {climb.faulty_after(0):.2f} s, {climb.fastest():.2f} m/s")
     # a seal that holds it moves no wheel: then it has stalled
-    assert {Mode.WHEELS_DIFFER, Mode.STALLED} & set(climb.modes)
+    assert climb.controller.mode in (Mode.WHEELS_DIFFER, Mode.STALLED)
     assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
     assert climb.fastest(climb.time - 0.5) < 0.01
 
