@@ -25,7 +25,7 @@ MOST, PUSHES = 0.1, 6  # [m/s] beyond what is allowed, and pushes, after which i
 STOPPED, STOPPED_PUSHES = 0.05, 1
 TRIED = 2  # pushes, from which on a climber off its path is stalled
 SPENT = 0.95  # of it, from which it is used up
-MORE = 0.2  # of the friction, beyond which each push after the first goes, more than the last
+MORE = 0.2  # of the friction, by which each push after the first is stronger than the last
 FIRST_PAUSE, PAUSE = 0.16, 0.05  # [s] from one to the next, for which nothing drives
 ECHO = 1.1  # [s] after the very first one, in which an answer comes that is late
 # of the friction, that is pushed against meanwhile, once it rests; and for a time [s] before the

@@ -124,7 +124,7 @@ class SafeOutput:
         return _let_go(estimator, age)
 
     def _weigh(self, law: ControlLaw, motion: Motion) -> None:
-        """Carry half as much of the weight if it gets faster upwards, let go; twice, if downwards."""
+        """Carry half of the weight if it is driven upwards by that; else twice as much again."""
         weight, climber = law.weight(motion), law.climber
         if weight * motion.speed <= 0:
             self._carries = min(1.0, self._carries / LESS)
