@@ -6,7 +6,7 @@ import numpy as np
 
 from climber_uk.closed_loop.outcome import Outcome
 from climber_uk.mechanics import Array
-from climber_uk.report.comparison import Comparison
+from climber_uk.report.comparison import MetricBound
 
 METRICS: dict[str, tuple[str, Callable[[Outcome], Array]]] = {
     "rms_distance": ("m", lambda outcome: outcome.rms),
@@ -22,7 +22,7 @@ METRICS: dict[str, tuple[str, Callable[[Outcome], Array]]] = {
 }
 
 
-class Limit(Comparison):
+class Limit(MetricBound):
     """A bound that a metric must keep, as max_distance < 0.05."""
 
     metrics = METRICS

@@ -19,7 +19,7 @@ FORM = re.compile(r"\s*(\w+)\s*([<>=!]+)\s*(\S+)\s*")
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MetricBound:
     """A metric's name, an operator and a finite number in SI units."""
 
     metric: str
@@ -30,7 +30,7 @@ class Comparison:
 
     @classmethod
     def read(cls, text: str) -> Self:
-        """Comparison of a text; raises `ValueError` saying what is wrong with it."""
+        """Bound of a text; raises `ValueError` saying what is wrong with it."""
         match = FORM.fullmatch(text)
         if match is None or match[2] not in OPERATORS:
             raise ValueError(f"{text!r} must be a metric, one of {' '.join(OPERATORS)}, a number")

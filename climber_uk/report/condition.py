@@ -2,12 +2,12 @@
 
 import math
 
-from climber_uk.report.comparison import Comparison
+from climber_uk.report.comparison import MetricBound
 from climber_uk.report.metrics import METRICS
 from climber_uk.report.tables import Column
 
 
-class Condition(Comparison):
+class Condition(MetricBound):
     """A comparison by which a run fails."""
 
     metrics = METRICS
