@@ -104,15 +104,17 @@ class RigidBody:
 
     def runge_kutta(self, y: Array, inputs: Inputs, direction: float | None, h: float) -> Array:
         """y after `h` [s], by the classic fourth-order method; `direction` as in `derivative`."""
-        k1 = self.derivative(y, inputs, direction)
-        k2 = self.derivative(y + h / 2 * k1, inputs, direction)
-        k3 = self.derivative(y + h / 2 * k2, inputs, direction)
-        k4 = self.derivative(y + h * k3, inputs, direction)
-        end = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        start = y.tolist()  # arithmetic on a few floats is faster than on a small array
+        k1 = self.derivative(start, inputs, direction)
+        k2 = self.derivative(_along(start, k1, h / 2), inputs, direction)
+        k3 = self.derivative(_along(start, k2, h / 2), inputs, direction)
+        k4 = self.derivative(_along(start, k3, h), inputs, direction)
+        slopes = zip(k1, k2, k3, k4, strict=True)
+        end = _along(start, [a + 2 * b + 2 * c + d for a, b, c, d in slopes], h / 6)
         end[3:6] = self.derivative(end, inputs, direction)[:3]
-        return end
+        return np.array(end)
 
-    def derivative(self, y: Array, inputs: Inputs, direction: float | None) -> Array:
+    def derivative(self, y: list[float], inputs: Inputs, direction: float | None) -> list[float]:
         """(q̇, v̇) of (30), both (3,), and the bristles' rates (3,) if there are any.
 
         A = [sinθ -cosθ 0] has unit length and M weighs x and y alike, so that M^(-1/2) B⁺ = Aᵀ.
@@ -120,13 +122,12 @@ class RigidBody:
         climber: [cosθ sinθ 0] is a second row with b_q = b = 0. For None see `_ring`.
         """
         climber = self.climber
-        x, height, heading, v_x, v_y, yaw_rate, *deflection = y.tolist()
+        x, height, heading, v_x, v_y, yaw_rate, *deflection = y
         cosine, sine = math.cos(heading), math.sin(heading)
         force, moment = inputs.force, inputs.moment + inputs.push_moment
         bending = [0.0] * len(deflection)
         if direction == 0:
-            at_rest = [0.0, 0.0, yaw_rate, 0.0, 0.0, moment / climber.driven_inertia]
-            return np.array(at_rest + bending)
+            return [0.0, 0.0, yaw_rate, 0.0, 0.0, moment / climber.driven_inertia, *bending]
 
         A_v = sine * v_x - cosine * v_y
         x_dot, y_dot = v_x - sine * A_v, v_y + cosine * A_v
@@ -144,15 +145,15 @@ class RigidBody:
         a_x = (force * cosine + f_x) / climber.driven_mass
         a_y = (force * sine + f_y) / climber.driven_mass
         b_minus_A_a = -yaw_rate * speed - (sine * a_x - cosine * a_y)
-        rates = [
+        return [
             *(x_dot, y_dot, yaw_rate),
             *(
                 a_x + sine * b_minus_A_a,
                 a_y - cosine * b_minus_A_a,
                 moment / climber.driven_inertia,
             ),
+            *bending,
         ]
-        return np.array(rates + bending)
 
     def _ring(
         self, v: float, omega: float, deflection: list[float]
@@ -185,3 +186,8 @@ def forward_speed(y: Array) -> float:
     """v = ẋ cosθ + ẏ sinθ (12) [m/s]."""
     _, _, heading, v_x, v_y, *_ = y.tolist()
     return float(v_x * math.cos(heading) + v_y * math.sin(heading))
+
+
+def _along(y: list[float], rates: list[float], time: float) -> list[float]:
+    """y after a time [s] at constant rates."""
+    return [value + time * rate for value, rate in zip(y, rates, strict=True)]

@@ -52,7 +52,7 @@ class NoSlipStepper:
         if self.sticks and radius > 0 and not y[3:6].any():
             return 0.0, 0.0
         direction = self._direction(y, inputs) if self.sticks and radius == 0 else None
-        *_, v_x_1, v_y_1, omega_1 = self.body.derivative(y, inputs, direction)[:6].tolist()
+        *_, v_x_1, v_y_1, omega_1 = self.body.derivative(y.tolist(), inputs, direction)[:6]
         return v_x_1 * math.cos(y[2]) + v_y_1 * math.sin(y[2]), omega_1
 
     # A seal without radius
