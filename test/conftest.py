@@ -49,3 +49,8 @@ def pytest_collection():
     finally:
         gc.enable()
         gc.freeze()
+
+
+def pytest_make_parametrize_id(val):
+    """Short names for long texts, which a name would repeat: some are a megabyte."""
+    return f"{val[:60]}... {len(val)}" if isinstance(val, str) and len(val) > 100 else None
