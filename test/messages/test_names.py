@@ -1,4 +1,4 @@
-"""Joints of the wheels by their names: one a side, or more, in messages and back."""
+"""Names in messages: joints of the wheels, one a side or more, and frames."""
 
 import pytest
 from hypothesis import given
@@ -35,3 +35,17 @@ def test_a_message_without_all_of_them_is_refused_by_name():
     fields = reading.JointFields(0, 0, [1.0, 2.0], ["lf", "rf"])
     with pytest.raises(ValueError, match="must be 'lf', 'lr', 'rf' and 'rr'"):
         reading.wheel_torques(fields, wheel_joints(*SIDES[2]))
+
+
+@pytest.mark.parametrize(
+    ("namespace", "prefixes", "frames"),
+    [
+        ("/", True, ("odom", "base")),
+        ("/left", True, ("left/odom", "left/base")),
+        ("/north/left", True, ("north/left/odom", "north/left/base")),
+        ("/left", False, ("odom", "base")),
+    ],
+)
+def test_frames_begin_with_the_namespace_unless_told_not_to(namespace, prefixes, frames):
+    names = Names(odom_frame="odom", base_frame="base", prefix_frames=prefixes).within(namespace)
+    assert (names.odom_frame, names.base_frame) == frames
