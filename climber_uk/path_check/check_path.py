@@ -58,7 +58,8 @@ def read(
     """Path, climber, what holds it and its wall, by a file and changes of the path's parameters.
 
     What resists a turn is that of plant_simulator's `locomotion`, if the file has one: a robot of
-    one's own needs none. Raises `ValueError`, also for a name that no part of the path has. `remarks` gets a line on each value that can hardly be meant.
+    one's own needs none. Raises `ValueError`, also for a name that no part of the path has.
+    `remarks` gets a line on each value that can hardly be meant.
     """
     refuse_unknown(changes, NAMES, "a path")
     planner = read_planner(file, f"/{PLANNER}", changes, remarks)
