@@ -96,7 +96,8 @@ def read_sections(path: Path) -> list[Section]:
             raise ValueError(f"{path} has more than {MOST} values")
         if PARAMETERS not in keys:
             raise ValueError(
-                f"{path} is no parameter file: {'/'.join(keys)} is not in {PARAMETERS}"
+                f"{path} is no parameter file: {'/'.join(keys)} is not in {PARAMETERS} "
+                "(with two underscores)"
             )
         own = keys.index(PARAMETERS)
         name = "/".join(keys[:own])
