@@ -18,7 +18,7 @@ from climber_uk.system.command_line import Parser
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 OURS = {
-    script.name: script.module
+    script.name: f"climber_uk.{script.attr}"
     for script in entry_points(group="console_scripts")
     if script.value.startswith("climber_uk.")
 }
