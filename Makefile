@@ -19,13 +19,16 @@ SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools-set-up
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
+$(foreach name,config clock climbers output,$(if $(filter command,$(origin $(name))),\
+	$(error $(name)= is not heeded: its name is in capitals)))
+
 .PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean test-kilted sbom
 
 ## run the nodes, and tell how well; CONFIG=config/climber.yaml, CLOCK=wall, CLIMBERS=4
 demo: $(SET_UP)
-	@exec $(BIN)/run_demo --with-parent --config $(CONFIG) --clock $(CLOCK) --output $(OUTPUT) \
+	@exec $(BIN)/run_demo --with-parent --config "$(CONFIG)" --clock $(CLOCK) --output "$(OUTPUT)" \
 		$(if $(CLIMBERS),--climbers $(CLIMBERS))
-	@$(BIN)/analyze_bag $(OUTPUT)/bag --params $(CONFIG) --output $(OUTPUT)
+	@$(BIN)/analyze_bag "$(OUTPUT)/bag" --params "$(CONFIG)" --output "$(OUTPUT)"
 
 help:
 	@awk '/^##/ {line = substr($$0, 4)} /^[a-z-]+:/ && line {split($$1, name, ":"); \

@@ -44,7 +44,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            f"{executable} = {package_name}.{module}:main"
+            f"{executable} = {package_name}.executables:{module}"
             for executable, module in {
                 "trajectory_publisher": "nodes.trajectory_publisher",
                 "uk_torque_controller": "nodes.uk_torque_controller",

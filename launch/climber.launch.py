@@ -5,6 +5,7 @@ all arguments. They and the file are looked at before anything starts; when plan
 simulator ends, all do.
 """
 
+import os
 import re
 import shutil
 import tempfile
@@ -54,7 +55,8 @@ def start(context: LaunchContext) -> list[GroupAction | ExecuteProcess]:
     """Start what the arguments say; `RuntimeError` in words if they say nothing that can be."""
     given = {name: context.launch_configurations[name] for name in ARGUMENTS}
     on = {name: is_on(name, given[name]) for name in SWITCHES}
-    namespace, config = given["namespace"].strip("/"), given["config"]
+    namespace = given["namespace"].strip("/")
+    config = os.path.expanduser(given["config"])  # no shell does that behind :=
     if namespace and not re.fullmatch(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", namespace):
         raise RuntimeError(f"namespace:={namespace} must be a name: letters, digits, _ and /")
     for name, packages in NEEDED.items():

@@ -71,6 +71,27 @@ def test_ctrl_c_ends_a_tool_in_a_line_and_an_error_of_ours_in_a_traceback():
     assert "ZeroDivisionError" in spoken("1 / 0")[2]
 
 
+@pytest.mark.parametrize("ignored", [False, True])
+def test_ctrl_c_while_a_tool_imports_what_it_needs_ends_it_in_a_line(ignored):
+    """Not in the background, where it is ignored."""
+    code = (
+        "import signal, sys\n"
+        "from climber_uk.executables import system\n"
+        f"{'signal.signal(signal.SIGINT, signal.SIG_IGN)' if ignored else ''}\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "sys.argv = ['bin/tool']\n"
+        "system.nothing()"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    if ignored:
+        assert "ModuleNotFoundError: No module named 'climber_uk.system.nothing'" in ran.stderr
+    else:
+        assert (ran.returncode, ran.stderr) == (-signal.SIGINT, "tool: interrupted\n")
+
+
 def test_a_stream_that_was_closed_does_not_lead_into_a_file_of_somebody(tmp_path):
     file = tmp_path / "file"
     code = f"""
@@ -104,7 +125,7 @@ def test_all_executables_of_the_package_are_tried():
 
 
 def test_an_executable_tells_its_use_and_its_version_and_refuses_what_it_does_not_know():
-    modules = {name: script.module for name, script in OURS.items()}
+    modules = {name: f"climber_uk.{script.attr}" for name, script in OURS.items()}
     command = [sys.executable, "-c", TRY, json.dumps(modules), *TRIES]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert ran.stderr == ""

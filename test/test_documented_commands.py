@@ -4,6 +4,7 @@ import ast
 import importlib
 import re
 import shlex
+import subprocess
 import sys
 from importlib.metadata import entry_points
 from itertools import pairwise
@@ -18,7 +19,7 @@ from climber_uk.system.command_line import Parser
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 OURS = {
-    script.name: script.module
+    script.name: f"climber_uk.{script.attr}"
     for script in entry_points(group="console_scripts")
     if script.value.startswith("climber_uk.")
 }
@@ -106,6 +107,15 @@ def test_make_has_this_target_and_takes_this_variable(words):
         pattern = rf"^{name} [?:]=" if is_variable else rf"^{name}:"
         assert word == "…" or re.search(pattern, makefile, re.MULTILINE), word
         check_files([value])
+
+
+def test_a_variable_of_make_in_small_letters_is_refused_and_one_with_a_blank_is_one_word():
+    def said(words):
+        ran = subprocess.run(["make", "-n", *words], cwd=ROOT, capture_output=True, text=True)
+        return ran.stdout + ran.stderr
+
+    assert "config= is not heeded: its name is in capitals" in said(["demo", "config=x.yaml"])
+    assert '--config "my dir/x.yaml"' in said(["demo", "CONFIG=my dir/x.yaml"])
 
 
 @of("python")

@@ -203,6 +203,14 @@ def test_a_simulation_that_is_recorded_waits_for_the_recorder(launch):
 
 
 @without_launch
+def test_a_config_may_be_in_the_home_directory(launch, monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "mine.yaml").write_text(CONFIG.read_text())
+    found, _ = nodes(launch, "config:=~/mine.yaml")
+    assert found[topics.PLANT]["parameters"][0] == str(tmp_path / "mine.yaml")
+
+
+@without_launch
 def test_every_node_is_an_executable_and_every_package_is_depended_on(launch):
     found, _ = nodes(launch, "rviz:=true")
     ours = {script.name for script in entry_points(group="console_scripts")}

@@ -51,14 +51,18 @@ class Bag:
         by_count = sorted(self.connections, key=attrgetter("msgcount"))
         return {connection.topic: connection.msgtype for connection in by_count}
 
-    def lacks(self, topic: str, type_name: str) -> str:
-        """Words on a topic that has no message: its other type, or which topics have that type."""
+    def lacks(self, topic: str, type_name: str, how: str = "") -> str:
+        """Words on a topic that has no message: its other type, or which topics have that type.
+
+        `how` says how to choose one of these.
+        """
         types = self.types
         others = sorted(name for name, kind in types.items() if kind == type_name)
         if types.get(topic, type_name) != type_name:
             return f"no message on {topic} (it is {types[topic] or NO_TYPE}, not {type_name})"
-        there = f" ({type_name} is on {listed(others)})" if others and topic not in others else ""
-        return f"no message on {topic}{there}"
+        if not others or topic in others:
+            return f"no message on {topic}"
+        return f"no message on {topic} ({type_name} is on {listed(others)}{how and f': {how}'})"
 
     def count(self, topics: Collection[str]) -> int:
         """Return the number of messages of some topics, as the files state it."""

@@ -20,7 +20,7 @@ from climber_uk.bags.joints import Joints, commanded_torques, rates_and_torques
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.time_series import TimeSeries
-from climber_uk.bags.topics import KNOWN, TYPES, Topics
+from climber_uk.bags.topics import HOW, KNOWN, TYPES, Topics
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
@@ -65,7 +65,7 @@ class RunReader:
     def runs(self, collected: Collected, reported: Collection[Event]) -> list[RecordedRun]:
         """All runs, with those of the `reported` events that are theirs; raises `NoRunError`."""
         if not collected.samples[topics.ODOMETRY]:
-            lacking = self.bag.lacks(self.topic(topics.ODOMETRY), TYPES[topics.ODOMETRY])
+            lacking = self.bag.lacks(self.topic(topics.ODOMETRY), TYPES[topics.ODOMETRY], HOW)
             raise NoRunError(f"no odometry: {lacking}")
         if collected.lost_previews:
             topic = self.topic(topics.REFERENCE)
@@ -138,6 +138,8 @@ class RunReader:
             self.note_without_reference(whole, int(first), int(last))
             odometry = odometry.within(whole.stamps[first], whole.stamps[last])
             reference = reference[first : last + 1]
+        elif self.topic(topics.REFERENCE) not in self.bag.types:
+            self.note_other_references()
         elif len(whole) > 1 and any(len(part.arrivals) for part in collected.reference):
             topic = self.topic(topics.REFERENCE)
             self.bag.lose(f"{topic}: no message has a time of the odometry's")
@@ -200,6 +202,16 @@ class RunReader:
                     f"{self.topic(topics.ODOMETRY)}: {number} of {len(places)} messages left out, "
                     f"{when} those with a reference: it went {far:.3g} m away in them"
                 )
+
+    def note_other_references(self) -> None:
+        """Note references that are of no climber with odometry: topics were renamed."""
+        types, kind, name = self.bag.types, TYPES[topics.REFERENCE], topics.REFERENCE
+        own = self.names.full(name, "")
+        there = [topic for topic, of in types.items() if of == kind and topic.endswith(own)]
+        climbers = [topic.removesuffix(own) for topic in there]
+        if any(self.names.full(topics.ODOMETRY, climber) not in types for climber in climbers):
+            how = HOW.replace(topics.ODOMETRY, topics.REFERENCE)
+            self.bag.lose(self.bag.lacks(self.topic(topics.REFERENCE), kind, how))
 
     def series(self, collected: Collected, name: str) -> TimeSeries:
         """The fit messages of a topic; notes how many are left out, and why."""

@@ -178,7 +178,10 @@ class ControlLaw:
             push = r_F + weight_beyond(wall, climber, motion, ahead)[0]
         for _ in range(2 if ahead else 1):
             force, moment = drive + push, yaw_moment + r_N
-            predicted = predict(climber, motion, force, moment, ahead, friction, turning, aside)
+            predicted = motion
+            if ahead:
+                given = force, moment, ahead, friction, turning, aside
+                predicted = predict(climber, motion, *given)
             answer = solve(prepared, predicted, ways, friction, turning, course)
             # a law of somebody else's may answer with numbers of another kind
             force, moment, v_1, yaw_rate = map(float, answer) if is_one else answer

@@ -18,7 +18,12 @@ class Exact:
     """
 
     natural_frequency: float = parameter(
-        6.0, "rad/s", "ω_n: K_p = ω_n², K_d = 2 ω_n", above=0, runtime=True
+        6.0,
+        "rad/s",
+        "ω_n: K_p = ω_n², K_d = 2 ω_n",
+        above=0,
+        plausible=(0.1, 150.0),  # as guidance.frequency
+        runtime=True,
     )
     hidden_rate: float = parameter(10.0, "1/s", "λ, decay of φ", above=0, runtime=True)
 

@@ -65,7 +65,12 @@ class Guidance:
     """
 
     frequency: float = parameter(
-        18.0, "rad/s", "ω, how fast errors vanish; of the heading 2/3 of it", above=0, runtime=True
+        18.0,
+        "rad/s",
+        "ω, how fast errors vanish; of the heading 2/3 of it",
+        above=0,
+        plausible=(0.1, 150.0),  # at 300 torques go to and fro, at 200 Hz
+        runtime=True,
     )
     damping: float = parameter(
         0.7, "", "ζ; 1: no overshoot, lower: faster", above=0.5, at_most=2, runtime=True

@@ -15,6 +15,11 @@ COMMENT = re.compile(r"""("[^"]*")|#.*|^\s*(//|%).*""")  # not in quotes
 BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")
 UNIT = re.compile(r"[\[(](.*)[\])]|_((?:mm|cm|m|km|ft|in)(?:/s)?|m?s)$", re.IGNORECASE)
 EXCEL = re.compile(r"sep=(.?)", re.IGNORECASE)  # a first line that tells the separator
+NOT_COMPUTED = re.compile(r"#(?:N/[AD]|NV|[A-ZÄÖÜ/0]+[!?])(?=[\s,;\"]|$)")  # cells of spreadsheets
+OTHER_UNIT = re.compile(  # told by a comment
+    r"\s*[#/%].*\bunits?\b\W*(?:(?:is|are|in)\b\W*)*(mm|cm|km|ft|feet|inch\w*|milli\w+|centi\w+)\b",
+    re.IGNORECASE,
+)
 BESIDE_COMMA = re.compile(r"(^|\s),|,(\s|$)")  # what has blanks beside it is no decimal comma
 LINE_END = re.compile(r"\r\n?")
 METRES = "m", "metre", "meter", "metres", "meters"
@@ -119,6 +124,11 @@ def read_waypoint_text(text: str, first: int = 1) -> tuple[Array, Marks]:
     `first` is the number of its first line.
     """
     lines = list(enumerate(text.split("\n"), start=first))
+    for n, line in lines:
+        if cell := NOT_COMPUTED.search(line):  # it begins as a comment does
+            raise ValueError(f"line {n}: {cell[0]} is a cell that a spreadsheet could not compute")
+        if unit := OTHER_UNIT.match(line):
+            raise ValueError(f"line {n}: units of {unit[1]} must be m")
     rows = [(n, bare) for n, line in lines if (bare := _bare(line))]
     if not rows:
         raise ValueError("no points in it: want x and y [m] of a point a line")

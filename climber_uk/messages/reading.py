@@ -42,10 +42,13 @@ def check_stamp(stamp: int) -> None:
         raise ValueError(f"stamp {stamp / SECOND:.0f} must be within ± 2**31 [s]")
 
 
-def check_frame(frame: str, wanted: str, name: str = "frame_id") -> None:
-    """Raise `ValueError` naming the field of a message unless it has the frame that is wanted."""
+def check_frame(frame: str, wanted: str, name: str = "frame_id", by: str = "") -> None:
+    """Raise `ValueError` naming the field of a message unless it has the frame that is wanted.
+
+    `by` are the parameters that say which one it is.
+    """
     if frame != wanted:
-        raise ValueError(f"{name}={frame!r} must be {wanted!r}")
+        raise ValueError(f"{name}={frame!r} must be {wanted!r}" + (by and f": see {by}"))
 
 
 class OdometryFields(NamedTuple):
@@ -124,8 +127,8 @@ def state(message: "Odometry", odom_frame: str, base_frame: str) -> State:
 
 def motion_of(fields: OdometryFields, odom_frame: str, base_frame: str) -> Motion:
     """Motion of the climber in `odom_frame`, the wall's, from a twist in `base_frame`."""
-    check_frame(fields.frame, odom_frame)
-    check_frame(fields.child_frame, base_frame, "child_frame_id")
+    check_frame(fields.frame, odom_frame, by="odom_frame, prefix_frames")
+    check_frame(fields.child_frame, base_frame, "child_frame_id", "base_frame, prefix_frames")
     _, _, x, y, _, q_x, q_y, q_z, q_w, v_x, v_y, yaw_rate, _, _ = fields
     check_stamp(fields.stamp)
     heading = heading_of(q_x, q_y, q_z, q_w)

@@ -97,6 +97,8 @@ class UkTorqueController(ManagedNode):
         self.is_due = Throttle(PUBLISH_PERIOD)  # of the disturbance
         self.is_position_due = Throttle(PUBLISH_PERIOD)
         self.last_mode = Mode.WAITING
+        self.told_mode = Mode.WAITING  # in diagnostics
+        self.answered_mode: Mode | None = None  # of the last answer since then
         self.first_z: float | None = None  # [m] of odometry, off the wall
 
         self.read_odometry = NumberReader(Odometry, *reading.ODOMETRY)
@@ -283,6 +285,9 @@ class UkTorqueController(ManagedNode):
             self.report("safe output", trouble, controller.detail, mode.is_fault)
         if answer is not None:
             self.publish_torques(answer)
+            self.answered_mode = mode
+            if self.told_mode is Mode.WAITING:
+                self.diagnose()
         if self.setpoint is not None:
             self.setpoint.publish(controller, answer, self.now())
         self.publish_position()
@@ -364,7 +369,14 @@ class UkTorqueController(ManagedNode):
         )
 
     def diagnose(self) -> None:
-        """Publish a status of troubles and values, and one of the lowest margins."""
+        """Publish a status of troubles and values, and one of the lowest margins.
+
+        A wait for a reference is told if nothing was answered since the last one: in lock-step all
+        nodes wait for each other now and then, while no time goes by.
+        """
+        mode = self.controller.mode
+        self.told_mode = (self.answered_mode or mode) if mode is Mode.WAITING else mode
+        self.answered_mode = None
         self.report_delay()
         super().diagnose()
         self.margins.diagnose()
@@ -383,7 +395,7 @@ class UkTorqueController(ManagedNode):
         force, moment = estimator.disturbance
         return {
             "state": self.life,
-            "mode": controller.mode.value,
+            "mode": self.told_mode.value,
             "constraints": self.parameters.read(ControllerChoice).constraints,
             "answers": self.answers,
             "saturated answers": self.saturations,

@@ -95,8 +95,9 @@ def read_sections(path: Path) -> list[Section]:
         if number == MOST:
             raise ValueError(f"{path} has more than {MOST} values")
         if PARAMETERS not in keys:
+            hint = " (with two underscores)" * ("ros_parameters" in keys)
             raise ValueError(
-                f"{path} is no parameter file: {'/'.join(keys)} is not in {PARAMETERS}"
+                f"{path} is no parameter file: {'/'.join(keys)} is not in {PARAMETERS}{hint}"
             )
         own = keys.index(PARAMETERS)
         name = "/".join(keys[:own])

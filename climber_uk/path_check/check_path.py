@@ -26,7 +26,13 @@ from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
 from climber_uk.mechanics.wall import WALLS, Wall
 from climber_uk.messages.topics import CONTROLLER, PLANNER, PLANT
-from climber_uk.parameters.parameter_file import Values, read_argument, refuse_unknown
+from climber_uk.parameters.parameter_file import (
+    Values,
+    given,
+    read_argument,
+    read_sections,
+    refuse_unknown,
+)
 from climber_uk.parameters.text_file import write_whole
 from climber_uk.path_check.demands import demands
 from climber_uk.path_check.fastest import fastest, write_fastest
@@ -51,8 +57,9 @@ def read(
 ) -> tuple[Trajectory, Climber, Contact, Wall]:
     """Path, climber, what holds it and its wall, by a file and changes of the path's parameters.
 
-    What resists a turn is that of plant_simulator's `locomotion`. Raises `ValueError`, also for a
-    name that no part of the path has. `remarks` gets a line on each value that can hardly be meant.
+    What resists a turn is that of plant_simulator's `locomotion`, if the file has one: a robot of
+    one's own needs none. Raises `ValueError`, also for a name that no part of the path has.
+    `remarks` gets a line on each value that can hardly be meant.
     """
     refuse_unknown(changes, NAMES, "a path")
     planner = read_planner(file, f"/{PLANNER}", changes, remarks)
@@ -62,10 +69,14 @@ def read(
         values.read(kind, prefix)
     choice = values.read(ControllerChoice)
     name, wall = choice.adhesion, choice.wall
-    plant = Values(read_parameters(file, f"/{PLANT}"))
-    elsewhere, _ = start_elsewhere(trajectory, values, plant)
-    said = other_climber(values, plant), "" if changes else elsewhere
-    remarks += [f"{file}: {line}" for line in said if line]
+    plant = Values({})
+    if given(read_sections(file), f"/{PLANT}"):
+        plant = Values(read_parameters(file, f"/{PLANT}"))
+        elsewhere, _ = start_elsewhere(trajectory, values, plant)
+        said = other_climber(values, plant), "" if changes else elsewhere
+        remarks += [f"{file}: {line}" for line in said if line]
+    else:
+        remarks.append(f"{file}: without a {PLANT}'s locomotion, nothing is taken to resist turns")
     runs_on = plant.read(Physics).locomotion
     contact = Contact(
         adhesion=values.read(ADHESION[name], f"{name}."),

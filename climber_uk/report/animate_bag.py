@@ -16,7 +16,7 @@ from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.topics import Topics
 from climber_uk.mechanics import Array
 from climber_uk.report.figures import STYLE, thinned
-from climber_uk.report.outputs import failing_in_a_line, output, parser_for_bag
+from climber_uk.report.outputs import add_remap, failing_in_a_line, output, parser_for_bag
 from climber_uk.report.plotting import plt
 from climber_uk.system.command_line import between, printable
 
@@ -134,12 +134,13 @@ def main() -> None:
         default=12.0,
         help="pictures a second (default: %(default)s)",
     )
+    add_remap(parser)
     options = parser.arguments()
     with (
         failing_in_a_line("animate_bag") as remarks,
         output(options.bag, "film", options.output) as directory,
     ):
-        runs, losses = read_runs(options.bag, Topics(), [options.namespace])
+        runs, losses = read_runs(options.bag, Topics.parse(options.remap), [options.namespace])
         remarks += [f"{options.bag}: {loss}" for loss in losses]
         for number, run in enumerate(runs, start=1):
             name = f"film_{number}" if len(runs) > 1 else "film"

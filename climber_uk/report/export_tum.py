@@ -11,24 +11,26 @@ from pathlib import Path
 import numpy as np
 
 from climber_uk.bags.run_reader import NoRunError, RunReader
-from climber_uk.bags.topics import TYPES, Topics
+from climber_uk.bags.topics import HOW, TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
-from climber_uk.report.outputs import failing_in_a_line, output, parser_for_bag
+from climber_uk.report.outputs import add_remap, failing_in_a_line, output, parser_for_bag
 from climber_uk.system.command_line import printable
 
 Poses = tuple[Stamps, Array]  # (n,) [ns], and x, y, heading (n, 3)
 
 
-def read_poses(bag: Path, namespace: str) -> tuple[list[dict[str, Poses]], list[str]]:
+def read_poses(
+    bag: Path, names: Topics, namespace: str
+) -> tuple[list[dict[str, Poses]], list[str]]:
     """Poses of each run by the names of their files, and the bag's losses.
 
     Raises `FileNotFoundError` or `ValueError` naming the bag and what it lacks.
     """
-    reader, found = RunReader.read(bag, Topics(), namespace)
+    reader, found = RunReader.read(bag, names, namespace)
     topic = reader.topic(ODOMETRY)
     if not found.samples[ODOMETRY]:
-        lacking = reader.bag.lacks(topic, TYPES[ODOMETRY])
+        lacking = reader.bag.lacks(topic, TYPES[ODOMETRY], HOW)
         raise ValueError("; ".join([f"{bag} has {lacking}", *reader.bag.losses]))
     runs = []
     for part in reader.split(found):
@@ -61,12 +63,15 @@ def lines(poses: Poses) -> str:
 
 def main() -> None:
     """Write the trajectories of a bag."""
-    options = parser_for_bag("export_tum", __doc__, "tum").arguments()
+    parser = parser_for_bag("export_tum", __doc__, "tum")
+    add_remap(parser)
+    options = parser.arguments()
     with (
         failing_in_a_line("export_tum") as remarks,
         output(options.bag, "tum", options.output) as directory,
     ):
-        runs, losses = read_poses(options.bag, options.namespace.strip("/"))
+        names, namespace = Topics.parse(options.remap), options.namespace.strip("/")
+        runs, losses = read_poses(options.bag, names, namespace)
         remarks += [f"{options.bag}: {loss}" for loss in losses]
         for number, found in enumerate(runs, start=1):
             place = directory / f"run_{number}" if len(runs) > 1 else directory

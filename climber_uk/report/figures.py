@@ -116,6 +116,8 @@ def _curves(title: str, labels: Sequence[str], drawn: Sequence[tuple[str, Curves
         if labels[i] in LOGARITHMIC and any((values[:, i] > 0).any() for _, (_, values) in drawn):
             lowest, ticks = LOGARITHMIC[labels[i]]
             axes.set_yscale("log")
+            if LOGARITHMIC[labels[i]] is RATIO:  # the limit, as round the grip
+                axes.axhline(1.0, color="tab:red")
             axes.set_ylim(bottom=lowest)
             axes.yaxis.set_major_locator(LogLocator(subs=ticks))
             axes.yaxis.set_major_formatter("{x:g}")

@@ -32,6 +32,17 @@ def parser_for_bag(tool: str, description: str | None, name: str) -> Parser:
     return parser
 
 
+def add_remap(parser: Parser) -> None:
+    """Add the option by which topics may have other names: rules of `Topics.parse`."""
+    parser.add_argument(
+        "--remap",
+        action="append",
+        default=[],
+        metavar="FROM:=TO",
+        help="other name of a topic, as in odom:=/robot/odom; may be repeated",
+    )
+
+
 @contextmanager
 def failing_in_a_line(tool: str) -> Iterator[list[str]]:
     """Have a tool end with one line and status 2 where it raises `OSError` or `ValueError`.

@@ -16,7 +16,7 @@ from climber_uk.parameters.parameter_file import Values
 from climber_uk.report import figures
 from climber_uk.report.condition import Condition
 from climber_uk.report.metrics import Case
-from climber_uk.report.outputs import check_writable, failing_in_a_line, output
+from climber_uk.report.outputs import add_remap, check_writable, failing_in_a_line, output
 from climber_uk.report.page import page
 from climber_uk.report.tables import Column, to_csv, to_json
 from climber_uk.system.command_line import Parser, between, printable
@@ -45,13 +45,7 @@ def parser(name: str, description: str | None) -> Parser:
         default=[],
         help="of a climber, may be repeated (default: all that have odometry)",
     )
-    made.add_argument(
-        "--remap",
-        action="append",
-        default=[],
-        metavar="FROM:=TO",
-        help="other name of a topic, as in odom:=/robot/odom; may be repeated",
-    )
+    add_remap(made)
     made.add_argument(
         "--params", type=Path, help="parameter file of the nodes (default: those in the bag)"
     )

@@ -154,7 +154,7 @@ class NodeParameters:
 
     def _set(self, changes: list[Parameter]) -> SetParametersResult:
         """Set parameters while the node runs: all of a request, or none."""
-        kept = dict(self._kept)
+        kept, doubts = dict(self._kept), []
         try:
             for change in changes:
                 if change.name in self._fields:
@@ -163,11 +163,14 @@ class NodeParameters:
                     if (prefix, kind) in kept:
                         changed = {field.name: change.value}
                         kept[prefix, kind] = dataclasses.replace(kept[prefix, kind], **changed)
+                    doubts += [prefix + said for said in [doubt(field, change.value)] if said]
         except ValueError as error:
             return SetParametersResult(successful=False, reason=f"{prefix}{error}")
         if kept != self._kept:
             self._kept = kept
             self._on_change()
+        for said in doubts:
+            self._node.get_logger().warning(said)  # rclpy tells no reason of what is done
         return SetParametersResult(successful=True)
 
 

@@ -368,11 +368,23 @@ def test_of_a_bag_of_another_robot_every_tool_tells_which_topics_there_are(tmp_p
         bags = ["bag", "bag"] if tool == "compare_bags" else ["bag"]
         _, said = run(tool, *bags)
         of_joints = "no message on /.* (sensor_msgs/msg/JointState is on /motors)"
-        of_odometry = "no message on /?odom (nav_msgs/msg/Odometry is on /robot/filtered)"
+        how = "" if tool == "identify" else ": --remap odom:=TOPIC"
+        of_odometry = f"no message on /?odom (nav_msgs/msg/Odometry is on /robot/filtered{how})"
         wanted = of_joints if tool in ("localize", "replay_controller") else of_odometry
         assert re.search(wanted.replace("(", r"\(").replace(")", r"\)"), said), said
     remapped = [f"--remap={name[1:]}:={other}" for name, other in others.items()]
-    assert run("analyze_bag", "bag", *remapped) == (False, "")
+    for tool in ("analyze_bag", "export_tum"):
+        assert run(tool, "bag", *remapped) == (False, "")
+    assert run("animate_bag", "bag", *remapped, "--seconds=0.2") == (False, "")
+
+
+def test_a_reference_of_no_climber_is_said(tmp_path, run):
+    """An odometry of another namespace was taken, and no word said of why nothing is compared."""
+    others = {"/odom": "/wheel/odom"}
+    write(tmp_path / "bag", [(others.get(m[0], m[0]), *m[1:]) for m in a_whole_run().messages])
+    _, said = run("analyze_bag", "bag")
+    assert "no message on /wheel/reference (trajectory_msgs/msg/MultiDOF" in said
+    assert "is on /reference: --remap reference:=TOPIC)" in said
 
 
 @pytest.mark.parametrize("tool", ALL_TOOLS)

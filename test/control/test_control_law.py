@@ -177,6 +177,14 @@ def test_a_control_law_of_forces_has_prediction_disturbance_and_limits_around_it
     assert np.abs(command.lost).max() > 0.1
 
 
+@pytest.mark.parametrize("turning", [0.0, 1e-16, 2.0])
+def test_without_prediction_torques_are_for_the_motion_that_is_told(turning):
+    """Whatever has been learnt to resist its turn: the safe output came for each 1e-16 N m."""
+    law = ControlLaw(Climber(), Guidance(), ControlOptions(predict=False))
+    now = situation(START, held=(0.3, 0.2))._replace(turning=turning)
+    assert law.command(now, PAPER.at(0.1).target).motion == now.motion
+
+
 @dataclass(frozen=True)
 class Kind:
     """A law of forces, and of accelerations, that answers in another kind of number."""

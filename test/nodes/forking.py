@@ -16,11 +16,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-PARTS = "nodes", "recording", "operating", "driver_check"
+PARTS = "nodes.", "recording.", "operating.", "driver_check."
 PROGRAMS = {
     script.name: script
     for script in entry_points(group="console_scripts")
-    if script.module.startswith(tuple(f"climber_uk.{part}." for part in PARTS))
+    if script.module == "climber_uk.executables" and script.attr.startswith(PARTS)
 }
 SERVER = multiprocessing.get_context("forkserver")
 SERVER.set_forkserver_preload(["preloaded"])

@@ -5,6 +5,7 @@ its logger for its caller, which goes through the files of all modules.
 """
 
 import ctypes
+import importlib
 import inspect
 import os
 import sys
@@ -13,7 +14,7 @@ from forking import PROGRAMS
 
 del os.environ["PYTHONPATH"]  # for this import alone
 for script in PROGRAMS.values():
-    script.load()
+    importlib.import_module(f"climber_uk.{script.attr}")
 ctypes.CDLL("librmw_fastrtps_cpp.so")
 for name in [name for name in sys.modules if name.endswith((".msg", ".srv"))]:
     found = vars(sys.modules[name]).values()

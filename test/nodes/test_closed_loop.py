@@ -13,6 +13,7 @@ from evo.tools import file_interface
 from world import CONFIG, TIMEOUT, World, executable, inhabitants
 
 from climber_uk.bags.recorded_run import read_run
+from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 from climber_uk.messages.topics import PRESSURE
@@ -157,6 +158,9 @@ def test_a_realistic_climber_goes_from_rest_to_rest(climber_bag):
     # the last half second, in which it creeps home
     assert np.abs(run.pose[-25:] - run.pose[-1]).max() < 1e-6
     assert run.distance[-1] < 5e-3
+    # it is told as it begins, not within a second of the wall's clock
+    told = [time for time, event in run.events if event.text == Mode.FOLLOWING.value]
+    assert told[0] < 0.1
 
 
 @pytest.mark.soak  # without nodes: test/control/test_least_suction.py

@@ -114,7 +114,7 @@ class Repeating:
         ({"spoil": Repeating()}, "it is back where it was"),
         ({"spoil": spoil_nan}, "is not finite"),
         ({"spoil": spoil_frame}, "frame_id='map' must be 'odom'"),
-        ({"spoil": spoil_child_frame}, "child_frame_id='base_footprint' must be 'base_link'"),
+        ({"spoil": spoil_child_frame}, "'base_footprint' must be 'base_link': see base_frame, "),
         ({"spoil": spoil_orientation}, "must be a unit turn about z"),
         ({"age": 2_000_000_000}, "from the clock, too far"),
     ],
@@ -273,6 +273,8 @@ def test_gains_change_while_running_but_not_geometry_and_not_beyond_bounds(world
     assert not refused.successful
     assert "frequency" in refused.reason
     assert not set_parameter(world, "wheel_radius", 0.05).successful
+    assert set_parameter(world, "suction_pressure", 8.0).successful
+    assert "suction_pressure=8 [Pa] is hardly meant" in world.log(NAME)
 
 
 def test_the_torques_answer_the_odometry_and_effort_commands_say_the_same(world):

@@ -76,6 +76,11 @@ def test_what_is_no_parameter_file_is_said_in_one_line(file, text):
     assert len(str(error.value).splitlines()) == 1
 
 
+def test_one_underscore_is_said_to_be_one_too_few(file):
+    with pytest.raises(ValueError, match=r"is not in ros__parameters \(with two underscores\)$"):
+        read_file(file("x:\n  ros_parameters:\n    mass: 5.0\n"), NODE)
+
+
 def test_a_tab_in_a_parameter_file_is_said_in_plain_words(file):
     text = "x:\n  ros__parameters:\n    mass: 5.0\n\thalf_track: 0.3\n"
     with pytest.raises(ValueError, match="line 4, column 1: a tab, where YAML takes blanks only"):

@@ -162,6 +162,20 @@ def test_a_climber_of_which_a_number_was_changed_in_one_place_only_is_said(
     assert capsys.readouterr().err == f"check_path: {tmp_path / 'mine.yaml'}: {said}\n"
 
 
+def test_a_file_for_a_robot_of_ones_own_needs_no_simulator(monkeypatch, capsys, tmp_path):
+    text = (CONFIG / "climber.yaml").read_text().partition("/**/plant_simulator:")[0]
+    (tmp_path / "mine.yaml").write_text(text)
+    status, with_one = run(monkeypatch, capsys, "--params", CONFIG / "climber.yaml")
+    monkeypatch.setattr("sys.argv", ["check_path", "--params", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit) as ended:
+        check_path.main()
+    said = capsys.readouterr()
+    assert (ended.value.code, said.out) == (status, with_one)
+    assert said.err.endswith(
+        "without a plant_simulator's locomotion, nothing is taken to resist turns\n"
+    )
+
+
 def test_what_asks_for_too_much_is_told_with_its_place_and_the_status(monkeypatch, capsys):
     fast = "-p", "rest_to_rest.rate:=2.0", "-p", "rest_to_rest.ramp_time:=0.05"
     words = "--params", CONFIG / "climber.yaml", *fast
