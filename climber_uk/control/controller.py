@@ -30,7 +30,7 @@ from climber_uk.control.speed_command import STANDING, MotorBoard
 from climber_uk.control.stops import Stops
 from climber_uk.control.time_scaling import Pacing
 from climber_uk.control.timing import LONGEST_STEP, Ages, Timing
-from climber_uk.control.twist import OPPOSED_IF_TOO_FAST, TwistCheck
+from climber_uk.control.twist import FAST_SIDEWAYS, OPPOSED_IF_TOO_FAST, TwistCheck
 from climber_uk.mechanics import SECOND, Array, pack
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.preview import Preview
@@ -326,6 +326,11 @@ class Controller:
         if target is None:
             return None
         expected = self.active.expected(self._stamp, target, self._law.constraints)
+        margin = self.guard.options.speed_margin
+        if abs(self._twist.aside) > expected.allowed.speed + margin > expected.allowed.speed:
+            least = FAST_SIDEWAYS * self.safety.max_twist_error
+            if sideways := self._twist.sideways_of_late(least):
+                return Mode.HEADING_WRONG, sideways
         fault = self.guard.watch(self._law.climber, observed, expected)
         if fault and fault[0] is Mode.LATE and self.estimator.acts_later(self.guard.late):
             fault = None

@@ -13,11 +13,13 @@ from climber_uk.mechanics.elementary import wrapped
 
 SWING_TIME = 0.15  # [s] what changes more slowly is left out: weight, friction, load
 MEMORY = 1.0  # [s]
+WHEEL_MEMORY = 0.2  # [s]
 LEAST_SWING = 0.005  # [m/s] of a rim that torques should cause, RMS, to tell anything
 # correlation of what they should cause with what is measured, for a sign that is right, and wrong:
 # odometry that is late by a third of an oscillation goes against its torques, too
 RIGHT, WRONG = 0.5, -0.85
 POSE_SMOOTHING = 0.03  # [s] of speeds that are taken from poses
+SLIDES = 0.01  # [m/s] from which it is known which way friction acts
 TINY = 1e-30
 
 
@@ -38,13 +40,14 @@ class Swing:
 class Polarity:
     """Of one speed: compares its swings with those that the torques should cause."""
 
-    def __init__(self) -> None:
+    def __init__(self, memory: float = MEMORY) -> None:
+        self.memory = memory  # [s]
         self._expected, self._measured = Swing(), Swing()
         self._squares = self._products = self._squares_measured = 0.0  # [m²/s]
 
     def add(self, expected: float, measured: float, time: float) -> None:
         """Take changes of a rim's speed [m/s] within `time` [s]."""
-        kept, left = math.exp(-time / SWING_TIME), math.exp(-time / MEMORY)
+        kept, left = math.exp(-time / SWING_TIME), math.exp(-time / self.memory)
         should, does = self._expected.add(expected, kept), self._measured.add(measured, kept)
         self._squares = left * self._squares + time * should * should
         self._products = left * self._products + time * should * does
@@ -53,14 +56,18 @@ class Polarity:
     @property
     def sign(self) -> int:
         """1 where it follows its torque, -1 where it goes against it; 0: nobody knows."""
-        if self._squares < LEAST_SWING**2 * MEMORY:
+        if self._squares < LEAST_SWING**2 * self.memory:
             return 0
         correlation = self._products / math.sqrt(self._squares * self._squares_measured + TINY)
         return int(correlation > RIGHT) - int(correlation < WRONG)
 
 
 class Polarities:
-    """Of speed and yaw rate of a climber."""
+    """Of speed and yaw rate of a climber, and of each wheel.
+
+    What is measured of a wheel is the force that acted on it, by (11) and (15): nothing of what
+    the other one does, nor of a steady push.
+    """
 
     def __init__(self) -> None:
         self.restart()
@@ -68,6 +75,11 @@ class Polarities:
     def restart(self) -> None:
         """Know nothing."""
         self.drive, self.yaw = Polarity(), Polarity()
+        self.forget_wheels()
+
+    def forget_wheels(self) -> None:
+        """Know nothing of each wheel."""
+        self.right, self.left = Polarity(WHEEL_MEMORY), Polarity(WHEEL_MEMORY)
 
     def forget_unknown(self) -> None:
         """Begin anew with what is not known: what nobody caused would hide an answer."""
@@ -81,17 +93,34 @@ class Polarities:
             return
         force, moment = climber.wrench(*observed.torques)
         mass, inertia, friction, weight = climber.inertial
-        force -= weight * after.sine + math.copysign(friction, after.speed)
-        force += observed.pull
+        resisting = weight * after.sine, math.copysign(friction, after.speed)
+        force += observed.pull - sum(resisting)
         self.drive.add(force / mass * time, after.speed - before.speed, time)
         lever = climber.half_track
         turn = lever * (after.yaw_rate - before.yaw_rate)
         self.yaw.add(lever * moment / inertia * time, turn, time)
+        if min(abs(before.speed), abs(after.speed)) < SLIDES:
+            return  # what rubs may be anything
+        drive = after.speed - before.speed + (sum(resisting) - observed.pull) / mass * time
+        turn *= inertia / lever**2 / mass
+        wheels, acted = (self.right, self.left), (drive + turn, drive - turn)
+        for wheel, torque, does in zip(wheels, observed.torques, acted, strict=True):
+            wheel.add(2 * torque / climber.wheel_radius / mass * time, does, time)
 
     @property
     def signs(self) -> tuple[int, int]:
         """Of speed and yaw rate; see `Polarity.sign`."""
         return self.drive.sign, self.yaw.sign
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether a wheel goes against its torque."""
+        return min(self.right.sign, self.left.sign) < 0
+
+    @property
+    def are_right(self) -> bool:
+        """Whether both wheels follow their torques."""
+        return min(self.right.sign, self.left.sign) > 0
 
 
 class PoseSpeeds:

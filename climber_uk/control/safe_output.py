@@ -6,11 +6,12 @@ from climber_uk.control.control_law import Braking, ControlLaw, check_finite
 from climber_uk.control.estimator import Estimator
 from climber_uk.control.observed import Observed
 from climber_uk.control.polarity import Polarities, PoseSpeeds
-from climber_uk.control.safety import Mode, Safety
+from climber_uk.control.safety import NO_FAULTS, Mode, Safety
 from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import GRAVITY, Climber
-from climber_uk.mechanics.quantities import NO_TORQUES, Motion, Torques
+from climber_uk.mechanics.elementary import clipped
+from climber_uk.mechanics.quantities import NO_TORQUES, Motion, Torques, Wrench
 
 BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
 PUSHED = 0.05  # [m/s] by which it may be faster than before, and
@@ -27,6 +28,10 @@ SHAKEN = 0.02  # [m/s] of a rim, above which it is
 SHAKING = 0.3  # [m/s²] to and fro: 1.5 cm/s
 HALF_SHAKE = SECOND // 10  # [ns]
 SHAKES = 2 * SECOND  # [ns] of it, at most
+REACHES = 0.1  # of the braking rate: that of the integral that carries what pushes it
+# modes of a climber with which nothing is wrong: what was learnt as it followed pushes it still
+STOPS = Mode.EMERGENCY_STOP, Mode.LOW_BATTERY, Mode.TETHER, Mode.NO_REFERENCE
+SOUND = NO_FAULTS.union(STOPS)
 
 
 class SealCheck:
@@ -69,6 +74,9 @@ class SafeOutput:
         self._gently = 1.0  # share of its rate that it brakes with, less each time it is pushed
         self._begins, self._left_until = True, 0  # with the next torques; [ns]
         self._seal = SealCheck()
+        # the force that pushes it [N], None: of its weight more is not known; if that is learnt on
+        self._push: float | None = None
+        self._learns, self._learnt = False, 0.0  # and what was learnt [N] while it was followed
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -84,6 +92,7 @@ class SafeOutput:
                 self._seal.add(is_driven, abs(observed.after.speed), observed.time)
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
+            self._learn_push(climber, observed)
             self._way = self.polarities.drive.sign or self._way
             return
         self.polarities.restart()
@@ -92,6 +101,18 @@ class SafeOutput:
         )
         if self.safety.has_jumped(seen, pose, climber.half_track):
             self.by_pose.restart()
+
+    def _learn_push(self, climber: Climber, observed: Observed) -> None:
+        """Learn what pushes it: as it is followed, then as the integral of the speed it has yet."""
+        if self._begins:
+            self._learnt = observed.disturbance.force
+            return
+        if self.polarities.is_wrong:
+            self._push = None
+        elif self._push is not None and self._learns:
+            rate = REACHES * self.safety.braking_rate**2 * climber.driven_mass * observed.time
+            most = 2 * climber.max_wheel_torque / climber.wheel_radius
+            self._push = clipped(self._push + rate * observed.after.speed, -most, most)
 
     def send(
         self, mode: Mode, stamp: int, age: float, estimator: Estimator, law: ControlLaw
@@ -104,15 +125,24 @@ class SafeOutput:
         if mode is Mode.NO_ODOMETRY and age < safety.odometry_timeout and not falls:
             return self._coast(mode, estimator, law, age)  # it comes again, and may be old
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
+        if self._begins:
+            is_known = falls and (mode in SOUND or self._answers(mode))
+            self._push = self._learnt if is_known else None
+            self.polarities.forget_wheels()
         if self._lets_go(mode, stamp, falls):
             return _let_go(estimator, age)
-        if stamp < self._coasts_until:
+        sinks = falls and law.weight(motion) * motion.speed <= 0  # what rises is carried too much
+        answers = sinks and self._answers(mode)
+        if stamp < self._coasts_until and not answers:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
                 self._is_carried = False
                 self._weigh(law, motion)
                 self._coasts_from = rim
             return self._coast(mode, estimator, law, age)
-        if self._is_pushed(stamp, rim, falls):
+        is_pushed = self._is_pushed(stamp, rim, falls)
+        if is_pushed and answers:
+            self._push, self._learns = self._push or 0.0, mode not in SOUND
+        elif is_pushed:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
             self._gently *= GENTLER
             self._coasts_from, self._way = rim, 1  # a push looks like motors the wrong way round
@@ -150,7 +180,14 @@ class SafeOutput:
         since = None if self._doubted is None else stamp - self._doubted
         believed, signs = self._believed(mode, motion) if since is not None else (motion, None)
         braking = self._braking(mode, law, believed, signs, since)
-        return _brake(estimator, law, age, braking, None if since is None else believed)
+        if since is not None:
+            return _brake(estimator, law, age, braking, believed)
+        return _brake(estimator, law, age, braking, None, self._push or 0.0)
+
+    def _answers(self, mode: Mode) -> bool:
+        """Whether torques surely do what they should, as odometry tells that may be believed."""
+        is_doubtful = mode is Mode.LATE or mode.doubts_odometry
+        return self.polarities.are_right and not is_doubtful
 
     def _is_pushed(self, stamp: int, rim: float, falls: bool) -> bool:
         """Whether a rim's speed [m/s] has grown, though it has been braked for a while.
@@ -217,6 +254,8 @@ class SafeOutput:
         if doubtful is None or doubted is None:
             way = self._way if mode.is_fault else 1
             sign, yaw_sign = self.polarities.signs
+            if self._push is not None:
+                return Braking(rate, rate * (yaw_sign or 1))
             drive, yaw = rate * (sign or way), rate * (yaw_sign or 1)
             holds = not falls and law.climber.seal_friction > 0
             # The other wheel can brake a turn, while the seal holds what it drives. What goes
@@ -228,6 +267,8 @@ class SafeOutput:
             # nobody knows its heading where odometry is stuck
             carries = 0.0 if mode is Mode.STALLED and holds else way * self._carries
             return Braking(drive, yaw, carries)
+        if mode is Mode.HEADING_WRONG and not falls:  # nobody knows how fast it goes ahead
+            return Braking(0.0, rate, carries=0.0)
         if falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
             doubtful = doubtful[0] or 1, doubtful[1] or 1
         rims = motion.speed, law.climber.half_track * motion.yaw_rate
@@ -235,8 +276,7 @@ class SafeOutput:
             0.0 if sign or abs(rim) < SHAKEN else _shaking(doubted)
             for sign, rim in zip(doubtful, rims, strict=True)
         )
-        carries = 0.0 if mode is Mode.HEADING_WRONG and not falls else self._carries
-        return Braking(rate * doubtful[0], rate * doubtful[1], carries, (drive, yaw))
+        return Braking(rate * doubtful[0], rate * doubtful[1], self._carries, (drive, yaw))
 
 
 def _shaking(doubted: int) -> float:
@@ -252,13 +292,19 @@ def _let_go(estimator: Estimator, age: float) -> Torques:
 
 
 def _brake(
-    estimator: Estimator, law: ControlLaw, age: float, braking: Braking, believed: Motion | None
+    estimator: Estimator,
+    law: ControlLaw,
+    age: float,
+    braking: Braking,
+    believed: Motion | None,
+    push: float = 0.0,
 ) -> Torques:
     """Torques that carry the weight and brake; raises `ValueError` if they are not finite.
 
-    `believed` has the speeds that are braked, if not those of the estimator.
+    A `push` [N] is carried as well; `believed` has the speeds that are braked, if not those of the
+    estimator.
     """
-    ahead = estimator.ahead(age)
+    ahead = estimator.ahead(age)._replace(disturbance=Wrench(push, 0.0))
     if believed is not None:
         speeds = {"speed": believed.speed, "yaw_rate": believed.yaw_rate}
         ahead = ahead._replace(motion=ahead.motion._replace(**speeds))

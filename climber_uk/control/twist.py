@@ -25,6 +25,10 @@ OPPOSED_DISTANCE = 0.1  # of the largest error: distance of both, to opposite si
 OPPOSED_IN_A_ROW = 3  # odometry messages
 LEAPS = 2.0  # times the twist's way in a message, that a pose goes in it at most: else it leaps
 OPPOSED_IF_TOO_FAST = 0.01  # of the largest error: enough, once, where it is too fast as well
+# What goes sideways faster than it should go at all is found over this share of the largest error
+# in a moment, if that is more than a share of the way ahead
+MOMENT = 0.1  # [s]
+FAST_SIDEWAYS, ALSO_AHEAD = 0.2, 0.5
 
 
 class TwistKind:
@@ -102,6 +106,9 @@ class TwistCheck:
         self._alone = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         self._unlike = Unlike(), Unlike()  # of the same two
         self._aside = 0.0, 0.0  # [m] by pose, to the left, and the squares of its steps [m²]
+        self.aside = 0.0  # [m/s] the same of the last message
+        # [m] of the last moment: ahead and aside by pose, of a rim by yawing; squares aside [m²]
+        self._of_late = 0.0, 0.0, 0.0, 0.0
 
     def add(self, last: Motion, motion: Motion, time: float, half_track: float) -> None:
         """Add the distances from the `last` odometry to that of `motion`, `time` [s] later."""
@@ -120,6 +127,12 @@ class TwistCheck:
         )
         sideways, squares = self._aside
         self._aside = left * sideways + aside, left * squares + aside * aside
+        self.aside = aside / time if time > 0 else 0.0
+        new = forward, aside, turned, aside * aside
+        forgotten = math.exp(-time / MOMENT)
+        self._of_late = (
+            *(forgotten * old + it for old, it in zip(self._of_late, new, strict=True)),
+        )
         drive, yaw = self._products
         self._products = _summed(left, drive, forward, way), _summed(left, yaw, turned, rim)
         drive_sums, yaw_sums = self._smooth
@@ -173,10 +186,12 @@ class TwistCheck:
     def sideways(self, largest: float) -> str:
         """By how much it goes to the side, in words, if by more than `largest` [m]; else ''."""
         (ahead, _), (turned, _) = self._distances  # what scrubs turns about another point
-        aside, squares = self._aside
-        is_far = abs(aside) - abs(ahead) - abs(turned) > largest
-        is_leap = aside * aside <= AT_LEAST * squares  # as a fix corrects it
-        return f"it goes sideways, by {aside:.2f} m" if is_far and not is_leap else ""
+        return _sideways(largest, ahead, turned, *self._aside)
+
+    def sideways_of_late(self, largest: float) -> str:
+        """The same of the last moment, for what goes sideways faster than it should go at all."""
+        ahead, aside, turned, squares = self._of_late
+        return _sideways(largest, ALSO_AHEAD * ahead, turned, aside, squares)
 
     def trouble(self, largest: float) -> tuple[str, bool]:
         """What is wrong if they differ by more than `largest` [m], and whether a sign is."""
@@ -196,6 +211,12 @@ def _alone(sums: Products, pose: float, twist: float, least: float, is_zero: boo
     by_pose, pose_2, by_twist = sums
     by_twist = by_twist + twist if pose == 0 and abs(twist) > least else 0.0
     return (by_pose + pose, pose_2 + pose * pose, by_twist) if is_zero else (0.0, 0.0, by_twist)
+
+
+def _sideways(largest: float, ahead: float, turned: float, aside: float, squares: float) -> str:
+    is_far = abs(aside) - abs(ahead) - abs(turned) > largest
+    is_leap = aside * aside <= AT_LEAST * squares  # as a fix corrects it
+    return f"it goes sideways, by {aside:.2f} m" if is_far and not is_leap else ""
 
 
 def _smooth(

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from climbs import Climb
 
-from climber_uk.control.polarity import MEMORY, Polarity
+from climber_uk.control.observed import Observed
+from climber_uk.control.polarity import MEMORY, Polarities, Polarity
 from climber_uk.control.safety import Mode
-from climber_uk.mechanics.quantities import State
+from climber_uk.mechanics.climber import Climber
+from climber_uk.mechanics.quantities import State, Torques, Wrench
 
 PERIOD = 0.005
 SHOVE = np.array([4.0, -4.0])  # [N m]
@@ -104,3 +106,28 @@ def test_the_wheel_that_is_left_brakes_a_turn_and_does_not_drive(side):
     climb.run(4.0, motors=dead)
     assert climb.fastest_turn(climb.time - 0.1) < 0.05
     assert climb.fastest(climb.time - 0.1) == 0
+
+
+@pytest.mark.parametrize(
+    ("wiring", "signs"),
+    [
+        (np.eye(2), (1, 1)),
+        (np.diag([1, -1]), (1, -1)),
+        (np.diag([0, 1]), (0, 1)),
+        (-np.eye(2), (-1, -1)),
+    ],
+)
+def test_each_wheel_is_told_from_the_other_and_from_a_steady_push(wiring, signs):
+    climber, polarities = Climber(), Polarities()
+    random, speeds = np.random.default_rng(1), np.array([0.5, 0.0])
+    mass, inertia, friction, _ = climber.inertial
+    for _ in range(400):
+        torques = random.normal(1.0, 0.5, 2)
+        force, moment = climber.wrench(*(wiring @ torques + [0.5, 0.0]))
+        push = force - friction - 20.0
+        after = speeds + PERIOD * np.array([push / mass, moment / inertia])
+        one, other = (State.rolling(np.zeros(3), *it).motion for it in (speeds, after))
+        acted = [(Torques(*torques), PERIOD)]
+        polarities.add(climber, Observed(one, other, PERIOD, acted, Wrench(0.0, 0.0), 0.01))
+        speeds = np.array([0.5, after[1]])
+    assert (polarities.right.sign, polarities.left.sign) == signs
