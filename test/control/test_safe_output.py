@@ -1,0 +1,43 @@
+"""Parts of the safe output; what it does to a climber is in test_guard.py and test_polarity.py."""
+
+import pytest
+
+from climber_uk.control.safe_output import FALLS, LATEST, SealCheck
+
+PERIOD = 0.01  # [s]
+
+
+def told(check, speeds, is_driven=False):
+    """Whether the seal gives way, after speeds [m/s] one period apart."""
+    for speed in speeds:
+        check.add(is_driven, speed, PERIOD)
+    return check.gives_way
+
+
+def rising(by, seconds):
+    """Speeds [m/s] from 5 cm/s on, at a steady acceleration."""
+    count = round(seconds / PERIOD)
+    return [0.05 + by * (number + 1) / count for number in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("speeds", "is_driven", "gives_way"),
+    [
+        (rising(0.0, 5.0), False, False),  # it slides steadily
+        (rising(1.0, 2.0), True, False),  # its motors do that
+        (rising(3.0, 0.9 * LATEST), False, False),  # or did: torques may act late
+        (rising(0.9 * FALLS, LATEST) + rising(0.9 * FALLS, 2.0), False, False),
+        (rising(1.0, 2.0), False, True),
+    ],
+)
+def test_a_seal_gives_way_once_who_is_not_driven_gets_faster(speeds, is_driven, gives_way):
+    check = SealCheck()
+    assert told(check, speeds, is_driven) == gives_way
+    assert told(check, rising(0.0, 1.0), is_driven=True) == gives_way  # and stays so
+
+
+def test_a_torque_now_and_then_begins_the_wait_anew():
+    check = SealCheck()
+    for _ in range(10):
+        assert not told(check, rising(1.0, 0.9 * LATEST))
+        assert not told(check, [1.05], is_driven=True)
