@@ -440,6 +440,9 @@ class Controller:
                 command = law.command(ahead, target.point or point)
             pending = estimator.pending(ahead.begins)
             command = self.guard.budget.within(command, law, ahead, pending)
+            if active.way is not None:
+                most = active.options.approach_yaw_rate
+                command = self.guard.budget.gently(command, law, ahead, most)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None

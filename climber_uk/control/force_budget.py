@@ -37,6 +37,8 @@ MEMORY = 0.1  # [s] in which friction is learnt
 CREEPS = 1e-3  # [m/s] of a motion that pose and twist tell alike, from which on it is one
 KNOWN = 0.2  # [s] of sliding, after which it is known
 MOST_FRICTION = 2.0  # times that of the model
+GENTLE = 4.0  # [1/s] by which a turn on the way to the reference changes its rate, of the fastest
+TRIES = 90.0  # [rad/s³] by which its moment grows beyond that: fast enough for what scrubs
 BREAKS_LOOSE = 1.2  # times what a turn meets, until it begins
 
 
@@ -56,6 +58,7 @@ class ForceBudget:
         self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
         # [N m] that is turned against, of late, and what a turn is known to meet
         self._resisted = self._scrubs = 0.0
+        self._lasts = 0.0  # [N m] by which it is turned on its way to the reference
 
     def pause(self) -> None:
         """Watch nothing for now: it need not move."""
@@ -237,6 +240,27 @@ class ForceBudget:
         lost = Wrench(command.lost.force + cut, command.lost.moment + turned)
         wheels = law.torques(weight + push_given, moment - turned, ahead)
         return command._replace(wheels=wheels, lost=lost)
+
+    def gently(
+        self, command: Command, law: ControlLaw, ahead: ControlInput, yaw_rate: float
+    ) -> Command:
+        """A command on the way to the reference, which turns by a `yaw_rate` [rad/s] at most.
+
+        How late torques act may not be known yet, and a turn on the spot meets next to nothing: a
+        moment that swings is bounded, and one that lasts is given all the same.
+        """
+        force, moment = (
+            asked - lost for asked, lost in zip(command.demanded, command.lost, strict=True)
+        )
+        inertia = law.climber.driven_inertia
+        most = inertia * GENTLE * yaw_rate + BREAKS_LOOSE * self._scrubs
+        given = min(max(moment, self._lasts - most), self._lasts + most)
+        change = inertia * TRIES * ahead.period
+        self._lasts += min(max(moment - self._lasts, -change), change)
+        if given == moment:
+            return command
+        lost = Wrench(command.lost.force, command.lost.moment + moment - given)
+        return command._replace(wheels=law.torques(force, given, ahead), lost=lost)
 
     def _stronger(self, climber: Climber, push: float) -> float:
         """A push [N] with at least the force of its number; see `MORE`.

@@ -153,6 +153,24 @@ def test_what_comes_to_be_late_in_mid_course_is_learnt(what, delay, number, plan
     assert_goes_on(climb, 4.0, delay)
 
 
+@pytest.mark.parametrize(
+    ("delay", "most"),  # [s], [rad/s]
+    [
+        pytest.param(0.06, 1.5, marks=soak),
+        (0.1, 2.0),
+        *(pytest.param(d, 5.0, marks=soak) for d in (0.15, 0.2)),
+    ],
+)
+@pytest.mark.parametrize("turned", [pytest.param(0.6, marks=soak), -1.2])
+def test_a_turn_on_the_spot_to_the_path_does_not_spin_by_a_delay_that_nobody_told(
+    turned, delay, most
+):
+    """At 7 to 16 rad/s it did, from 60 ms on, where nothing resists a turn."""
+    climb = Climb(offset=(0.0, 0.0, turned))
+    climb.run(2.5, motors=Late(delay, climb.torques))
+    assert max(abs(state.velocity[2]) for state in climb.states) < most
+
+
 @pytest.mark.parametrize(("planner", "number"), WAYS)
 @pytest.mark.parametrize("rate", [pytest.param(0.02, marks=soak), 0.05])
 @pytest.mark.parametrize("what", ["odometry", pytest.param("motors", marks=soak)])
