@@ -22,7 +22,7 @@ from climber_uk.mechanics.elementary import clipped
 from climber_uk.mechanics.quantities import Motion, ReferencePoint
 from climber_uk.mechanics.wall import Wall, weight
 
-SIZES = 0.06, 0.1, 0.03  # of ρ, λ [m] and p [m], as large as they may well be
+SIZES = 0.06, 0.1, 0.06  # of ρ, λ [m] and p [m], as large as they may well be
 LARGEST = 10.0  # times as large as that, at most
 FORGOTTEN = 10.0  # [s] in which what is known of them is known no more
 FADE_SPEED = 0.02  # [m/s] of a reference below which its course is its heading

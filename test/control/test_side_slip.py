@@ -262,6 +262,21 @@ def test_what_is_learnt_at_one_speed_holds_at_another():
     assert np.abs(errors[500:]).max() < 2e-3  # [m/s] of 3e-2
 
 
+def test_what_wheels_show_that_drive_harder_uphill_holds_downhill():
+    """Tyres that pass on less along the climber hold less aside, by the friction's ellipse."""
+    slip, errors = SideSlip(), []
+    for time in np.arange(0.0, 4.3, PERIOD):  # over a crest
+        target = SINE.at(float(time)).target
+        x, y, speed = target.x, target.y, target.speed
+        now = Motion.at(x, y, target.heading, speed, target.yaw_rate)
+        drive = CLIMBER.seal_friction + CLIMBER.weight_along_wall * now.sine
+        scrub = 0.146 / (1 + (CLIMBER.half_track * drive / 34.0) ** 2 / 2)
+        aside = SideSlip(scrub=scrub, pivot=0.036).speed(CLIMBER, now)
+        errors.append(slip.speed(CLIMBER, now) - aside)
+        slip = slip.learnt(CLIMBER, now, aside, PERIOD, 6.0)
+    assert np.abs(errors[600:]).max() < 1e-3  # [m/s] of 6e-2
+
+
 @pytest.mark.parametrize("way", [1, -1])
 def test_a_heading_is_as_far_ahead_as_its_sagging_asks_for(way):
     """On a sine wave of narrow bends; the equation is integrated from three seconds off."""
