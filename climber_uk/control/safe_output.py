@@ -20,6 +20,8 @@ GENTLER, CALM = 0.5, SECOND  # times as fast it is braked after that, for [ns] w
 COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
 NOTHING = 0.05  # of the weight: a drive that is let go
 FALLS = 0.1  # [m/s] by which it may get faster without a torque, if its seal holds it
+SINKS = 0.3  # [m/s] the same, downwards, each time it is left for `SOON`
+SOON = 0.15  # [s] after the last torque: the late ones of who goes down brake it still
 LATEST = 0.6  # [s] that a torque may act after it was sent: none acts this long after the last
 LESS = 0.5  # times as much of the weight is carried, where what carries it drives it
 LETS_GO = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
@@ -35,17 +37,24 @@ SOUND = NO_FAULTS.union(STOPS)
 
 
 class SealCheck:
-    """Whether a seal gives way: who is not driven gets faster, once no late torque can act."""
+    """Whether a seal gives way: who is not driven gets faster, once no late torque can act.
+
+    Who goes down gets so by its weight, as well soon after a torque that would have braked it.
+    """
 
     def __init__(self) -> None:
         self.gives_way = False
         self._left_for, self._slowest = 0.0, math.inf  # [s] without a torque, [m/s] since then
+        self._last = self._sunk = 0.0  # [m/s], and by how much it got faster downwards
 
-    def add(self, is_driven: bool, speed: float, time: float) -> None:
+    def add(self, is_driven: bool, speed: float, time: float, goes_down: bool = False) -> None:
         """Take a speed [m/s], after a `time` [s] in which torques drove it or not."""
         self._left_for = 0.0 if is_driven else self._left_for + time
         self._slowest = min(self._slowest, speed) if self._left_for > LATEST else math.inf
-        self.gives_way = self.gives_way or speed > self._slowest + FALLS
+        if self._left_for > SOON:
+            self._sunk = max(0.0, self._sunk + speed - self._last) if goes_down else 0.0
+        self._last = speed
+        self.gives_way = self.gives_way or speed > self._slowest + FALLS or self._sunk > SINKS
 
 
 class SafeOutput:
@@ -89,7 +98,9 @@ class SafeOutput:
             self._is_driven = is_against and gained > GRAVITY * observed.time
             if not self._begins:
                 is_driven = abs(force) >= NOTHING * climber.mass * GRAVITY
-                self._seal.add(is_driven, abs(observed.after.speed), observed.time)
+                after = observed.after
+                goes_down = after.sine * after.speed < 0
+                self._seal.add(is_driven, abs(after.speed), observed.time, goes_down)
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
             self._learn_push(climber, observed)

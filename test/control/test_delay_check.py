@@ -2,6 +2,7 @@
 
 from collections import deque
 from copy import deepcopy
+from dataclasses import replace
 from functools import cache
 from itertools import count
 
@@ -169,6 +170,26 @@ def test_a_turn_on_the_spot_to_the_path_does_not_spin_by_a_delay_that_nobody_tol
     climb = Climb(offset=(0.0, 0.0, turned))
     climb.run(2.5, motors=Late(delay, climb.torques))
     assert max(abs(state.velocity[2]) for state in climb.states) < most
+
+
+@pytest.mark.parametrize(
+    ("mass", "delay", "number"),  # [kg], believed to be 5; [s]; of `every`
+    [
+        (9.0, 0.05, 1),
+        (7.5, 0.05, 4),
+        *(pytest.param(*it, marks=soak) for it in ((7.5, 0.05, 1), (9.0, 0.05, 4), (9.0, 0.1, 1))),
+    ],
+)
+@pytest.mark.parametrize("is_enabled", [True, pytest.param(False, marks=soak)])
+def test_what_its_seal_does_not_hold_is_found_though_torques_are_late(
+    mass, delay, number, is_enabled
+):
+    """5 to 13 m/s at the end, where what brakes in vain was taken for what drives."""
+    climb = Climb(offset=(0.0, 0.05, -2.3), truth=lambda it: replace(it, mass=mass))
+    climb.controller.enable(is_enabled)
+    climb.run(4.0, odometry=every(number, as_it_is), motors=Late(delay, climb.torques))
+    assert climb.fastest() < 1.3
+    assert climb.fastest(climb.time - 0.5) < 0.1
 
 
 @pytest.mark.parametrize(("planner", "number"), WAYS)

@@ -36,6 +36,17 @@ def test_a_seal_gives_way_once_who_is_not_driven_gets_faster(speeds, is_driven, 
     assert told(check, rising(0.0, 1.0), is_driven=True) == gives_way  # and stays so
 
 
+@pytest.mark.parametrize(("goes_down", "slows", "found"), [(1, 0, 1), (1, 1, 0), (0, 0, 0)])
+def test_who_goes_down_faster_whenever_it_is_left_is_not_held(goes_down, slows, found):
+    """Though a torque that should brake it comes again and again; a seal that holds slows it."""
+    check, speed = SealCheck(), 0.1
+    for _ in range(6):
+        for driven in [True] * 5 + [False] * 30:
+            speed += PERIOD * (0.5 if driven else (-0.4 if slows else 1.0))
+            check.add(driven, speed, PERIOD, bool(goes_down))
+    assert check.gives_way == found
+
+
 def test_a_torque_now_and_then_begins_the_wait_anew():
     check = SealCheck()
     for _ in range(10):
