@@ -299,14 +299,15 @@ class ControlLaw:
         return force + friction * direction, moment, v_1, 0.0
 
     def braking(self, situation: ControlInput, braking: Braking) -> Torques:
-        """Torques that carry the weight and what else pushes forwards, and brake what moves."""
+        """Torques that carry the weight and what else pushes or turns, and brake what moves."""
         climber, motion = self.climber, situation.motion
         weight = braking.carries * self.weight(motion)
         shaken, shaken_yaw = braking.shaking
         force = weight + climber.driven_mass * (shaken - braking.drive * motion.speed)
         turning = shaken_yaw / climber.half_track - braking.yaw * motion.yaw_rate
-        force -= situation.disturbance.force
-        return self.torques(force, climber.driven_inertia * turning, situation)
+        push, turn = situation.disturbance
+        moment = climber.driven_inertia * turning - turn
+        return self.torques(force - push, moment, situation)
 
     def torques(self, force: Any, moment: Any, situation: ControlInput) -> Torques:
         """Those that give a force [N] and a moment [N m], or as much as limits leave of them."""

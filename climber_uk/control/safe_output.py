@@ -30,6 +30,7 @@ SHAKEN = 0.02  # [m/s] of a rim, above which it is
 SHAKING = 0.3  # [m/s²] to and fro: 1.5 cm/s
 HALF_SHAKE = SECOND // 10  # [ns]
 SHAKES = 2 * SECOND  # [ns] of it, at most
+NO_PUSH = Wrench(0.0, 0.0)
 REACHES = 0.1  # of the braking rate: that of the integral that carries what pushes it
 # modes of a climber with which nothing is wrong: what was learnt as it followed pushes it still
 STOPS = Mode.EMERGENCY_STOP, Mode.LOW_BATTERY, Mode.TETHER, Mode.NO_REFERENCE
@@ -85,7 +86,9 @@ class SafeOutput:
         self._seal = SealCheck()
         # the force that pushes it [N], None: of its weight more is not known; if that is learnt on
         self._push: float | None = None
-        self._learns, self._learnt = False, 0.0  # and what was learnt [N] while it was followed
+        self._learns, self._learnt = False, Wrench(0.0, 0.0)  # and what was, while it was followed
+        # [N m] the moment that turns it, and whether more of it is learnt on
+        self._turn, self._learns_turn = 0.0, False
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -116,14 +119,19 @@ class SafeOutput:
     def _learn_push(self, climber: Climber, observed: Observed) -> None:
         """Learn what pushes it: as it is followed, then as the integral of the speed it has yet."""
         if self._begins:
-            self._learnt = observed.disturbance.force
+            self._learnt = observed.disturbance
             return
+        rate = REACHES * self.safety.braking_rate**2 * observed.time
+        most = 2 * climber.max_wheel_torque / climber.wheel_radius
         if self.polarities.is_wrong:
-            self._push = None
-        elif self._push is not None and self._learns:
-            rate = REACHES * self.safety.braking_rate**2 * climber.driven_mass * observed.time
-            most = 2 * climber.max_wheel_torque / climber.wheel_radius
-            self._push = clipped(self._push + rate * observed.after.speed, -most, most)
+            self._push, self._turn, self._learns_turn = None, 0.0, False
+            return
+        if self._push is not None and self._learns:
+            pushed = self._push + rate * climber.driven_mass * observed.after.speed
+            self._push = clipped(pushed, -most, most)
+        if self._learns_turn:
+            turned = self._turn + rate * climber.driven_inertia * observed.after.yaw_rate
+            self._turn = clipped(turned, -most * climber.half_track, most * climber.half_track)
 
     def send(
         self, mode: Mode, stamp: int, age: float, estimator: Estimator, law: ControlLaw
@@ -137,13 +145,14 @@ class SafeOutput:
             return self._coast(mode, estimator, law, age)  # it comes again, and may be old
         rim = abs(motion.speed) + climber.half_track * abs(motion.yaw_rate)
         if self._begins:
-            is_known = falls and (mode in SOUND or self._answers(mode))
-            self._push = self._learnt if is_known else None
-            self.polarities.forget_wheels()
+            self._carry_on(mode, falls)
         if self._lets_go(mode, stamp, falls):
             return _let_go(estimator, age)
         sinks = falls and law.weight(motion) * motion.speed <= 0  # what rises is carried too much
-        answers = sinks and self._answers(mode)
+        turns = rim > 2 * max(abs(motion.speed), SHAKEN)
+        steers = turns and self._answers(mode, of_turn=True)
+        answers = steers or (sinks and self._answers(mode))
+        self._learns_turn = self._learns_turn or steers
         if stamp < self._coasts_until and not answers:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
                 self._is_carried = False
@@ -151,9 +160,9 @@ class SafeOutput:
                 self._coasts_from = rim
             return self._coast(mode, estimator, law, age)
         is_pushed = self._is_pushed(stamp, rim, falls)
-        if is_pushed and answers:
+        if is_pushed and answers and sinks:
             self._push, self._learns = self._push or 0.0, mode not in SOUND
-        elif is_pushed:
+        elif is_pushed and not answers:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
             self._gently *= GENTLER
             self._coasts_from, self._way = rim, 1  # a push looks like motors the wrong way round
@@ -163,6 +172,14 @@ class SafeOutput:
         except (ValueError, ArithmeticError):
             estimator.reset()  # finite odometry gave an absurd state
         return _let_go(estimator, age)
+
+    def _carry_on(self, mode: Mode, falls: bool) -> None:
+        """Carry what was learnt to push and to turn it, where that may be believed."""
+        answers = self._answers(mode)
+        is_known = falls and (mode in SOUND or answers)
+        self._push = self._learnt.force if is_known else None
+        self._turn = self._learnt.moment if answers else 0.0
+        self.polarities.forget_wheels()
 
     def _weigh(self, law: ControlLaw, motion: Motion) -> None:
         """Carry half of the weight if it is driven upwards by that; else twice as much again."""
@@ -193,12 +210,16 @@ class SafeOutput:
         braking = self._braking(mode, law, believed, signs, since)
         if since is not None:
             return _brake(estimator, law, age, braking, believed)
-        return _brake(estimator, law, age, braking, None, self._push or 0.0)
+        return _brake(estimator, law, age, braking, None, Wrench(self._push or 0.0, self._turn))
 
-    def _answers(self, mode: Mode) -> bool:
-        """Whether torques surely do what they should, as odometry tells that may be believed."""
+    def _answers(self, mode: Mode, of_turn: bool = False) -> bool:
+        """Whether torques surely do what they should, as odometry tells that may be believed.
+
+        Those of both wheels, or of the turn alone.
+        """
         is_doubtful = mode is Mode.LATE or mode.doubts_odometry
-        return self.polarities.are_right and not is_doubtful
+        is_right = self.polarities.are_right or (of_turn and self.polarities.yaw.sign > 0)
+        return is_right and not is_doubtful
 
     def _is_pushed(self, stamp: int, rim: float, falls: bool) -> bool:
         """Whether a rim's speed [m/s] has grown, though it has been braked for a while.
@@ -308,14 +329,14 @@ def _brake(
     age: float,
     braking: Braking,
     believed: Motion | None,
-    push: float = 0.0,
+    push: Wrench = NO_PUSH,
 ) -> Torques:
     """Torques that carry the weight and brake; raises `ValueError` if they are not finite.
 
-    A `push` [N] is carried as well; `believed` has the speeds that are braked, if not those of the
+    A `push` is carried as well; `believed` has the speeds that are braked, if not those of the
     estimator.
     """
-    ahead = estimator.ahead(age)._replace(disturbance=Wrench(push, 0.0))
+    ahead = estimator.ahead(age)._replace(disturbance=push)
     if believed is not None:
         speeds = {"speed": believed.speed, "yaw_rate": believed.yaw_rate}
         ahead = ahead._replace(motion=ahead.motion._replace(**speeds))

@@ -1,10 +1,14 @@
 """Parts of the safe output; what it does to a climber is in test_guard.py and test_polarity.py."""
 
+import numpy as np
 import pytest
+from climbs import Climb
+from test_delay_check import Late
 
 from climber_uk.control.safe_output import FALLS, LATEST, SealCheck
 
 PERIOD = 0.01  # [s]
+soak = pytest.mark.soak
 
 
 def told(check, speeds, is_driven=False):
@@ -52,3 +56,19 @@ def test_a_torque_now_and_then_begins_the_wait_anew():
     for _ in range(10):
         assert not told(check, rising(1.0, 0.9 * LATEST))
         assert not told(check, [1.05], is_driven=True)
+
+
+@pytest.mark.parametrize(
+    ("moment", "delay"),
+    [(1.0, 0.0), (3.0, 0.02), *(pytest.param(*it, marks=soak) for it in ((1.0, 0.1), (3.0, 0.1)))],
+)
+@pytest.mark.parametrize("is_known", [True, False])
+def test_what_turns_it_steadily_turns_it_no_more_once_it_is_disabled(moment, delay, is_known):
+    """As a centre of mass beside the axle, or a cable: .6 rad/s, and 54 for 3 N m 20 ms late."""
+    climb, pushed = Climb(), np.array([0.0, 0.0, moment])
+    late = Late(delay, climb.torques)
+    climb.run(2.0, motors=late, push=pushed * is_known)
+    climb.controller.enable(False)
+    climb.run(5.0, motors=late, push=pushed)
+    assert climb.fastest_turn(2.0) < 3.4 or is_known
+    assert climb.fastest_turn(climb.time - 0.5) < 0.3
