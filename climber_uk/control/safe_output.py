@@ -20,8 +20,8 @@ GENTLER, CALM = 0.5, SECOND  # times as fast it is braked after that, for [ns] w
 COASTING = 0.3  # [s] for which it is left alone then, as that may be the safe output itself
 NOTHING = 0.05  # of the weight: a drive that is let go
 FALLS = 0.1  # [m/s] by which it may get faster without a torque, if its seal holds it
-SINKS = 0.3  # [m/s] the same, downwards, each time it is left for `SOON`
-SOON = 0.15  # [s] after the last torque: the late ones of who goes down brake it still
+SINKS = 0.3  # [m/s] likewise downwards, in all the times that it is left for longer than
+SOON = 0.15  # [s]: late torques of who goes down brake it still
 LATEST = 0.6  # [s] that a torque may act after it was sent: none acts this long after the last
 LESS = 0.5  # times as much of the weight is carried, where what carries it drives it
 LETS_GO = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
@@ -84,11 +84,11 @@ class SafeOutput:
         self._gently = 1.0  # share of its rate that it brakes with, less each time it is pushed
         self._begins, self._left_until = True, 0  # with the next torques; [ns]
         self._seal = SealCheck()
-        # the force that pushes it [N], None: of its weight more is not known; if that is learnt on
+        # what was learnt to push and turn it, as it was followed; of that, what is carried on, [N]
+        # (None: no more than its weight is known) and [N m], and whether more of it is learnt
+        self._learnt = NO_PUSH
         self._push: float | None = None
-        self._learns, self._learnt = False, Wrench(0.0, 0.0)  # and what was, while it was followed
-        # [N m] the moment that turns it, and whether more of it is learnt on
-        self._turn, self._learns_turn = 0.0, False
+        self._turn, self._learns, self._learns_turn = 0.0, False, False
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -117,7 +117,7 @@ class SafeOutput:
             self.by_pose.restart()
 
     def _learn_push(self, climber: Climber, observed: Observed) -> None:
-        """Learn what pushes it: as it is followed, then as the integral of the speed it has yet."""
+        """Learn what pushes and turns it: as it is followed, then by the speeds that it has yet."""
         if self._begins:
             self._learnt = observed.disturbance
             return
@@ -148,11 +148,10 @@ class SafeOutput:
             self._carry_on(mode, falls)
         if self._lets_go(mode, stamp, falls):
             return _let_go(estimator, age)
-        sinks = falls and law.weight(motion) * motion.speed <= 0  # what rises is carried too much
-        turns = rim > 2 * max(abs(motion.speed), SHAKEN)
-        steers = turns and self._answers(mode, of_turn=True)
-        answers = steers or (sinks and self._answers(mode))
-        self._learns_turn = self._learns_turn or steers
+        # what goes down, not up, where too much is carried, or turns, though its torques are right
+        sinks = falls and law.weight(motion) * motion.speed <= 0 and self._answers(mode)
+        turns = rim > 2 * max(abs(motion.speed), SHAKEN) and self._answers(mode, of_turn=True)
+        self._learns_turn, answers = self._learns_turn or turns, sinks or turns
         if stamp < self._coasts_until and not answers:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
                 self._is_carried = False
@@ -160,7 +159,7 @@ class SafeOutput:
                 self._coasts_from = rim
             return self._coast(mode, estimator, law, age)
         is_pushed = self._is_pushed(stamp, rim, falls)
-        if is_pushed and answers and sinks:
+        if is_pushed and sinks:
             self._push, self._learns = self._push or 0.0, mode not in SOUND
         elif is_pushed and not answers:
             self._coasts_until, self._braked = stamp + round(COASTING * SECOND), None
