@@ -35,6 +35,7 @@ REACHES = 0.1  # of the braking rate: that of the integral that carries what pus
 # modes of a climber with which nothing is wrong: what was learnt as it followed pushes it still
 STOPS = Mode.EMERGENCY_STOP, Mode.LOW_BATTERY, Mode.TETHER, Mode.NO_REFERENCE
 SOUND = NO_FAULTS.union(STOPS)
+TURNED = SOUND | {Mode.TOO_FAST}  # in which something else than a faulty wheel may turn it
 
 
 class SealCheck:
@@ -150,7 +151,7 @@ class SafeOutput:
             return _let_go(estimator, age)
         # what goes down, not up, where too much is carried, or turns, though its torques are right
         sinks = falls and law.weight(motion) * motion.speed <= 0 and self._answers(mode)
-        turns = rim > 2 * max(abs(motion.speed), SHAKEN) and self._answers(mode, of_turn=True)
+        turns = rim > 2 * max(abs(motion.speed), SHAKEN) and self._is_turned(mode)
         self._learns_turn, answers = self._learns_turn or turns, sinks or turns
         if stamp < self._coasts_until and not answers:
             if rim > self._coasts_from + PUSHED:  # motors that are not as believed, perhaps
@@ -177,7 +178,7 @@ class SafeOutput:
         answers = self._answers(mode)
         is_known = falls and (mode in SOUND or answers)
         self._push = self._learnt.force if is_known else None
-        self._turn = self._learnt.moment if answers else 0.0
+        self._turn = self._learnt.moment if answers and mode in TURNED else 0.0
         self.polarities.forget_wheels()
 
     def _weigh(self, law: ControlLaw, motion: Motion) -> None:
@@ -211,14 +212,15 @@ class SafeOutput:
             return _brake(estimator, law, age, braking, believed)
         return _brake(estimator, law, age, braking, None, Wrench(self._push or 0.0, self._turn))
 
-    def _answers(self, mode: Mode, of_turn: bool = False) -> bool:
-        """Whether torques surely do what they should, as odometry tells that may be believed.
-
-        Those of both wheels, or of the turn alone.
-        """
+    def _answers(self, mode: Mode) -> bool:
+        """Whether torques surely do what they should, as odometry tells that may be believed."""
         is_doubtful = mode is Mode.LATE or mode.doubts_odometry
-        is_right = self.polarities.are_right or (of_turn and self.polarities.yaw.sign > 0)
-        return is_right and not is_doubtful
+        return self.polarities.are_right and not is_doubtful
+
+    def _is_turned(self, mode: Mode) -> bool:
+        """Whether a turn that follows its torques, or both wheels do, has another cause."""
+        is_right = self.polarities.are_right or self.polarities.yaw.sign > 0
+        return is_right and mode in TURNED
 
     def _is_pushed(self, stamp: int, rim: float, falls: bool) -> bool:
         """Whether a rim's speed [m/s] has grown, though it has been braked for a while.
