@@ -85,11 +85,11 @@ class SafeOutput:
         self._gently = 1.0  # share of its rate that it brakes with, less each time it is pushed
         self._begins, self._left_until = True, 0  # with the next torques; [ns]
         self._seal = SealCheck()
-        # what was learnt to push and turn it, as it was followed; of that, what is carried on, [N]
-        # (None: no more than its weight is known) and [N m], and whether more of it is learnt
-        self._learnt = NO_PUSH
+        # [N] what was learnt to push it as it was followed, and what is carried of that (None: no
+        # more than its weight is known); [N m] what turns it; and whether more of both is learnt
+        self._learnt = self._turn = 0.0
         self._push: float | None = None
-        self._turn, self._learns, self._learns_turn = 0.0, False, False
+        self._learns = self._learns_turn = False
 
     def watch(self, climber: Climber, observed: Observed | None, motion: Motion) -> None:
         """Take what an odometry tells, for modes that doubt it; None: it has jumped to `motion`."""
@@ -118,9 +118,9 @@ class SafeOutput:
             self.by_pose.restart()
 
     def _learn_push(self, climber: Climber, observed: Observed) -> None:
-        """Learn what pushes and turns it: as it is followed, then by the speeds that it has yet."""
+        """Learn what pushes it: as it is followed, then, and what turns it, by its speeds yet."""
         if self._begins:
-            self._learnt = observed.disturbance
+            self._learnt = observed.disturbance.force
             return
         rate = REACHES * self.safety.braking_rate**2 * observed.time
         most = 2 * climber.max_wheel_torque / climber.wheel_radius
@@ -174,11 +174,9 @@ class SafeOutput:
         return _let_go(estimator, age)
 
     def _carry_on(self, mode: Mode, falls: bool) -> None:
-        """Carry what was learnt to push and to turn it, where that may be believed."""
-        answers = self._answers(mode)
-        is_known = falls and (mode in SOUND or answers)
-        self._push = self._learnt.force if is_known else None
-        self._turn = self._learnt.moment if answers and mode in TURNED else 0.0
+        """Carry what was learnt to push it, where that may be believed; not what resisted turns."""
+        is_known = falls and (mode in SOUND or self._answers(mode))
+        self._push = self._learnt if is_known else None
         self.polarities.forget_wheels()
 
     def _weigh(self, law: ControlLaw, motion: Motion) -> None:
