@@ -7,7 +7,7 @@ from climber_uk.bags.bag import open_bag
 from climber_uk.bags.collecting import collect
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.run_reader import NoRunError, Parameters, RunReader
-from climber_uk.bags.topics import HOW, TYPES, Topics
+from climber_uk.bags.topics import REMAP_HINT, TYPES, Topics
 from climber_uk.messages import topics
 
 
@@ -49,6 +49,6 @@ def read_runs(
         if not runs:
             if not collected:
                 name = names.remapped.get(topics.ODOMETRY, topics.ODOMETRY)
-                bag.lose(f"no odometry: {bag.lacks(name, TYPES[topics.ODOMETRY], HOW)}")
+                bag.lose(f"no odometry: {bag.lacks(name, TYPES[topics.ODOMETRY], REMAP_HINT)}")
             raise ValueError(f"{path}: {'; '.join(bag.losses)}")
         return runs, bag.losses

@@ -20,7 +20,7 @@ from climber_uk.bags.joints import Joints, commanded_torques, rates_and_torques
 from climber_uk.bags.reference import poses_at
 from climber_uk.bags.run import RecordedRun
 from climber_uk.bags.time_series import TimeSeries
-from climber_uk.bags.topics import HOW, KNOWN, TYPES, Topics
+from climber_uk.bags.topics import KNOWN, REMAP_HINT, TYPES, Topics
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.mechanics.climber import Climber
@@ -65,7 +65,9 @@ class RunReader:
     def runs(self, collected: Collected, reported: Collection[Event]) -> list[RecordedRun]:
         """All runs, with those of the `reported` events that are theirs; raises `NoRunError`."""
         if not collected.samples[topics.ODOMETRY]:
-            lacking = self.bag.lacks(self.topic(topics.ODOMETRY), TYPES[topics.ODOMETRY], HOW)
+            lacking = self.bag.lacks(
+                self.topic(topics.ODOMETRY), TYPES[topics.ODOMETRY], REMAP_HINT
+            )
             raise NoRunError(f"no odometry: {lacking}")
         if collected.lost_previews:
             topic = self.topic(topics.REFERENCE)
@@ -210,7 +212,7 @@ class RunReader:
         there = [topic for topic, of in types.items() if of == kind and topic.endswith(own)]
         climbers = [topic.removesuffix(own) for topic in there]
         if any(self.names.full(topics.ODOMETRY, climber) not in types for climber in climbers):
-            how = HOW.replace(topics.ODOMETRY, topics.REFERENCE)
+            how = REMAP_HINT.replace(topics.ODOMETRY, topics.REFERENCE)
             self.bag.lose(self.bag.lacks(self.topic(topics.REFERENCE), kind, how))
 
     def series(self, collected: Collected, name: str) -> TimeSeries:

@@ -18,7 +18,7 @@ TYPES = {
     topics.PRESSURE: "sensor_msgs/msg/FluidPressure",
     topics.CLOCK: "rosgraph_msgs/msg/Clock",
 }  # of those that are read message by message
-HOW = f"--remap {ODOMETRY}:=TOPIC"
+REMAP_HINT = f"--remap {ODOMETRY}:=TOPIC"
 KNOWN = {*NAMES, topics.DIAGNOSTICS, topics.LOG}
 MOST_CLIMBERS = 100  # that are read, unless they are chosen by namespace
 

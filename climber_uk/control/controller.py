@@ -327,7 +327,7 @@ class Controller:
             return None
         expected = self.active.expected(self._stamp, target, self._law.constraints)
         margin = self.guard.options.speed_margin
-        if abs(self._twist.aside) > expected.allowed.speed + margin > expected.allowed.speed:
+        if margin > 0 and abs(self._twist.aside) > expected.allowed.speed + margin:
             least = FAST_SIDEWAYS * self.safety.max_twist_error
             if sideways := self._twist.sideways_of_late(least):
                 return Mode.HEADING_WRONG, sideways

@@ -49,7 +49,7 @@ class SealCheck:
         self._left_for, self._slowest = 0.0, math.inf  # [s] without a torque, [m/s] since then
         self._last = self._sunk = 0.0  # [m/s], and by how much it got faster downwards
 
-    def add(self, is_driven: bool, speed: float, time: float, goes_down: bool = False) -> None:
+    def add(self, is_driven: bool, speed: float, time: float, *, goes_down: bool) -> None:
         """Take a speed [m/s], after a `time` [s] in which torques drove it or not."""
         self._left_for = 0.0 if is_driven else self._left_for + time
         self._slowest = min(self._slowest, speed) if self._left_for > LATEST else math.inf
@@ -102,9 +102,10 @@ class SafeOutput:
             self._is_driven = is_against and gained > GRAVITY * observed.time
             if not self._begins:
                 is_driven = abs(force) >= NOTHING * climber.mass * GRAVITY
-                after = observed.after
-                goes_down = after.sine * after.speed < 0
-                self._seal.add(is_driven, abs(after.speed), observed.time, goes_down)
+                after, (*_, weight) = observed.after, climber.inertial
+                downhill = observed.pull - weight * after.sine  # [N] forwards
+                goes_down = downhill * after.speed > 0
+                self._seal.add(is_driven, abs(after.speed), observed.time, goes_down=goes_down)
             self.polarities.add(climber, observed)
             self.by_pose.add(climber, observed)
             self._learn_push(climber, observed)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from climber_uk.bags.run_reader import NoRunError, RunReader
-from climber_uk.bags.topics import HOW, TYPES, Topics
+from climber_uk.bags.topics import REMAP_HINT, TYPES, Topics
 from climber_uk.mechanics import SECOND, Array, Stamps
 from climber_uk.messages.topics import ODOMETRY, REFERENCE, TRUTH
 from climber_uk.report.outputs import add_remap, failing_in_a_line, output, parser_for_bag
@@ -30,7 +30,7 @@ def read_poses(
     reader, found = RunReader.read(bag, names, namespace)
     topic = reader.topic(ODOMETRY)
     if not found.samples[ODOMETRY]:
-        lacking = reader.bag.lacks(topic, TYPES[ODOMETRY], HOW)
+        lacking = reader.bag.lacks(topic, TYPES[ODOMETRY], REMAP_HINT)
         raise ValueError("; ".join([f"{bag} has {lacking}", *reader.bag.losses]))
     runs = []
     for part in reader.split(found):

@@ -14,7 +14,7 @@ soak = pytest.mark.soak
 def told(check, speeds, is_driven=False):
     """Whether the seal gives way, after speeds [m/s] one period apart."""
     for speed in speeds:
-        check.add(is_driven, speed, PERIOD)
+        check.add(is_driven, speed, PERIOD, goes_down=False)
     return check.gives_way
 
 
@@ -47,7 +47,7 @@ def test_who_goes_down_faster_whenever_it_is_left_is_not_held(goes_down, slows, 
     for _ in range(6):
         for driven in [True] * 5 + [False] * 30:
             speed += PERIOD * (0.5 if driven else (-0.4 if slows else 1.0))
-            check.add(driven, speed, PERIOD, bool(goes_down))
+            check.add(driven, speed, PERIOD, goes_down=bool(goes_down))
     assert check.gives_way == found
 
 
