@@ -401,8 +401,9 @@ def main() -> None:
         while not end.is_set():
             executor.spin_once(timeout_sec=0.1)
     finally:
-        driver.stop()
+        driver.let_go()
         signal.alarm(5)  # [s] then the kernel ends it: now and then Fast DDS never comes back
+        driver.stop()  # its thread may be publishing
         driver.destroy_node()
         rclpy.shutdown()
         signal.alarm(0)
