@@ -195,9 +195,10 @@ class ActiveReference:
     def strayed(self, motion: Motion, target: ReferencePoint) -> tuple[Mode, str] | None:
         """Mode and detail if a climber is too far from its `target`, else None."""
         distance = math.hypot(motion.x - target.x, motion.y - target.y)
-        if distance <= STRAYED * self.options.max_distance:
+        most = STRAYED * self.options.max_distance
+        if distance <= most:
             return None
-        return Mode.OFF_PATH, f"{distance:.2f} m from it"
+        return Mode.OFF_PATH, f"{distance:.2f} m from it, at most {most:.2f} m"
 
     # Where it is to be next
 

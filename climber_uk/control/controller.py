@@ -102,7 +102,7 @@ class Controller:
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
         self._enabled = True
         self._clockless_looks = 0  # in a row, of `look`: see `CLOCK_PATIENCE`
-        self._heard: int | None = None  # [ns] time of the last odometry, good or bad
+        self._heard: int | None = None  # [ns] when the last odometry told of, or came if bad
         self._trouble: Trouble | None = None  # with that odometry
         self._stamp = 0  # [ns] of the last good one
         self._now = 0  # [ns] of the last look at the clock
@@ -155,6 +155,7 @@ class Controller:
         self._enabled = enabled
         if enabled:
             self.guard.fault = None
+            self.guard.forgive()
             self._watch_anew()
             self.stops.enable()
             self._forget_when()
@@ -191,7 +192,7 @@ class Controller:
         self._repeats.add(stamp, motion, self._law.climber.half_track)
         if older := self._repeats.older:
             return self.on_bad_odometry(now, f"it is back where it was {older:.2f} s ago")
-        self._heard = stamp
+        self._heard = min(stamp, now or stamp)  # a clock that is ahead makes no news
         if now > 0:
             self.ages.add(now, off)
         if stamp != self._stamp:
@@ -241,10 +242,11 @@ class Controller:
         self.estimator.restart()
         if back > CLOCK_STEP:
             self.active.preview = None
+            if not self.guard.is_for_good:  # what only ~/enable ends is ended by no clock
+                self.guard.forgive()
 
     def _forget_when(self) -> None:
-        """Forget when what was: it counts no more, or times of before mean nothing."""
-        self.guard.forgive()
+        """Forget when what was: times of before mean nothing."""
         self._safe_output.forget()
         self._calm = Calm()
 
@@ -351,9 +353,9 @@ class Controller:
         mode, detail = self._calm.mode(self.mode, max(now, self._stamp), current)
         command = None
         if mode in (FOLLOWING, Mode.NO_REFERENCE):
-            is_followed, why, command = self._follow(age)
-            if is_followed is not WAITING or mode is FOLLOWING:
-                mode, detail = is_followed, why
+            found, why, command = self._follow(age)
+            if found is not WAITING or mode is FOLLOWING:
+                mode, detail = found, why
         if mode in (WAITING, Mode.NO_REFERENCE):
             self._waiting_since = self._waiting_since or self._stamp
         else:
@@ -386,7 +388,7 @@ class Controller:
         if self._heard is None:
             return Mode.WAITING, ""
         silent, patience = (now - self._heard) / SECOND, PATIENCE * self.estimator.period
-        is_silent = silent - self.ages.least > max(LONGEST_STEP, patience)
+        is_silent = silent - max(self.ages.least, 0.0) > max(LONGEST_STEP, patience)
         if silent > self.safety.odometry_timeout or is_silent:
             return Mode.NO_ODOMETRY, ""
         if self._stamp < self._resumes:  # what comes may be as old as it was silent
@@ -400,7 +402,7 @@ class Controller:
         safety, pressure = self.safety, self._law.climber.suction_pressure
         period = self.estimator.period
         if pressure < safety.least_pressure:
-            return Mode.LOW_PRESSURE, f"{pressure:.0f} Pa"
+            return Mode.LOW_PRESSURE, f"{pressure:.0f} Pa of {safety.least_pressure:.0f}"
         if period > SELDOM * safety.odometry_timeout:
             return Mode.SELDOM, f"every {period:.2f} s for a timeout of {safety.odometry_timeout} s"
         return None
@@ -441,8 +443,8 @@ class Controller:
             pending = estimator.pending(ahead.begins)
             command = self.guard.budget.within(command, law, ahead, pending)
             if active.way is not None:
-                most = active.options.approach_yaw_rate
-                command = self.guard.budget.gently(command, law, ahead, most)
+                most = active.options.approach_speed, active.options.approach_yaw_rate
+                command = self.guard.budget.gently(command, law, ahead, *most)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None

@@ -15,7 +15,7 @@ from climber_uk.control.model import SLOW
 from climber_uk.control.observed import Acting, Observed
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.elementary import wrapped
+from climber_uk.mechanics.elementary import clipped, wrapped
 from climber_uk.mechanics.quantities import Torques, Wrench
 
 FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
@@ -37,9 +37,24 @@ MEMORY = 0.1  # [s] in which friction is learnt
 CREEPS = 1e-3  # [m/s] of a motion that pose and twist tell alike, from which on it is one
 KNOWN = 0.2  # [s] of sliding, after which it is known
 MOST_FRICTION = 2.0  # times that of the model
-GENTLE = 4.0  # [1/s] by which a turn on the way to the reference changes its rate, of the fastest
-TRIES = 90.0  # [rad/s³] by which its moment grows beyond that: fast enough for what scrubs
+# On the way to the reference speed and yaw rate may change by so much [1/s] of the fastest; beyond
+# that the push [m/s³] and the moment [rad/s³] grow: fast enough for what scrubs
+GENTLE = 4.0
+GROWS_BY, TURN_GROWS_BY = 10.0, 90.0
 BREAKS_LOOSE = 1.2  # times what a turn meets, until it begins
+
+
+class Lasting:
+    """What lasts of something that may swing."""
+
+    def __init__(self) -> None:
+        self.value = 0.0
+
+    def within(self, asked: float, most: float, change: float) -> float:
+        """What is asked for, at `most` so far from what lasts; that goes after it by `change`."""
+        given = clipped(asked, self.value - most, self.value + most)
+        self.value += clipped(asked - self.value, -change, change)
+        return given
 
 
 class ForceBudget:
@@ -58,7 +73,8 @@ class ForceBudget:
         self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
         # [N m] that is turned against, of late, and what a turn is known to meet
         self._resisted = self._scrubs = 0.0
-        self._lasts = 0.0  # [N m] by which it is turned on its way to the reference
+        # [N] and [N m] by which it is pushed and turned on its way to the reference
+        self._push, self._turn = Lasting(), Lasting()
 
     def pause(self) -> None:
         """Watch nothing for now: it need not move."""
@@ -101,7 +117,7 @@ class ForceBudget:
         before, after, time = observed.before, observed.after, observed.time
         is_told = after[:3] != before[:3]
         self._turns = is_told and abs(climber.half_track * after.yaw_rate) >= SLOW
-        if not (self._turns or (is_told and _is_fast(observed))):
+        if not is_told or max(abs(after.speed), abs(climber.half_track * after.yaw_rate)) < SLOW:
             return
         _, moment = climber.wrench(*observed.torques)
         moment -= climber.driven_inertia * (after.yaw_rate - before.yaw_rate) / time
@@ -191,6 +207,11 @@ class ForceBudget:
         return self.paused is None and (lives or self._creeps)
 
     @property
+    def _is_on_trust(self) -> bool:
+        """Whether torques are given while no motion is told."""
+        return self._rests and not self._is_told
+
+    @property
     def unanswered(self) -> Trouble | None:
         """Trouble if odometry stands exactly, whatever was pushed."""
         if self.pushes < TRIED or self._lives:
@@ -211,7 +232,7 @@ class ForceBudget:
         What may change of it within a period is found anew: a moment that is not given would leave
         nothing of that for the drive.
         """
-        if law.falls or not self._rests or self._is_told:
+        if law.falls or not self._is_on_trust:
             return command
         climber, weight, period = law.climber, law.weight(command.motion), ahead.period
         force, moment = (
@@ -242,25 +263,28 @@ class ForceBudget:
         return command._replace(wheels=wheels, lost=lost)
 
     def gently(
-        self, command: Command, law: ControlLaw, ahead: ControlInput, yaw_rate: float
+        self, command: Command, law: ControlLaw, ahead: ControlInput, speed: float, yaw_rate: float
     ) -> Command:
-        """A command on the way to the reference, which turns by a `yaw_rate` [rad/s] at most.
+        """A command on the way to the reference, at a `speed` [m/s] and a `yaw_rate` [rad/s].
 
-        How late torques act may not be known yet, and a turn on the spot meets next to nothing: a
-        moment that swings is bounded, and one that lasts is given all the same.
+        How late torques act may not be known yet: a push or a moment that swings is bounded, and
+        what lasts of it is given all the same.
         """
+        climber, weight, time = law.climber, law.weight(command.motion), ahead.period
         force, moment = (
             asked - lost for asked, lost in zip(command.demanded, command.lost, strict=True)
         )
-        inertia = law.climber.driven_inertia
+        mass, inertia, push = climber.driven_mass, climber.driven_inertia, force - weight
+        most = mass * GENTLE * speed + self._holds(climber)
+        given = self._push.within(push, most, mass * GROWS_BY * time)
+        if law.falls or self._is_on_trust:  # `within` has bounded it
+            given = push
         most = inertia * GENTLE * yaw_rate + BREAKS_LOOSE * self._scrubs
-        given = min(max(moment, self._lasts - most), self._lasts + most)
-        change = inertia * TRIES * ahead.period
-        self._lasts += min(max(moment - self._lasts, -change), change)
-        if given == moment:
+        turned = self._turn.within(moment, most, inertia * TURN_GROWS_BY * time)
+        if (given, turned) == (push, moment):
             return command
-        lost = Wrench(command.lost.force, command.lost.moment + moment - given)
-        return command._replace(wheels=law.torques(force, given, ahead), lost=lost)
+        lost = Wrench(command.lost.force + push - given, command.lost.moment + moment - turned)
+        return command._replace(wheels=law.torques(weight + given, turned, ahead), lost=lost)
 
     def _stronger(self, climber: Climber, push: float) -> float:
         """A push [N] with at least the force of its number; see `MORE`.
@@ -275,10 +299,10 @@ class ForceBudget:
 
     def _turning(self, climber: Climber, moment: float, period: float) -> float:
         """A moment [N m], or what of it is given while no turn is told: none in a pause."""
-        if self.paused is not None:
-            return 0.0
         if self._turns:  # as it is told
             return moment
+        if self.paused is not None:
+            return 0.0
         holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
         lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
         return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from climber_uk.control.actuator_check import NEITHER, ActuatorCheck
 from climber_uk.control.force_budget import ForceBudget
-from climber_uk.control.model import DisturbanceEstimate
 from climber_uk.control.observed import Observed
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics import SECOND
@@ -28,7 +27,7 @@ STRONG = 0.6  # of the largest torque, which has to move a climber that stands
 SWINGS = 5.0  # from one strong torque of a wheel to the opposite one, of late: a limit cycle
 MEMORY = 0.4  # [s] of them, and of strong torques that move nothing
 STANDS = 0.1  # of the reference's fastest motion: a climber below it stands
-LETS_GO = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
+BREAKS_FOR = 0.15  # [s] from a torque's answer, in which friction that let go may have it faster
 REACTION = 0.06  # [s] in which a torque can answer, at most
 UNKNOWN_DELAY = 0.012  # [s] that torques may act later than the estimator knows
 PROOF_IF_TOO_FAST = 0.4  # of that of a dead wheel is enough where it is too fast as well
@@ -206,7 +205,7 @@ class Guard:
         rests = abs(after) < MOVES or before * after < 0
         self._since_rest = 0.0 if rests else self._since_rest + observed.time
         answered = min(observed.reaction, REACTION) + UNKNOWN_DELAY
-        if self._since_rest > LETS_GO + answered or self._followed < self.options.memory:
+        if self._since_rest > BREAKS_FOR + answered or self._followed < self.options.memory:
             return 0.0
         return climber.seal_friction / climber.driven_mass * answered
 
@@ -244,7 +243,7 @@ class Guard:
         self._stalled = kept * self._stalled + effort * observed.time
         if not 0 < self.options.stall_time < self._stalled:
             return None
-        return Mode.STALLED, f"{largest:.2f} N m"
+        return Mode.STALLED, f"{largest:.2f} of {climber.max_wheel_torque:.2f} N m"
 
     def _watch_swings(
         self, climber: Climber, observed: Observed, torques: Torques
@@ -255,9 +254,7 @@ class Guard:
             return None
         return Mode.STALLED, f"to and fro, {max(map(abs, torques)):.2f} N m"
 
-    def _watch_disturbance(
-        self, climber: Climber, disturbance: Wrench | DisturbanceEstimate
-    ) -> Trouble | None:
+    def _watch_disturbance(self, climber: Climber, disturbance: Wrench) -> Trouble | None:
         weight, lever = climber.mass * GRAVITY, climber.half_track
         bound = self.options.max_disturbance
         force, moment = abs(disturbance.force), abs(disturbance.moment)

@@ -182,6 +182,19 @@ def test_a_clock_that_went_back_by_a_little_is_ridden_out(loop, back):
     assert loop.controller.active.position(loop.controller.stamp) == here + 2 * PERIOD
 
 
+@pytest.mark.parametrize("back", [1, MILLISECOND, SECOND // 10, SECOND, 3600 * SECOND])
+def test_what_only_enabling_ends_is_ended_by_no_clock_that_goes_back(loop, back):
+    loop.tell(times=3)
+    guard = loop.controller.guard
+    for _ in range(guard.options.attempts):
+        guard.count(loop.controller.stamp, (Mode.TOO_FAST, "9 m/s"))
+    loop.look(-back)
+    assert guard.is_for_good
+    loop.controller.enable(True)
+    assert not guard.is_for_good
+    assert not guard.faults
+
+
 def test_a_clock_that_was_set_back_holds_the_climber_as_before():
     loop = Loop(safe_output="hold")
     loop.plan()
@@ -202,6 +215,16 @@ def test_odometry_that_stops_with_a_clock_set_back_is_noticed(loop):
     loop.now -= 3600 * SECOND
     loop.look()
     assert loop.look(200 * MILLISECOND) is Mode.NO_ODOMETRY
+
+
+@pytest.mark.parametrize("ahead", [0, 50, 90])
+def test_odometry_that_stops_is_noticed_as_soon_though_its_clock_is_ahead(loop, ahead):
+    for _ in range(20):
+        loop.now += PERIOD
+        stamp = loop.now + ahead * MILLISECOND
+        loop.controller.on_odometry(loop.now, stamp, loop.state(stamp).motion)
+    assert loop.look(90 * MILLISECOND) is Mode.FOLLOWING
+    assert loop.look(20 * MILLISECOND) is Mode.NO_ODOMETRY  # after `odometry_timeout`
 
 
 def test_bad_odometry_is_safe_at_once(loop):
