@@ -117,6 +117,7 @@ class Graph:
 
     def close(self):
         if self.recorder:
+            print(f"recorder: {self.recorder.process.poll()}\n{self.recorder.log}")  # if it fails
             self.recorder.process.kill()
             self.recorder.process.wait()
         for node in (self.node, *self.others):
