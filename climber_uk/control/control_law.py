@@ -20,6 +20,7 @@ from climber_uk.mechanics import SECOND, Array, pack, unpack
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import clipped, everywhere, tanh
 from climber_uk.mechanics.quantities import (
+    NO_WRENCH,
     Bounds,
     DesiredAcceleration,
     Motion,
@@ -33,7 +34,6 @@ from climber_uk.mechanics.udwadia_kalaba import constraint_force
 from climber_uk.mechanics.wall import Wall, gravity, weight, weight_beyond
 from climber_uk.parameters.declaration import parameter, parameters
 
-NOTHING = Wrench(0.0, 0.0)
 CUT = 1e-9  # [N, N m] of a demand that limits have taken away
 CLEARLY = 8.0  # as many times `friction_speed` is a speed whose friction is overcome in full
 SLOPE = 0.8  # of friction's share by relative speed: steeper, and torques change faster
@@ -99,7 +99,7 @@ class Command(NamedTuple):
     wheels: Torques  # within the limits
     demanded: Wrench
     lateral: Any  # [N] reaction of the wheels
-    lost: Wrench  # drive and moment that limits took away; of many, `NOTHING` if none of any
+    lost: Wrench  # drive and moment that limits took away; of many, `NO_WRENCH` if none of any
     motion: Motion  # for which it is computed
     forward: Any  # acceleration [m/s²] along it that was asked for
     yaw_rate: Any = 0.0  # wanted [rad/s]
@@ -190,7 +190,7 @@ class ControlLaw:
                 force = force - forward_pull
             force, moment = force - r_F, moment - r_N
             drive, yaw_moment, tau_r, tau_l, fits = climber.saturate(force, moment, *bounds)
-            lost = NOTHING if fits else Wrench(force - drive, moment - yaw_moment)
+            lost = NO_WRENCH if fits else Wrench(force - drive, moment - yaw_moment)
             if near is not None:  # a change that is yet to come is not lost
                 drive, yaw_moment, tau_r, tau_l, _ = climber.saturate(drive, yaw_moment, *near)
         lateral = climber.lateral_reaction(predicted) - left_pull

@@ -34,7 +34,7 @@ from climber_uk.control.twist import FAST_SIDEWAYS, OPPOSED_IF_TOO_FAST, TwistCh
 from climber_uk.mechanics import SECOND, Array, pack
 from climber_uk.mechanics.adhesion import Adhesion, Suction
 from climber_uk.mechanics.preview import Preview
-from climber_uk.mechanics.quantities import Motion, Speeds, Torques
+from climber_uk.mechanics.quantities import NO_WRENCH, Motion, Speeds, Torques
 
 CLOCK_PATIENCE = 20  # looks at a clock that is not there
 CLOCK_STEP = round(0.2 * SECOND)  # [ns] back, from which time has started anew
@@ -440,15 +440,17 @@ class Controller:
                     target, lost / law.climber.driven_mass, target_time, ahead.period
                 )
                 command = law.command(ahead, target.point or point)
-            pending = estimator.pending(ahead.begins)
-            command = self.guard.budget.within(command, law, ahead, pending)
-            if active.way is not None:
+            budget, pending = self.guard.budget, estimator.pending(ahead.begins)
+            command = budget.within(command, law, ahead, pending)
+            if active.way is None:
+                budget.lasts = NO_WRENCH
+            else:
                 most = active.options.approach_speed, active.options.approach_yaw_rate
-                command = self.guard.budget.gently(command, law, ahead, *most)
+                command = budget.gently(command, law, ahead, *most)
             check_finite(command.wheels)
         except (ValueError, ArithmeticError) as error:
             return Mode.NO_SOLUTION, str(error), None
-        if self.guard.budget.paused is not None:
+        if budget.paused is not None:
             active.wait(target)
         else:
             active.go_on(target)

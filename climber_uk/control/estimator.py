@@ -39,7 +39,7 @@ from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.mechanics.wall import Wall, weight_beyond
 
 LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
-LATEST = round(LONGEST_DELAY * SECOND)  # [ns]
+KEPT_LONGER = round(LONGEST_DELAY * SECOND)  # [ns]
 PERIOD_SMOOTHING = 0.1  # share of a new period in the mean
 
 
@@ -93,7 +93,6 @@ class Estimator:
         self.delays.restart()
         self.motion: Motion | None = None
         self._last_odometry: Motion | None = None  # as it came
-        self._last_pose: Motion | None = None  # the same of any source
 
     def forget(self) -> None:
         """Forget what was learnt of the disturbance."""
@@ -144,13 +143,12 @@ class Estimator:
         before, has_twist = self.motion, self.observer.velocity_source == "odometry"
         if before is not None:
             acted = self._acting(self.stamp, stamp)
-            expected = self._rolled(before, acted)
+            expected = self._predicted(before, acted)
             if not has_twist:
                 motion = motion._replace(speed=expected.speed, yaw_rate=expected.yaw_rate)
             safety = self.safety
             if safety is None or not safety.has_jumped(expected, motion, self.climber.half_track):
-                self._learn_slip(motion, aside, (stamp - self.stamp) / SECOND)
-                return self._correct(stamp, before, acted, expected, motion)
+                return self._correct(stamp, before, acted, expected, motion, aside)
             self.reset()
         self.stamp = stamp
         self.motion = motion if has_twist else motion._replace(speed=0.0, yaw_rate=0.0)
@@ -233,14 +231,14 @@ class Estimator:
         assert self.motion is not None
         if stamp == self.stamp:
             return self.motion
-        return self._rolled(self.motion, self._acting(self.stamp, stamp))
+        return self._predicted(self.motion, self._acting(self.stamp, stamp))
 
     def _aside(self, motion: Motion) -> float:
         """Speed [m/s] at which wheels give way to the left."""
         slip = self.slip
         return slip.speed(self.climber, motion, self.wall) if slip is not NO_SLIP else 0.0
 
-    def _rolled(self, motion: Motion, acting: Acting) -> Motion:
+    def _predicted(self, motion: Motion, acting: Acting) -> Motion:
         """Motion after torques have acted, each for some time [s]."""
         climber, learnt = self.climber, self.learnt
         r_F, r_N, resisting = learnt.force, learnt.moment, (learnt.friction, learnt.turning)
@@ -253,15 +251,23 @@ class Estimator:
         return motion
 
     def _correct(
-        self, stamp: int, before: Motion, acted: Acting, expected: Motion, motion: Motion
+        self,
+        stamp: int,
+        before: Motion,
+        acted: Acting,
+        expected: Motion,
+        motion: Motion,
+        aside: float,
     ) -> Observed:
         """Correct what is `expected` at `stamp` [ns] by the `motion` that odometry gives."""
         time = (stamp - self.stamp) / SECOND
+        last, self._last_odometry = self._last_odometry, motion
         reaction = self._delay + self.period / 2
         pull = 0.0 if self.wall is None else weight_beyond(self.wall, self.climber, motion)[0]
         observed = Observed(
             before, motion, time, acted, self.disturbance, reaction, pull, self._turning
         )
+        # speeds that come from poses share their noise, which would be learnt
         has_twist = self.observer.velocity_source == "odometry" and isinstance(motion.x, float)
         share = PERIOD_SMOOTHING if self._period_is_measured else 1.0
         self.period += share * (time - self.period)
@@ -272,9 +278,11 @@ class Estimator:
         settling = select(abs(motion.speed) > SLOW, left, SETTLES)
         self.learnt = self.learnt._replace(settling=settling)
         if has_twist:
-            motion = self._at_its_stamp(before, expected, motion, time)
+            if last is not None:
+                self._learn_slip(last, motion, aside, time)
+            motion = self._at_its_stamp(last, before, expected, motion, time)
             if is_known:
-                self._kept = LATEST
+                self._kept = KEPT_LONGER
                 if self.timing.learn_delay:
                     self._learn_delay(acted[-1][0], expected, motion, time, shares)
                 if self.checks_delay:
@@ -289,25 +297,22 @@ class Estimator:
             self.learnt = learnt
         return observed
 
-    def _learn_slip(self, motion: Motion, aside: float, time: float) -> None:
+    def _learn_slip(self, last: Motion, motion: Motion, aside: float, time: float) -> None:
         """Learn how wheels give way, of poses `time` [s] apart, or a speed `aside` [m/s] told."""
-        observer, before = self.observer, self._last_pose
-        self._last_pose = motion
-        # speeds that come from poses share their noise, which would be learnt
-        has_twist = observer.velocity_source == "odometry" and isinstance(motion.x, float)
-        bandwidth = observer.side_slip_bandwidth
-        if before is None or not has_twist or bandwidth == 0:
+        observer, bandwidth = self.observer, self.observer.side_slip_bandwidth
+        if bandwidth == 0:
             return
         if observer.side_slip_source == "pose":
-            aside = shown(before, motion, time)
+            aside = shown(last, motion, time)
         self.slip = self.slip.learnt(self.climber, motion, aside, time, bandwidth, self.wall)
 
-    def _at_its_stamp(self, before: Motion, expected: Motion, now: Motion, time: float) -> Motion:
+    def _at_its_stamp(
+        self, last: Motion | None, before: Motion, expected: Motion, now: Motion, time: float
+    ) -> Motion:
         """Motion whose speeds are those of its stamp, not the mean of the `time` [s] before."""
         kind = self.observer.twist
-        if kind == "auto" and self._last_odometry is not None:
-            self.twist.learn(self._last_odometry, now, time)
-        self._last_odometry = now
+        if kind == "auto" and last is not None:
+            self.twist.learn(last, now, time)
         if kind == "instantaneous" or (kind == "auto" and not self.twist.is_mean):
             return now
         speed, rate = mean_twist(before, expected, time)

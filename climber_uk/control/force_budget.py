@@ -16,7 +16,7 @@ from climber_uk.control.observed import Acting, Observed
 from climber_uk.control.safety import Mode, Trouble
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import clipped, wrapped
-from climber_uk.mechanics.quantities import Torques, Wrench
+from climber_uk.mechanics.quantities import NO_WRENCH, Torques, Wrench
 
 FIRST, FIRST_SHARE = 0.04, 0.2  # [m/s] of the first push, and beside it of what is allowed
 GROWS = 1.4  # from one push to the next
@@ -44,19 +44,6 @@ GROWS_BY, TURN_GROWS_BY = 10.0, 90.0
 BREAKS_LOOSE = 1.2  # times what a turn meets, until it begins
 
 
-class Lasting:
-    """What lasts of something that may swing."""
-
-    def __init__(self) -> None:
-        self.value = 0.0
-
-    def within(self, asked: float, most: float, change: float) -> float:
-        """What is asked for, at `most` so far from what lasts; that goes after it by `change`."""
-        given = clipped(asked, self.value - most, self.value + most)
-        self.value += clipped(asked - self.value, -change, change)
-        return given
-
-
 class ForceBudget:
     """What a climber may do by its torques, while odometry tells that it rests."""
 
@@ -73,8 +60,7 @@ class ForceBudget:
         self._slid, self._friction = 0.0, 0.0  # [s] for which it slides, [N] of friction then
         # [N m] that is turned against, of late, and what a turn is known to meet
         self._resisted = self._scrubs = 0.0
-        # [N] and [N m] by which it is pushed and turned on its way to the reference
-        self._push, self._turn = Lasting(), Lasting()
+        self.lasts = NO_WRENCH  # of what pushes and turns it on its way to the reference
 
     def pause(self) -> None:
         """Watch nothing for now: it need not move."""
@@ -276,15 +262,16 @@ class ForceBudget:
         )
         mass, inertia, push = climber.driven_mass, climber.driven_inertia, force - weight
         most = mass * GENTLE * speed + self._holds(climber)
-        given = self._push.within(push, most, mass * GROWS_BY * time)
+        given, pushed = _gentle(push, self.lasts.force, most, mass * GROWS_BY * time)
+        most = inertia * GENTLE * yaw_rate + BREAKS_LOOSE * self._scrubs
+        turn, turned = _gentle(moment, self.lasts.moment, most, inertia * TURN_GROWS_BY * time)
+        self.lasts = Wrench(pushed, turned)
         if law.falls or self._is_on_trust:  # `within` has bounded it
             given = push
-        most = inertia * GENTLE * yaw_rate + BREAKS_LOOSE * self._scrubs
-        turned = self._turn.within(moment, most, inertia * TURN_GROWS_BY * time)
-        if (given, turned) == (push, moment):
+        if (given, turn) == (push, moment):
             return command
-        lost = Wrench(command.lost.force + push - given, command.lost.moment + moment - turned)
-        return command._replace(wheels=law.torques(weight + given, turned, ahead), lost=lost)
+        lost = Wrench(command.lost.force + push - given, command.lost.moment + moment - turn)
+        return command._replace(wheels=law.torques(weight + given, turn, ahead), lost=lost)
 
     def _stronger(self, climber: Climber, push: float) -> float:
         """A push [N] with at least the force of its number; see `MORE`.
@@ -306,6 +293,12 @@ class ForceBudget:
         holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
         lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
         return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))
+
+
+def _gentle(asked: float, lasts: float, most: float, change: float) -> tuple[float, float]:
+    """What is given of what is asked for, `most` beside what lasts; and what lasts from now on."""
+    given = clipped(asked, lasts - most, lasts + most)
+    return given, lasts + clipped(asked - lasts, -change, change)
 
 
 def _gone(observed: Observed) -> float:

@@ -19,9 +19,9 @@ from climber_uk.control.time_scaling import IN_TIME, STANDSTILL
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.adhesion import Attachment, Suction
 from climber_uk.mechanics.climber import Climber
-from climber_uk.mechanics.demand import NO_WRENCH, Demand, demanded
+from climber_uk.mechanics.demand import Demand, demanded
 from climber_uk.mechanics.elementary import sign
-from climber_uk.mechanics.quantities import Torques
+from climber_uk.mechanics.quantities import NO_WRENCH, Torques
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.wall import PLANE
 from climber_uk.parameters.declaration import parameter, parameters

@@ -11,7 +11,7 @@ from climber_uk.control.timing import LONGEST_STEP
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import clipped
-from climber_uk.mechanics.quantities import NO_TORQUES, Motion, Torques, Wrench
+from climber_uk.mechanics.quantities import NO_TORQUES, NO_WRENCH, Motion, Torques, Wrench
 
 BRAKING = 0.01  # [s] after which the safe output has to have braked what moves
 PUSHED = 0.05  # [m/s] by which it may be faster than before, and
@@ -22,15 +22,16 @@ NOTHING = 0.05  # of the weight: a drive that is let go
 FALLS = 0.1  # [m/s] by which it may get faster without a torque, if its seal holds it
 SINKS = 0.3  # [m/s] likewise downwards, in all the times that it is left for longer than
 SOON = 0.15  # [s]: late torques of who goes down brake it still
-LATEST = 0.6  # [s] that a torque may act after it was sent: none acts this long after the last
+LONGEST_EFFECT = (
+    0.6  # [s] that a torque may act after it was sent: none acts this long after the last
+)
 LESS = 0.5  # times as much of the weight is carried, where what carries it drives it
-LETS_GO = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
+LEFT_FOR = SECOND // 10  # [ns] for which what is driven against its torques is left to its seal
 # what moves, but in doubt and with a polarity that nobody knows, is shaken a little to find it out
 SHAKEN = 0.02  # [m/s] of a rim, above which it is
 SHAKING = 0.3  # [m/s²] to and fro: 1.5 cm/s
 HALF_SHAKE = SECOND // 10  # [ns]
 SHAKES = 2 * SECOND  # [ns] of it, at most
-NO_PUSH = Wrench(0.0, 0.0)
 REACHES = 0.1  # of the braking rate: that of the integral that carries what pushes it
 # modes of a climber with which nothing is wrong: what was learnt as it followed pushes it still
 STOPS = Mode.EMERGENCY_STOP, Mode.LOW_BATTERY, Mode.TETHER, Mode.NO_REFERENCE
@@ -52,7 +53,7 @@ class SealCheck:
     def add(self, is_driven: bool, speed: float, time: float, *, goes_down: bool) -> None:
         """Take a speed [m/s], after a `time` [s] in which torques drove it or not."""
         self._left_for = 0.0 if is_driven else self._left_for + time
-        self._slowest = min(self._slowest, speed) if self._left_for > LATEST else math.inf
+        self._slowest = min(self._slowest, speed) if self._left_for > LONGEST_EFFECT else math.inf
         if self._left_for > SOON:
             self._sunk = max(0.0, self._sunk + speed - self._last) if goes_down else 0.0
         self._last = speed
@@ -189,6 +190,10 @@ class SafeOutput:
         most = 2 * climber.max_wheel_torque / climber.wheel_radius  # more of it has no effect
         self._carries = LESS * min(self._carries, most / abs(weight))
 
+    def _holds(self, law: ControlLaw) -> bool:
+        """Whether its seal holds its weight."""
+        return not self._falls(law) and law.climber.seal_friction > 0
+
     def _falls(self, law: ControlLaw) -> bool:
         """Whether its weight may be more than its seal holds, as is believed or has shown."""
         return law.falls or self._seal.gives_way
@@ -204,12 +209,12 @@ class SafeOutput:
         elif self._doubted is None:
             self._doubted = stamp
             self.polarities.forget_unknown()
-        since = None if self._doubted is None else stamp - self._doubted
-        believed, signs = self._believed(mode, motion) if since is not None else (motion, None)
-        braking = self._braking(mode, law, believed, signs, since)
-        if since is not None:
-            return _brake(estimator, law, age, braking, believed)
-        return _brake(estimator, law, age, braking, None, Wrench(self._push or 0.0, self._turn))
+        if self._doubted is None:
+            push = Wrench(self._push or 0.0, self._turn)
+            return _brake(estimator, law, age, self._braking(mode, law), None, push)
+        believed, signs = self._believed(mode, motion)
+        braking = self._braking_in_doubt(mode, law, believed, signs, stamp - self._doubted)
+        return _brake(estimator, law, age, braking, believed)
 
     def _answers(self, mode: Mode) -> bool:
         """Whether torques surely do what they should, as odometry tells that may be believed."""
@@ -242,7 +247,7 @@ class SafeOutput:
         """
         is_known = self.polarities.drive.sign > 0
         if self._begins and mode is Mode.TOO_FAST and self._is_driven and not is_known:
-            self._left_until = stamp + LETS_GO
+            self._left_until = stamp + LEFT_FOR
         self._begins = False
         return stamp < self._left_until and not falls
 
@@ -273,42 +278,39 @@ class SafeOutput:
         )
         return motion._replace(speed=speed, yaw_rate=yaw_rate), (sign, yaw_sign)
 
-    def _braking(
-        self,
-        mode: Mode,
-        law: ControlLaw,
-        motion: Motion,
-        doubtful: tuple[int, int] | None,
-        doubted: int | None,
+    def _braking(self, mode: Mode, law: ControlLaw) -> Braking:
+        """How to brake by speeds that are believed."""
+        rate, holds = self._gently * self.safety.braking_rate, self._holds(law)
+        way = self._way if mode.is_fault else 1
+        sign, yaw_sign = self.polarities.signs
+        if self._push is not None:
+            return Braking(rate, rate * (yaw_sign or 1))
+        drive, yaw = rate * (sign or way), rate * (yaw_sign or 1)
+        # The other wheel can brake a turn, while the seal holds what it drives. What goes
+        # against its torques has motors the wrong way round, or late ones: a seal stops both.
+        # Where that is known of the yaw alone, the drive is left to the seal as well.
+        is_against = drive < 0 or (yaw < 0 and sign == 0)
+        if holds and (mode is Mode.DEAD_WHEEL or is_against):
+            return Braking(0.0, yaw, carries=0.0)
+        # nobody knows its heading where odometry is stuck
+        carries = 0.0 if mode is Mode.STALLED and holds else way * self._carries
+        return Braking(drive, yaw, carries)
+
+    def _braking_in_doubt(
+        self, mode: Mode, law: ControlLaw, motion: Motion, signs: tuple[int, int], doubted: int
     ) -> Braking:
-        """How to brake; `doubted` is for how long [ns] speeds are in doubt, None: they are not."""
+        """How to brake by speeds that have been in doubt for so long [ns], of polarity `signs`."""
         rate, falls = self._gently * self.safety.braking_rate, self._falls(law)
-        if doubtful is None or doubted is None:
-            way = self._way if mode.is_fault else 1
-            sign, yaw_sign = self.polarities.signs
-            if self._push is not None:
-                return Braking(rate, rate * (yaw_sign or 1))
-            drive, yaw = rate * (sign or way), rate * (yaw_sign or 1)
-            holds = not falls and law.climber.seal_friction > 0
-            # The other wheel can brake a turn, while the seal holds what it drives. What goes
-            # against its torques has motors the wrong way round, or late ones: a seal stops both.
-            # Where that is known of the yaw alone, the drive is left to the seal as well.
-            is_against = drive < 0 or (yaw < 0 and sign == 0)
-            if holds and (mode is Mode.DEAD_WHEEL or is_against):
-                return Braking(0.0, yaw, carries=0.0)
-            # nobody knows its heading where odometry is stuck
-            carries = 0.0 if mode is Mode.STALLED and holds else way * self._carries
-            return Braking(drive, yaw, carries)
         if mode is Mode.HEADING_WRONG and not falls:  # nobody knows how fast it goes ahead
             return Braking(0.0, rate, carries=0.0)
         if falls and mode is not Mode.SIGN_WRONG:  # a sign is more likely right
-            doubtful = doubtful[0] or 1, doubtful[1] or 1
+            signs = signs[0] or 1, signs[1] or 1
         rims = motion.speed, law.climber.half_track * motion.yaw_rate
         drive, yaw = (
             0.0 if sign or abs(rim) < SHAKEN else _shaking(doubted)
-            for sign, rim in zip(doubtful, rims, strict=True)
+            for sign, rim in zip(signs, rims, strict=True)
         )
-        return Braking(rate * doubtful[0], rate * doubtful[1], self._carries, (drive, yaw))
+        return Braking(rate * signs[0], rate * signs[1], self._carries, (drive, yaw))
 
 
 def _shaking(doubted: int) -> float:
@@ -329,7 +331,7 @@ def _brake(
     age: float,
     braking: Braking,
     believed: Motion | None,
-    push: Wrench = NO_PUSH,
+    push: Wrench = NO_WRENCH,
 ) -> Torques:
     """Torques that carry the weight and brake; raises `ValueError` if they are not finite.
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from climber_uk.mechanics.climber import GRAVITY, Climber
 from climber_uk.mechanics.elementary import cos, sin
-from climber_uk.mechanics.quantities import Torques, Wrench
+from climber_uk.mechanics.quantities import NO_WRENCH, Torques, Wrench
 from climber_uk.mechanics.reference import Reference
 from climber_uk.mechanics.wall import PLANE, Wall
 
 STANDS = 1e-4  # [m/s] below which friction holds, and asks for no torque
-NO_WRENCH = Wrench(0.0, 0.0)
 
 
 class Demand(NamedTuple):

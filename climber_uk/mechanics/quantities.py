@@ -87,6 +87,7 @@ class Torques(NamedTuple):
 
 
 NO_TORQUES = Torques(0.0, 0.0)
+NO_WRENCH = Wrench(0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import pytest
 from climbs import Climb
 from test_delay_check import Late
 
-from climber_uk.control.safe_output import FALLS, LATEST, SealCheck
+from climber_uk.control.safe_output import FALLS, LONGEST_EFFECT, SealCheck
 
 PERIOD = 0.01  # [s]
 soak = pytest.mark.soak
@@ -29,8 +29,8 @@ def rising(by, seconds):
     [
         (rising(0.0, 5.0), False, False),  # it slides steadily
         (rising(1.0, 2.0), True, False),  # its motors do that
-        (rising(3.0, 0.9 * LATEST), False, False),  # or did: torques may act late
-        (rising(0.9 * FALLS, LATEST) + rising(0.9 * FALLS, 2.0), False, False),
+        (rising(3.0, 0.9 * LONGEST_EFFECT), False, False),  # or did: torques may act late
+        (rising(0.9 * FALLS, LONGEST_EFFECT) + rising(0.9 * FALLS, 2.0), False, False),
         (rising(1.0, 2.0), False, True),
     ],
 )
@@ -54,7 +54,7 @@ def test_who_goes_down_faster_whenever_it_is_left_is_not_held(goes_down, slows, 
 def test_a_torque_now_and_then_begins_the_wait_anew():
     check = SealCheck()
     for _ in range(10):
-        assert not told(check, rising(1.0, 0.9 * LATEST))
+        assert not told(check, rising(1.0, 0.9 * LONGEST_EFFECT))
         assert not told(check, [1.05], is_driven=True)
 
 
