@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import TimeReference
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -31,6 +31,7 @@ from climber_uk.messages.topics import (
     REFERENCE,
     REFERENCE_PATH,
     REFERENCE_TIME,
+    STICK_LOCK,
     private,
 )
 from climber_uk.parameters.declaration import parameter, parameters
@@ -125,6 +126,8 @@ class TrajectoryPublisher(ClimberNode):
         patience = self.parameters.read(PublisherOptions).goal_patience
         self.goals = path_goals(self, self.journey, self.given, patience)
         listen_to_stick(self, hand.input, self.on_stick)
+        if hand.lock:
+            self.subscription(Bool, STICK_LOCK, self.on_stick_lock)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_service(SetBool, "~/pause", self.on_pause)
@@ -198,6 +201,11 @@ class TrajectoryPublisher(ClimberNode):
             self.report("stick", "refused", str(error))
             return
         self.report("stick", "")
+
+    def on_stick_lock(self, message: Bool) -> None:
+        """Topic by_hand_lock: ignore the stick while true."""
+        self.journey.lock(message.data)
+        self.report("stick lock", "by hand: locked" if message.data else "", is_fault=False)
 
     def said(self, said: Said) -> Said:
         """Log what is done for an operator."""

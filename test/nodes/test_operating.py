@@ -8,7 +8,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from test_faults import LIMIT, LOCK_STEP, PLANNER, PLANT
 from test_waiting import Waiting
@@ -216,7 +216,7 @@ def test_tags_of_a_path_are_told_as_the_climber_reaches_them(world):
 @pytest.mark.soak
 def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
-    by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2"]
+    by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2", "by_hand.lock:=true"]
     heading = ["initial_heading:=0.0"]
     climb = Operated(world, {PLANNER: [*line, *by_hand], PLANT: heading})
     climb.drives(0.28, 0.31)
@@ -224,14 +224,21 @@ def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     asked = TwistStamped()
     asked.twist.linear.x, asked.twist.angular.z = 1.0, 0.3  # cut to 0.2
 
-    def drives_by_hand():
+    lock = world.speak(Bool, "by_hand_lock")
+
+    def drives(speed, yaw_rate):
         stick.publish(asked)
         last = [m.twist.twist for m in climb.odometry[-15:]]
         return all(
-            abs(twist.linear.x - 0.2) < 0.01 and abs(twist.angular.z - 0.3) < 0.02 for twist in last
+            abs(twist.linear.x - speed) < 0.01 and abs(twist.angular.z - yaw_rate) < 0.02
+            for twist in last
         )
 
-    world.wait(drives_by_hand, "a turn by hand")
+    world.wait(lambda: drives(0.2, 0.3), "a turn by hand")
+    lock.publish(Bool(data=True))
+    world.wait(lambda: drives(0.0, 0.0), "rest, though the stick is moved")
+    lock.publish(Bool(data=False))
+    world.wait(lambda: drives(0.2, 0.3), "a turn by hand again")
     climb.drives(-1e-3, 1e-3)  # the stick is silent
     climb.is_told_to_be("by hand")
     left = climb.odometry[-1].pose.pose.position

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from under_way import UnderWay
+from under_way import Travelling, UnderWay
 
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
@@ -109,3 +109,27 @@ def test_a_stick_that_is_lost_at_full_speed_stops_the_climber_without_a_jump(hea
     assert climb.states[-1].forward_speed == pytest.approx(0.0, abs=1e-3)
     assert set(climb.modes) == {Mode.FOLLOWING}
     assert climb.largest_jump <= 0.2
+
+
+def test_a_stick_that_is_locked_stops_the_climber_and_is_ignored_until_it_is_not():
+    line = Trajectory(Line(length=1.0, direction=-np.pi / 2), RestToRest(rate=0.1))
+    climb = Travelling(line, state=State(line.at(0.0).pose, np.zeros(3)))
+
+    def steer(seconds):
+        for _ in range(round(10 * seconds)):
+            climb.stick(1.0, 0.0)
+        return climb.state.forward_speed
+
+    assert steer(2.0) == pytest.approx(0.2, rel=0.02)
+    climb.journey.lock(True)
+    within = OPTIONS.reaction + 3 * OPTIONS.publish_period + HAND.ramp_time
+    assert steer(within) == pytest.approx(0.0, abs=1e-3)
+    assert steer(0.5) == pytest.approx(0.0, abs=1e-3)
+    climb.journey.lock(False)
+    assert steer(2.0) == pytest.approx(0.2, rel=0.02)
+    assert climb.largest_jump <= 0.2
+
+
+def test_a_lock_of_no_stick_is_refused():
+    with pytest.raises(ValueError, match="lock=true needs an input"):
+        HandOptions(lock=True)
