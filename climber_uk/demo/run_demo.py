@@ -25,7 +25,7 @@ from std_srvs.srv import Trigger
 
 from climber_uk.closed_loop.node_parameters import PARAMETERS as NODE_PARAMETERS
 from climber_uk.closed_loop.node_parameters import doubts, read_planner
-from climber_uk.closed_loop.start import other_climber, start_elsewhere
+from climber_uk.closed_loop.start import begun_there, other_climber, start_elsewhere
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages import reading
@@ -46,6 +46,7 @@ from climber_uk.parameters.parameter_file import Values, given, read_file, read_
 from climber_uk.ros.leaving import leave
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import free_domain, use_udp
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.system.command_line import Parser, between, in_words, whole
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, on_end
@@ -289,6 +290,7 @@ def remarks_on(config: Path, climber: str, is_refused: bool) -> list[str]:
     controller, plant = (Values(read_file(config, f"{climber}/{n}")) for n in (CONTROLLER, PLANT))
     try:
         trajectory = build_trajectory(Values(read_planner(config, f"{climber}/{PLANNER}")).read)
+        trajectory = begun_there(trajectory, plant.read(SimulationOptions))
         elsewhere, is_too_far = start_elsewhere(trajectory, controller, plant)
         said = other_climber(controller, plant), elsewhere
     except ValueError:

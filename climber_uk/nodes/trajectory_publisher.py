@@ -19,7 +19,12 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.summary import summary
-from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
+from climber_uk.mechanics.trajectory_parameters import (
+    TYPES,
+    TrajectoryParameters,
+    begun_near,
+    build_trajectory,
+)
 from climber_uk.messages import reading, writing
 from climber_uk.messages.references import ReferenceWriter, Row
 from climber_uk.messages.topics import (
@@ -107,7 +112,7 @@ class TrajectoryPublisher(ClimberNode):
         planned, make = build_trajectory(self.parameters.read), writing.reference_numbers
         self.journey: Journey[Row] = Journey(planned, self.options, hand, make)
         self.journey.speed = self.parameters.read(PublisherOptions).speed
-        self.has_told_done = False
+        self.is_placed = self.has_told_done = False
         self.followed: int | None = None  # [ns] how far a controller has come
         self.mode = ""  # what it does; empty: none tells
         self.last_look = self.stood_at = 0  # [ns] of the clock
@@ -250,6 +255,8 @@ class TrajectoryPublisher(ClimberNode):
             self.report("start", "odometry refused", str(error))
             return
         self.report("start", "")
+        if self.journey.next == PATH and not self.is_placed and self.is_moved_near(state):
+            return  # to plan has taken a while: it starts at the next odometry
         self.destroy_subscription(self.odometry)
         self.odometry = None
         what = self.shape if self.journey.next == PATH else self.journey.next
@@ -261,6 +268,12 @@ class TrajectoryPublisher(ClimberNode):
         self.publish_around(start)
         self.get_logger().info(f"{what} starts at {start / SECOND:.3f} s")
         self.publish_path(start)
+
+    def is_moved_near(self, state: State) -> bool:
+        """Whether lanes begin elsewhere now, nearest to where the climber is at the first start."""
+        self.is_placed, planned = True, self.journey.planned
+        self.journey.planned = begun_near(planned, state.pose[:2])
+        return self.journey.planned is not planned
 
     def resting_pose(self, state: State) -> Array:
         """Pose (3,) at which a climber in a state is once it rests: on its way it brakes first."""

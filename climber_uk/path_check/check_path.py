@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from climber_uk.closed_loop.node_parameters import PATHS, read_parameters, read_planner
-from climber_uk.closed_loop.start import other_climber, start_elsewhere
+from climber_uk.closed_loop.start import begun_there, other_climber, start_elsewhere
 from climber_uk.control.build import KINDS as CONTROLLER_TYPES
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics.adhesion import ADHESION, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import LOCOMOTION, Contact
 from climber_uk.mechanics.fastest_law import DEGREE
+from climber_uk.mechanics.lanes import Lanes
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
@@ -41,6 +42,7 @@ from climber_uk.path_check.path_limits import Limits
 from climber_uk.path_check.posterior import chances, read_posterior
 from climber_uk.path_check.time_optimal import PERIOD, time_optimal
 from climber_uk.report.outputs import failing_in_a_line
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.simulated_robot import Physics
 from climber_uk.system.command_line import Parser, between, printable, whole
 
@@ -72,6 +74,7 @@ def read(
     plant = Values({})
     if given(read_sections(file), f"/{PLANT}"):
         plant = Values(read_parameters(file, f"/{PLANT}"))
+        trajectory = begun_there(trajectory, plant.read(SimulationOptions))
         elsewhere, _ = start_elsewhere(trajectory, values, plant)
         said = other_climber(values, plant), "" if changes else elsewhere
         remarks += [f"{file}: {line}" for line in said if line]
@@ -197,5 +200,8 @@ def main() -> None:
                 planner = read_planner(options.params, f"/{PLANNER}", changes)
                 files = {name: str(Path(planner[name]).absolute()) for name in PATHS & {*planner}}
                 changes |= files
+                if isinstance(trajectory.shape, Lanes):  # the table is of lanes that begin there
+                    begin = trajectory.shape.start_x, trajectory.shape.start_y
+                    changes |= dict(zip(("lanes.start_x", "lanes.start_y"), begin, strict=True))
                 print(printable(str(write_fastest(law, options.params, changes, options.output))))
     sys.exit(not numbers["feasible"])

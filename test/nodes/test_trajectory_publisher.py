@@ -123,3 +123,14 @@ def test_waypoints_are_relative_to_the_parameter_file_that_names_them(world, tmp
     world.wait(lambda: paths, "path")
     end = paths[0].poses[-1].pose.position
     np.testing.assert_allclose([end.x, end.y], [1.5, 0.3], atol=1e-9)
+
+
+def test_lanes_begin_where_the_climber_is_nearest_to_them(world):
+    (world.directory / "strip.csv").write_text("0 0\n3 0\n3 0.45\n0 0.45\n")
+    area = f"lanes.area:={world.directory / 'strip.csv'}"
+    world.start_node("trajectory_publisher", "shape:=lanes", area)
+    references = world.listen(MultiDOFJointTrajectory, "reference")
+    world.start_node("plant_simulator", "initial_x:=2.9", "initial_y:=0.3")
+    world.wait(lambda: references, "previews")
+    begin = references[0].points[0].transforms[0].translation
+    assert (begin.x, begin.y) == pytest.approx((2.8, 0.245), abs=0.02)
