@@ -39,6 +39,16 @@ def begun_there(trajectory: Trajectory, start: SimulationOptions) -> Trajectory:
     return begun_near(trajectory, np.array([start.initial_x, start.initial_y]))
 
 
+def begun_at(trajectory: Trajectory) -> dict[str, dict[str, float]]:
+    """Parameters by node of a climber that begins where the path does, at rest, and drives it."""
+    x, y, heading = trajectory.at(0.0).pose.tolist()
+    start = {"initial_x": x, "initial_y": y, "initial_heading": heading}
+    return {
+        PLANT: {**start, "initial_speed": 0.0, "initial_yaw_rate": 0.0},
+        "run_demo": {"duration": float(math.ceil(trajectory.duration + 1.0))},
+    }
+
+
 def other_climber(controller: Values, plant: Values) -> str:
     """Words on parameters of the climber that the two have otherwise; '' if there are none."""
     expected, simulated = controller.read(Climber), plant.read(Climber)

@@ -26,6 +26,7 @@ from std_srvs.srv import Trigger
 from climber_uk.closed_loop.node_parameters import PARAMETERS as NODE_PARAMETERS
 from climber_uk.closed_loop.node_parameters import doubts, read_planner
 from climber_uk.closed_loop.start import begun_there, other_climber, start_elsewhere
+from climber_uk.demo.corners import write_for_corners
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages import reading
@@ -304,6 +305,9 @@ def parse() -> argparse.Namespace:
     """Options of the command line."""
     parser = Parser("run_demo", __doc__)
     parser.add_argument("--config", type=Path, required=True, help="parameter file of all nodes")
+    parser.add_argument(
+        "--corners", type=Path, help="of an area, as lanes.area: drive lanes over that one instead"
+    )
     parser.add_argument("--output", "-o", type=Path, required=True, help="new directory")
     parser.add_argument(
         "--duration", type=between(1e-3, 1e9), help="[s] (default: that of the config)"
@@ -347,16 +351,13 @@ def main() -> None:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:
-        said: list[str] = []  # of what can hardly be meant, once for all nodes
-        for node in NODES:
-            for climber in climbers:
-                values = read_file(options.config, f"{climber}/{node}")
-                said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
-        for climber in climbers:
-            said += remarks_on(options.config, climber, not options.controller)
-        for line in dict.fromkeys(said):
-            print(f"run_demo: {line}", file=sys.stderr)
         options.output.mkdir(parents=True)
+        try:
+            for line in prepare(options, climbers):
+                print(f"run_demo: {line}", file=sys.stderr)
+        except (ValueError, OSError):
+            shutil.rmtree(options.output)
+            raise
     except ValueError as error:
         sys.exit(f"run_demo: {error}")
     except OSError as error:
@@ -368,6 +369,25 @@ def main() -> None:
         print(f"recorded: {options.output / 'bag'}")
     leave(int(bool(trouble)), demo)
     sys.exit(int(bool(trouble)))
+
+
+def prepare(options: argparse.Namespace, climbers: Sequence[str]) -> list[str]:
+    """Write the parameters for an area of one's own; lines on what can hardly be meant, once each.
+
+    Raises `OSError`, and `ValueError` if the nodes would refuse what is in the files.
+    """
+    if options.corners:
+        written = options.output / "corners.yaml"
+        write_for_corners(options.config, options.corners, written)
+        options.config = written
+    said: list[str] = []
+    for node in NODES:
+        for climber in climbers:
+            values = read_file(options.config, f"{climber}/{node}")
+            said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
+    for climber in climbers:
+        said += remarks_on(options.config, climber, not options.controller)
+    return list(dict.fromkeys(said))
 
 
 def record(
