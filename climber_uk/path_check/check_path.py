@@ -2,7 +2,7 @@
 
 The path is that of trajectory_publisher's parameters in a file, the climber that of
 uk_torque_controller's. With `--posterior` it tells as well how probable it is that a climber falls
-or slips that is known only as well as a bag told (`identify BAG --json FILE`). The status is 1 if
+or slips that is known only as well as a bag tells, by `identify`. The status is 1 if
 the path asks for more than there is, and 2 if that cannot be told.
 """
 
@@ -39,7 +39,7 @@ from climber_uk.path_check.demands import demands
 from climber_uk.path_check.fastest import fastest, write_fastest
 from climber_uk.path_check.findings import lines, told, told_of
 from climber_uk.path_check.path_limits import Limits
-from climber_uk.path_check.posterior import chances, read_posterior
+from climber_uk.path_check.posterior import chances, posterior_of
 from climber_uk.path_check.time_optimal import PERIOD, time_optimal
 from climber_uk.report.outputs import failing_in_a_line
 from climber_uk.simulation.options import SimulationOptions
@@ -157,7 +157,8 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--posterior",
         type=Path,
-        help="what `identify --json` wrote: tell how probable it is that such a climber falls",
+        help="a bag, or what `identify --json` wrote of one: tell how probable it is that such a "
+        "climber falls",
     )
     parser.add_argument(
         "--climbers",
@@ -175,7 +176,9 @@ def main() -> None:
     with failing_in_a_line("check_path") as remarks:
         changes = dict(map(read_argument, options.param))
         trajectory, climber, contact, wall = read(options.params, changes, remarks)
-        posterior = read_posterior(options.posterior) if options.posterior else None
+        posterior = (
+            posterior_of(options.posterior, options.params, remarks) if options.posterior else None
+        )
         asked, law = (climber, contact), None
         found = demands(trajectory, *asked, options.margin, wall)
         numbers = told(found, trajectory, climber.half_track, remarks)
