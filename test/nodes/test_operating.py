@@ -1,6 +1,7 @@
 """An operator pauses a climber on its path, goes on, slower, and back: the three nodes."""
 
 import json
+import re
 import subprocess
 
 import numpy as np
@@ -15,6 +16,7 @@ from test_waiting import Waiting
 from world import CONFIG, executable
 
 from climber_uk.messages import reading
+from climber_uk.operating.command import DO
 
 pytestmark = pytest.mark.nodes
 
@@ -248,6 +250,30 @@ def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     climb.is_told_to_be("done")
     end = climb.odometry[-1].pose.pose.position
     assert (end.x, end.y) == pytest.approx((4.0, 3.0), abs=0.01)
+
+
+@pytest.mark.soak
+def test_the_command_does_all_it_is_there_for(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    climb = Operated(world, {PLANNER: line, PLANT: ["initial_heading:=0.0"]})
+    climb.drives(0.28, 0.31)
+    does = {
+        "pause": r"comes to rest within [\d.]+ s",
+        "resume": "goes on",
+        "speed 0.5": "speed 0.5",
+        "status": r"following, .* m done, .* m left, .* s, lap 1, segment 1",
+        "push 20 0": r"pushed by \(20, 0\) N",
+        "disable": "inactive",
+        "enable": "active",
+        "stop": r"comes to rest within [\d.]+ s|rests where it is|comes to rest where it is",
+        "retreat": "goes back along the path",
+        "watch": r"(?s).*\n(following|done), 0\.0\d m done, .*",
+        "start": "starts at the next odometry",
+    }
+    assert {words.split()[0] for words in does} == {*DO}
+    for words, said in does.items():
+        status, told = climb.command(*words.split())
+        assert (status, bool(re.fullmatch(said, told.strip()))) == (0, True), (words, told)
 
 
 def test_the_command_tells_when_nobody_answers_and_what_it_takes(world):

@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry, Path
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
@@ -75,6 +76,21 @@ def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(w
                 taken_back.append(time - begin)
                 points[time] = point
     assert min(taken_back) > 0.3 * SECOND
+
+
+def test_a_stick_without_stamps_drives_too(world):
+    references = start(world, "autostart:=false", "by_hand.input:=twist", "by_hand.ramp_time:=0.2")
+    world.start_node("plant_simulator")
+    stick, asked = world.speak(Twist, "cmd_vel"), Twist()
+    asked.linear.x, asked.angular.z = 0.1, -0.2
+
+    def drives():
+        stick.publish(asked)
+        rates = (point.velocities[0] for message in references[-1:] for point in message.points)
+        told = [(np.hypot(of.linear.x, of.linear.y), of.angular.z) for of in rates]
+        return pytest.approx((0.1, -0.2)) in told
+
+    world.wait(drives, "a reference as fast as the stick asks for")
 
 
 @pytest.mark.parametrize("seconds", [pytest.param(0, marks=pytest.mark.soak), 5])
