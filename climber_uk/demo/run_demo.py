@@ -12,9 +12,10 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import rclpy
@@ -282,6 +283,13 @@ def node_commands(
     return commands
 
 
+def doubts_on(config: Path, climber: str) -> Iterator[str]:
+    """Lines on what can hardly be meant in a file; raises as `read_file` does."""
+    for node in NODES:
+        values = read_file(config, f"{climber}/{node}")
+        yield from doubts(config, values, NODE_PARAMETERS, f"{node}.")
+
+
 def remarks_on(config: Path, climber: str, is_refused: bool) -> list[str]:
     """Lines on a climber that is not where its path begins, or other than its controller has it.
 
@@ -299,6 +307,12 @@ def remarks_on(config: Path, climber: str, is_refused: bool) -> list[str]:
     if is_too_far and is_refused:
         raise ValueError(f"{config}: {elsewhere}")
     return [f"{config}: {line}" for line in said if line]
+
+
+def tell(remarks: Iterable[Iterable[str]]) -> None:
+    """Print remarks on the parameters of several climbers, each once."""
+    for line in dict.fromkeys(chain.from_iterable(remarks)):
+        print(f"run_demo: {line}", file=sys.stderr)
 
 
 def parse() -> argparse.Namespace:
@@ -351,10 +365,15 @@ def main() -> None:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:
+        tell(doubts_on(options.config, climber) for climber in climbers)
         options.output.mkdir(parents=True)
         try:
-            for line in prepare(options, climbers):
-                print(f"run_demo: {line}", file=sys.stderr)
+            if options.corners:
+                written = options.output / "corners.yaml"
+                write_for_corners(options.config, options.corners, written)
+                options.config = written
+            is_refused = not options.controller
+            tell(remarks_on(options.config, climber, is_refused) for climber in climbers)
         except (ValueError, OSError):
             shutil.rmtree(options.output)
             raise
@@ -369,25 +388,6 @@ def main() -> None:
         print(f"recorded: {options.output / 'bag'}")
     leave(int(bool(trouble)), demo)
     sys.exit(int(bool(trouble)))
-
-
-def prepare(options: argparse.Namespace, climbers: Sequence[str]) -> list[str]:
-    """Write the parameters for an area of one's own; lines on what can hardly be meant, once each.
-
-    Raises `OSError`, and `ValueError` if the nodes would refuse what is in the files.
-    """
-    if options.corners:
-        written = options.output / "corners.yaml"
-        write_for_corners(options.config, options.corners, written)
-        options.config = written
-    said: list[str] = []
-    for node in NODES:
-        for climber in climbers:
-            values = read_file(options.config, f"{climber}/{node}")
-            said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
-    for climber in climbers:
-        said += remarks_on(options.config, climber, not options.controller)
-    return list(dict.fromkeys(said))
 
 
 def record(
