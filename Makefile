@@ -4,9 +4,10 @@
 
 PYTHON ?= python3
 CLIMBERS ?=
-CONFIG ?= config/$(if $(CLIMBERS),four_climbers,paper).yaml
+CORNERS ?=
+CONFIG ?= config/$(if $(CORNERS),lanes,$(if $(CLIMBERS),four_climbers,paper)).yaml
 CLOCK ?= sim
-OUTPUT ?= demo_output/$(basename $(notdir $(CONFIG)))-$(CLOCK)-$(shell date +%Y%m%d-%H%M%S)
+OUTPUT ?= demo_output/$(basename $(notdir $(or $(CORNERS),$(CONFIG))))-$(CLOCK)-$(shell date +%Y%m%d-%H%M%S)
 PAPER_OUTPUT ?= demo_output/paper
 CAMPAIGN ?= config/campaign.yaml
 CAMPAIGN_OUTPUT ?= demo_output/$(basename $(notdir $(CAMPAIGN)))
@@ -19,15 +20,15 @@ SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools-set-up
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 
-$(foreach name,config clock climbers output,$(if $(filter command,$(origin $(name))),\
+$(foreach name,config clock climbers corners output,$(if $(filter command,$(origin $(name))),\
 	$(error $(name)= is not heeded: its name is in capitals)))
 
 .PHONY: demo help paper campaign docs bench physics test lint unit coverage soak colcon clean test-kilted sbom
 
-## run the nodes, and tell how well; CONFIG=config/climber.yaml, CLOCK=wall, CLIMBERS=4
+## run the nodes, and tell how well; CONFIG=config/climber.yaml, CLOCK=wall, CLIMBERS=4, CORNERS=my.csv
 demo: $(SET_UP)
 	@exec $(BIN)/run_demo --with-parent --config "$(CONFIG)" --clock $(CLOCK) --output "$(OUTPUT)" \
-		$(if $(CLIMBERS),--climbers $(CLIMBERS))
+		$(if $(CLIMBERS),--climbers $(CLIMBERS)) $(if $(CORNERS),--corners "$(CORNERS)")
 	@$(BIN)/analyze_bag "$(OUTPUT)/bag" --params "$(CONFIG)" --output "$(OUTPUT)"
 
 help:

@@ -87,13 +87,6 @@ def under_way(trajectory: Trajectory, kind: Any = None, **how: Any) -> Any:
     return (kind or UnderWay)(trajectory, state=state, config=FILE, plant_of=Engine, **how)
 
 
-def off_line(climber: Any, mode: Mode = Mode.FOLLOWING, first: int = 0) -> float:
-    """Most distance [mm] from the line of where it should have been, in a mode."""
-    line = [target[:2] for target in climber.targets if target is not None]
-    places = climber.places[first:][np.array(climber.modes[first:]) == mode]
-    return 1e3 * float(np.max(cKDTree(line).query(places)[0], initial=0.0))
-
-
 def torques(climber: Any, jump: float | None) -> Iterator[Found]:
     """What is told of a climber's torques."""
     yield Found("torque", np.abs(climber.sent).max(), LIMIT, "N m")
@@ -180,33 +173,21 @@ def paths(options: argparse.Namespace) -> Iterator[Found]:
     yield from torques(climber, 0.4)
 
 
-def moments(options: argparse.Namespace) -> Iterator[Found]:
+SHARES = {  # of what is asked for
+    **{"pause": 0.2, "go on": 0.3, "speed": 0.1},
+    **{"another path": 0.15, "start": 0.1, "stick": 0.15},
+}
+
+
+def at_random_times(options: argparse.Namespace) -> Iterator[Found]:
     """Pauses, starts, speeds, other paths and a stick, at random times."""
-    from test_journey import some_path
+    from moments import moments, off_line, some_path
     from under_way import Travelling
 
-    random = np.random.default_rng(1)
+    random, back = np.random.default_rng(1), 0.0
     climber = under_way(some_path(random), Travelling).run(5.0)
-    journey = climber.journey
-    asked: dict[str, Callable[[], Any]] = {
-        "pause": climber.pause,
-        "go on": climber.go_on,
-        "speed": lambda: climber.set_speed(random.uniform(0.2, 1.0)),
-        "another path": lambda: climber.replace(some_path(random, climber.places[-1])),
-        "start": climber.start,
-        "stick": lambda: [
-            climber.stick(random.uniform(-0.3, 0.3), random.uniform(-0.5, 0.5))
-            for _ in range(random.integers(3, 30))
-        ],
-    }
-    back = 0.0
-    for _ in range(options.times):
-        what = random.choice(list(asked), p=[0.2, 0.3, 0.1, 0.15, 0.1, 0.15])
-        first, course = len(climber.times), journey.course
-        asked[what]()
-        climber.run(random.exponential(1.5) + 0.05)
-        if journey.course is course and journey.hand is None:
-            back = max(back, -np.diff(climber.positions[first:]).min())
+    for what, first, went_back in moments(climber, random, options.times, SHARES):
+        back = max(back, went_back)
         if options.verbose:
             off = (
                 off_line(climber, Mode.FOLLOWING, first),
@@ -224,6 +205,8 @@ def moments(options: argparse.Namespace) -> Iterator[Found]:
 
 def fastest(_: argparse.Namespace) -> Iterator[Found]:
     """The fastest law on the file's circle."""
+    from moments import off_line
+
     trajectory, climber, held, wall = read(FILE, {}, [])
     limits = Limits(margin=1.2, yaw_rate=0.6, acceleration=0.2)  # what scrubs takes a part of it
     law = time_optimal(trajectory, climber, held, limits, wall=wall).trajectory
@@ -258,7 +241,7 @@ def stick(_: argparse.Namespace) -> Iterator[Found]:
 JOBS: dict[str, Callable[[argparse.Namespace], Iterator[Found]]] = {
     "lanes": lanes,
     "paths from outside": paths,
-    "at random times": moments,
+    "at random times": at_random_times,
     "fastest law": fastest,
     "stick lost": stick,
 }

@@ -34,6 +34,9 @@ NODES: list[Callable[[], ClimberNode]] = [
 ]
 ALL_ON = [  # what a node publishes and subscribes only if it is asked to
     "trajectory_publisher:by_hand.input:=twist_stamped",
+    "trajectory_publisher:by_hand.lock:=true",
+    "uk_torque_controller:publish_cmd_vel:=true",
+    "uk_torque_controller:effort_commands:=true",
     "uk_torque_controller:stops.emergency_stop:=true",
     "uk_torque_controller:stops.least_charge:=0.2",
     "uk_torque_controller:least_suction.enabled:=true",
@@ -70,9 +73,11 @@ CONTENTS = {
     topics.REFERENCE_PATH: "the whole path, for display",
     topics.TORQUES: "`effort` [N m] and `velocity` [rad/s] by joint name, of which motors "
     "take one; the stamp is that of the odometry it answers",
-    "effort_controller/commands": "the torques again, in the order of `effort_order`",
+    "effort_controller/commands": "the torques again, in the order of `effort_order`; with "
+    "`effort_commands`",
     topics.STICK: "of the controller: the speeds again, if `publish_cmd_vel`: forward, about z; of "
     "the planner: a stick's, by `by_hand.input`",
+    topics.STICK_LOCK: "while true the stick on `cmd_vel` is ignored; with `by_hand.lock`",
     topics.PRESSURE: "pressure difference [Pa]; the plant tells it at 20 Hz",
     topics.SETPOINT: "least pressure difference [Pa] that margins need, for the pump, 20 Hz; with "
     "`least_suction.enabled` of the controller, `setpoint_timeout` of the plant",

@@ -25,7 +25,7 @@ OURS = {
 }
 NODES = {PLANNER, CONTROLLER, PLANT, LOCALIZATION, "markers", "check_driver"}
 PROGRAMS = {*OURS, "make", "python", "pytest", "climber.launch.py"}
-PLACEHOLDER = re.compile(r"[A-Z]+|…|dev|[a-z]+…|/.*…|run|my_.*|demo.*|again|[a-z]+\.(yaml|png)")
+PLACEHOLDER = re.compile(r"[A-Z]+|…|dev|[a-z]+…|/.*…|run|my_.*|demo.*|again|[a-z]+\.(yaml|png|csv)")
 PARTS = re.compile(r"^ *```(\w*)\n(.*?)^ *```|`([^`]+)`", re.DOTALL | re.MULTILINE)
 PREFIX = re.compile(
     r"^(\$ |\.venv/bin/|[A-Z_]+=\S+ |ros2 run climber_uk |ros2 launch climber_uk )+|[][]|\|\w+"

@@ -11,6 +11,7 @@ from climber_uk.campaign.names import REQUIRED, SEED, WITHOUT
 from climber_uk.closed_loop.batch import Change, Loops
 from climber_uk.closed_loop.node_parameters import PARAMETERS
 from climber_uk.closed_loop.period import BatchRun
+from climber_uk.closed_loop.start import begun_there
 from climber_uk.control.build import settings
 from climber_uk.mechanics.adhesion import Grip
 from climber_uk.mechanics.climber import Climber
@@ -58,7 +59,7 @@ class Scenario:
     def course(self) -> BatchRun:
         """Trajectory, duration and timing of all runs; raises as `Node.read` does."""
         options = Node(PLANT, self.values).read(SimulationOptions)
-        trajectory = build_trajectory(Node(PLANNER, self.values).read)
+        trajectory = begun_there(build_trajectory(Node(PLANNER, self.values).read), options)
         period, steps = options.control_period, options.steps
         return BatchRun(trajectory, self.duration, period, steps, backend=self.backend)
 

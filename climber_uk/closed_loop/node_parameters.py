@@ -54,7 +54,7 @@ PATHS = {  # parameters of a path that are files
 NODES_ONLY = {
     *("use_sim_time", "autostart", "start_delay", "preview", "point_period", "publish_period"),
     *("stop_time", "reaction", "speed", "exclusive", "goal_patience"),
-    *(f"by_hand.{name}" for name in ("input", "speed", "yaw_rate", "ramp_time", "timeout")),
+    *(f"by_hand.{name}" for name in ("input", "speed", "yaw_rate", "ramp_time", "timeout", "lock")),
     *("effort_commands", "effort_order", "publish_cmd_vel", "odom_frame", "base_frame"),
     *("left_wheel_joint", "right_wheel_joint", "prefix_frames"),
     *(at + field.name for at, kind in FIELD_SENSORS.items() for field in dataclasses.fields(kind)),

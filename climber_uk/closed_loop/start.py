@@ -3,10 +3,13 @@
 import dataclasses
 import math
 
+import numpy as np
+
 from climber_uk.control.approach import Approach
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.elementary import wrapped
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.trajectory_parameters import begun_near
 from climber_uk.messages.topics import CONTROLLER, PLANT
 from climber_uk.parameters.parameter_file import Values
 from climber_uk.simulation.options import SimulationOptions
@@ -29,6 +32,21 @@ def start_elsewhere(trajectory: Trajectory, controller: Values, plant: Values) -
         f"{PLANT} starts {distance:.2f} m and {turn:.2f} rad off where the path begins{most}: "
         f"there its initial_x is {x}, initial_y {y}, initial_heading {heading}"
     ), is_too_far
+
+
+def begun_there(trajectory: Trajectory, start: SimulationOptions) -> Trajectory:
+    """The path as the node makes it for a climber that starts there."""
+    return begun_near(trajectory, np.array([start.initial_x, start.initial_y]))
+
+
+def begun_at(trajectory: Trajectory) -> dict[str, dict[str, float]]:
+    """Parameters by node of a climber that begins where the path does, at rest, and drives it."""
+    x, y, heading = trajectory.at(0.0).pose.tolist()
+    start = {"initial_x": x, "initial_y": y, "initial_heading": heading}
+    return {
+        PLANT: {**start, "initial_speed": 0.0, "initial_yaw_rate": 0.0},
+        "run_demo": {"duration": float(math.ceil(trajectory.duration + 1.0))},
+    }
 
 
 def other_climber(controller: Values, plant: Values) -> str:

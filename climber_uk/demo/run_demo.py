@@ -12,9 +12,10 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import rclpy
@@ -25,7 +26,8 @@ from std_srvs.srv import Trigger
 
 from climber_uk.closed_loop.node_parameters import PARAMETERS as NODE_PARAMETERS
 from climber_uk.closed_loop.node_parameters import doubts, read_planner
-from climber_uk.closed_loop.start import other_climber, start_elsewhere
+from climber_uk.closed_loop.start import begun_there, other_climber, start_elsewhere
+from climber_uk.demo.corners import write_for_corners
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.trajectory_parameters import build_trajectory
 from climber_uk.messages import reading
@@ -46,6 +48,7 @@ from climber_uk.parameters.parameter_file import Values, given, read_file, read_
 from climber_uk.ros.leaving import leave
 from climber_uk.ros.running import ClimberNode
 from climber_uk.ros.transport import free_domain, use_udp
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.system.command_line import Parser, between, in_words, whole
 from climber_uk.system.processes import die_with, dies_with_me, end
 from climber_uk.system.signals import Interrupted, on_end
@@ -280,6 +283,13 @@ def node_commands(
     return commands
 
 
+def doubts_on(config: Path, climber: str) -> Iterator[str]:
+    """Lines on what can hardly be meant in a file; raises as `read_file` does."""
+    for node in NODES:
+        values = read_file(config, f"{climber}/{node}")
+        yield from doubts(config, values, NODE_PARAMETERS, f"{node}.")
+
+
 def remarks_on(config: Path, climber: str, is_refused: bool) -> list[str]:
     """Lines on a climber that is not where its path begins, or other than its controller has it.
 
@@ -289,6 +299,7 @@ def remarks_on(config: Path, climber: str, is_refused: bool) -> list[str]:
     controller, plant = (Values(read_file(config, f"{climber}/{n}")) for n in (CONTROLLER, PLANT))
     try:
         trajectory = build_trajectory(Values(read_planner(config, f"{climber}/{PLANNER}")).read)
+        trajectory = begun_there(trajectory, plant.read(SimulationOptions))
         elsewhere, is_too_far = start_elsewhere(trajectory, controller, plant)
         said = other_climber(controller, plant), elsewhere
     except ValueError:
@@ -298,10 +309,19 @@ def remarks_on(config: Path, climber: str, is_refused: bool) -> list[str]:
     return [f"{config}: {line}" for line in said if line]
 
 
+def tell(remarks: Iterable[Iterable[str]]) -> None:
+    """Print remarks on the parameters of several climbers, each once."""
+    for line in dict.fromkeys(chain.from_iterable(remarks)):
+        print(f"run_demo: {line}", file=sys.stderr)
+
+
 def parse() -> argparse.Namespace:
     """Options of the command line."""
     parser = Parser("run_demo", __doc__)
     parser.add_argument("--config", type=Path, required=True, help="parameter file of all nodes")
+    parser.add_argument(
+        "--corners", type=Path, help="of an area, as lanes.area: drive lanes over that one instead"
+    )
     parser.add_argument("--output", "-o", type=Path, required=True, help="new directory")
     parser.add_argument(
         "--duration", type=between(1e-3, 1e9), help="[s] (default: that of the config)"
@@ -345,16 +365,18 @@ def main() -> None:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
     climbers = [f"/climber_{number + 1}" for number in range(options.climbers or 0)] or [""]
     try:
-        said: list[str] = []  # of what can hardly be meant, once for all nodes
-        for node in NODES:
-            for climber in climbers:
-                values = read_file(options.config, f"{climber}/{node}")
-                said += doubts(options.config, values, NODE_PARAMETERS, f"{node}.")
-        for climber in climbers:
-            said += remarks_on(options.config, climber, not options.controller)
-        for line in dict.fromkeys(said):
-            print(f"run_demo: {line}", file=sys.stderr)
+        tell(doubts_on(options.config, climber) for climber in climbers)
         options.output.mkdir(parents=True)
+        try:
+            if options.corners:
+                written = options.output / "corners.yaml"
+                write_for_corners(options.config, options.corners, written)
+                options.config = written
+            is_refused = not options.controller
+            tell(remarks_on(options.config, climber, is_refused) for climber in climbers)
+        except (ValueError, OSError):
+            shutil.rmtree(options.output)
+            raise
     except ValueError as error:
         sys.exit(f"run_demo: {error}")
     except OSError as error:

@@ -6,6 +6,7 @@ each it goes on to the nearest end of all that are left, straight or around corn
 
 import itertools
 import math
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -54,8 +55,13 @@ class Lanes(ThroughPoints):
         at_most=100,
     )
     dwell: float = parameter(0.0, "s", "rest where each lane but the first begins", at_least=0)
-    start_x: float = parameter(0.0, "m", "begin at the end of a lane that is nearest to this x")
-    start_y: float = parameter(0.0, "m", "begin at the end of a lane that is nearest to this y")
+    start_x: float = parameter(
+        0.0,
+        "m",
+        "begin at the end of a lane that is nearest to (start_x, start_y); both 0: nearest to "
+        "where the climber is as it starts first",
+    )
+    start_y: float = parameter(0.0, "m", "see start_x")
 
     def __post_init__(self) -> None:
         if self.overlap >= self.width:
@@ -79,6 +85,17 @@ class Lanes(ThroughPoints):
             dwell[begin] = self.dwell
             tags[begin], tags[begin + 1] = f"lane {number} begins", f"lane {number} ends"
         return Marks(np.full(len(places), np.inf), dwell, tuple(tags))
+
+    def near(self, place: Array) -> "Lanes":
+        """The same from the end of a lane that is nearest to the climber's `place` (2,) [m].
+
+        Itself, if it is so already, or is told where to begin.
+        """
+        places, begins = self._way
+        ends = places[np.concatenate([begins, np.array(begins) + 1])]
+        if self.start_x or self.start_y or np.hypot(*(ends - place).T).argmin() == 0:
+            return self
+        return replace(self, start_x=float(place[0]), start_y=float(place[1]))
 
     @cached_property
     def _way(self) -> tuple[Array, list[int]]:

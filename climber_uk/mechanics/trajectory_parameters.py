@@ -1,8 +1,14 @@
 """The trajectory that parameters describe, for nodes and campaigns."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from climber_uk.mechanics import Array
+from climber_uk.mechanics.fastest_law import TabulatedLaw
+from climber_uk.mechanics.lanes import Lanes
 from climber_uk.mechanics.shapes import SHAPES
 from climber_uk.mechanics.time_laws import TIME_LAWS
 from climber_uk.mechanics.trajectory import Trajectory
@@ -36,3 +42,15 @@ def build_trajectory(read: Callable[..., Any]) -> Trajectory:
         reverse_gear=plan.reverse_gear,
         origin=(plan.origin_x, plan.origin_y),
     )
+
+
+def begun_near(trajectory: Trajectory, place: Array) -> Trajectory:
+    """Lanes that begin nearest to the climber's `place` (2,) [m], if they are to; else itself.
+
+    A law that is a table is of one path, and that stays.
+    """
+    shape = trajectory.shape
+    if not isinstance(shape, Lanes) or isinstance(trajectory.law, TabulatedLaw):
+        return trajectory
+    near = shape.near(place - np.array(trajectory.origin))
+    return trajectory if near is shape else replace(trajectory, shape=near)

@@ -11,6 +11,7 @@ REFERENCE_PATH = "reference_path"  # all of it, for display
 GIVEN_PATH = "path"  # from a planner, or a person's clicks
 FOLLOW_PATH = "follow_path"  # an action: the same, for who waits for what becomes of it
 STICK = "cmd_vel"  # speeds: from a stick to the planner, or from the controller to a board
+STICK_LOCK = "by_hand_lock"  # true: the planner ignores the stick
 PROGRESS = f"{PLANNER}/progress"  # how far along its path a climber is
 EVENTS = f"{PLANNER}/events"  # tags of its path that it reaches
 TRUTH = "ground_truth"  # of a simulation, or of what watches from outside

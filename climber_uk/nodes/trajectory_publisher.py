@@ -12,14 +12,19 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import TimeReference
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from climber_uk.mechanics import SECOND, Array
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.summary import summary
-from climber_uk.mechanics.trajectory_parameters import TYPES, TrajectoryParameters, build_trajectory
+from climber_uk.mechanics.trajectory_parameters import (
+    TYPES,
+    TrajectoryParameters,
+    begun_near,
+    build_trajectory,
+)
 from climber_uk.messages import reading, writing
 from climber_uk.messages.references import ReferenceWriter, Row
 from climber_uk.messages.topics import (
@@ -31,6 +36,7 @@ from climber_uk.messages.topics import (
     REFERENCE,
     REFERENCE_PATH,
     REFERENCE_TIME,
+    STICK_LOCK,
     private,
 )
 from climber_uk.parameters.declaration import parameter, parameters
@@ -106,7 +112,7 @@ class TrajectoryPublisher(ClimberNode):
         planned, make = build_trajectory(self.parameters.read), writing.reference_numbers
         self.journey: Journey[Row] = Journey(planned, self.options, hand, make)
         self.journey.speed = self.parameters.read(PublisherOptions).speed
-        self.has_told_done = False
+        self.is_placed = self.has_told_done = False
         self.followed: int | None = None  # [ns] how far a controller has come
         self.mode = ""  # what it does; empty: none tells
         self.last_look = self.stood_at = 0  # [ns] of the clock
@@ -125,6 +131,8 @@ class TrajectoryPublisher(ClimberNode):
         patience = self.parameters.read(PublisherOptions).goal_patience
         self.goals = path_goals(self, self.journey, self.given, patience)
         listen_to_stick(self, hand.input, self.on_stick)
+        if hand.lock:
+            self.subscription(Bool, STICK_LOCK, self.on_stick_lock)
         self.create_service(Trigger, "~/start", self.on_start)
         self.create_service(Trigger, "~/stop", self.on_stop)
         self.create_service(SetBool, "~/pause", self.on_pause)
@@ -199,6 +207,11 @@ class TrajectoryPublisher(ClimberNode):
             return
         self.report("stick", "")
 
+    def on_stick_lock(self, message: Bool) -> None:
+        """Topic by_hand_lock: ignore the stick while true."""
+        self.journey.lock(message.data)
+        self.report("stick lock", "by hand: locked" if message.data else "", is_fault=False)
+
     def said(self, said: Said) -> Said:
         """Log what is done for an operator."""
         if said[0]:
@@ -242,6 +255,8 @@ class TrajectoryPublisher(ClimberNode):
             self.report("start", "odometry refused", str(error))
             return
         self.report("start", "")
+        if self.journey.next == PATH and not self.is_placed and self.is_moved_near(state):
+            return  # to plan has taken a while: it starts at the next odometry
         self.destroy_subscription(self.odometry)
         self.odometry = None
         what = self.shape if self.journey.next == PATH else self.journey.next
@@ -253,6 +268,12 @@ class TrajectoryPublisher(ClimberNode):
         self.publish_around(start)
         self.get_logger().info(f"{what} starts at {start / SECOND:.3f} s")
         self.publish_path(start)
+
+    def is_moved_near(self, state: State) -> bool:
+        """Whether lanes begin elsewhere now, nearest to where the climber is at the first start."""
+        self.is_placed, planned = True, self.journey.planned
+        self.journey.planned = begun_near(planned, state.pose[:2])
+        return self.journey.planned is not planned
 
     def resting_pose(self, state: State) -> Array:
         """Pose (3,) at which a climber in a state is once it rests: on its way it brakes first."""

@@ -7,6 +7,7 @@ import numpy as np
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
+from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import BatteryState, FluidPressure, JointState, TimeReference
 from std_msgs.msg import Bool, Float64MultiArray
@@ -38,6 +39,7 @@ from climber_uk.messages.topics import (
     PRESSURE,
     REFERENCE,
     REFERENCE_TIME,
+    STICK,
     TORQUES,
     private,
 )
@@ -107,11 +109,15 @@ class UkTorqueController(ManagedNode):
         zeros = self.joints.rates(0.0, 0.0)
         torques = JointState(name=self.joints.all, velocity=zeros, effort=zeros)
         self.torques = self.output(TORQUES, torques, writing.WHEEL_COMMAND)
-        self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
+        self.efforts: Publisher | None = None
+        if self.options.effort_commands:
+            self.efforts = self.publisher(Float64MultiArray, "effort_controller/commands")
         zero, base_frame = (0.0, 0.0, 0.0), self.names.base_frame
-        twist = TwistStamped()
-        twist.header.frame_id = base_frame
-        self.twist = self.output("cmd_vel", twist, writing.TWIST)
+        self.twist: Output | None = None  # a stick of another type may be on that topic
+        if self.options.publish_cmd_vel:
+            twist = TwistStamped()
+            twist.header.frame_id = base_frame
+            self.twist = self.output(STICK, twist, writing.TWIST)
         vector, wrench = (of(zero, 0, base_frame) for of in (writing.vector, writing.wrench))
         self.error = self.output("~/tracking_error", vector, writing.VECTOR)
         self.force = self.output(private(FORCE), wrench, writing.WRENCH)
@@ -328,9 +334,9 @@ class UkTorqueController(ManagedNode):
         right_rate, left_rate = self.controller.law.climber.rim_rates(answer.speeds)
         torques = self.joints.torques(left, right)
         self.torques.publish(answer.stamp, self.joints.rates(left_rate, right_rate), torques)
-        if self.options.publish_cmd_vel:
+        if self.twist is not None:
             self.twist.publish(answer.stamp, *answer.speeds)
-        if self.options.effort_commands:
+        if self.efforts is not None:
             is_left_first, lefts = self.options.effort_order == "left_right", len(self.joints.left)
             ordered = torques if is_left_first else torques[lefts:] + torques[:lefts]
             self.efforts.publish(Float64MultiArray(data=ordered))

@@ -2,7 +2,7 @@
 
 The path is that of trajectory_publisher's parameters in a file, the climber that of
 uk_torque_controller's. With `--posterior` it tells as well how probable it is that a climber falls
-or slips that is known only as well as a bag told (`identify BAG --json FILE`). The status is 1 if
+or slips that is known only as well as a bag tells, by `identify`. The status is 1 if
 the path asks for more than there is, and 2 if that cannot be told.
 """
 
@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from climber_uk.closed_loop.node_parameters import PATHS, read_parameters, read_planner
-from climber_uk.closed_loop.start import other_climber, start_elsewhere
+from climber_uk.closed_loop.start import begun_there, other_climber, start_elsewhere
 from climber_uk.control.build import KINDS as CONTROLLER_TYPES
 from climber_uk.control.build import ControllerChoice
 from climber_uk.mechanics.adhesion import ADHESION, Grip
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import LOCOMOTION, Contact
 from climber_uk.mechanics.fastest_law import DEGREE
+from climber_uk.mechanics.lanes import Lanes
 from climber_uk.mechanics.summary import summary
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.trajectory_parameters import TYPES, build_trajectory
@@ -38,9 +39,10 @@ from climber_uk.path_check.demands import demands
 from climber_uk.path_check.fastest import fastest, write_fastest
 from climber_uk.path_check.findings import lines, told, told_of
 from climber_uk.path_check.path_limits import Limits
-from climber_uk.path_check.posterior import chances, read_posterior
+from climber_uk.path_check.posterior import chances, posterior_of
 from climber_uk.path_check.time_optimal import PERIOD, time_optimal
 from climber_uk.report.outputs import failing_in_a_line
+from climber_uk.simulation.options import SimulationOptions
 from climber_uk.simulation.simulated_robot import Physics
 from climber_uk.system.command_line import Parser, between, printable, whole
 
@@ -72,6 +74,7 @@ def read(
     plant = Values({})
     if given(read_sections(file), f"/{PLANT}"):
         plant = Values(read_parameters(file, f"/{PLANT}"))
+        trajectory = begun_there(trajectory, plant.read(SimulationOptions))
         elsewhere, _ = start_elsewhere(trajectory, values, plant)
         said = other_climber(values, plant), "" if changes else elsewhere
         remarks += [f"{file}: {line}" for line in said if line]
@@ -154,7 +157,8 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--posterior",
         type=Path,
-        help="what `identify --json` wrote: tell how probable it is that such a climber falls",
+        help="a bag, or what `identify --json` wrote of one: tell how probable it is that such a "
+        "climber falls",
     )
     parser.add_argument(
         "--climbers",
@@ -172,7 +176,9 @@ def main() -> None:
     with failing_in_a_line("check_path") as remarks:
         changes = dict(map(read_argument, options.param))
         trajectory, climber, contact, wall = read(options.params, changes, remarks)
-        posterior = read_posterior(options.posterior) if options.posterior else None
+        posterior = (
+            posterior_of(options.posterior, options.params, remarks) if options.posterior else None
+        )
         asked, law = (climber, contact), None
         found = demands(trajectory, *asked, options.margin, wall)
         numbers = told(found, trajectory, climber.half_track, remarks)
@@ -197,5 +203,8 @@ def main() -> None:
                 planner = read_planner(options.params, f"/{PLANNER}", changes)
                 files = {name: str(Path(planner[name]).absolute()) for name in PATHS & {*planner}}
                 changes |= files
+                if isinstance(trajectory.shape, Lanes):  # the table is of lanes that begin there
+                    begin = trajectory.shape.start_x, trajectory.shape.start_y
+                    changes |= dict(zip(("lanes.start_x", "lanes.start_y"), begin, strict=True))
                 print(printable(str(write_fastest(law, options.params, changes, options.output))))
     sys.exit(not numbers["feasible"])

@@ -9,12 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from climber_uk.closed_loop.start import begun_at
 from climber_uk.mechanics.climber import Climber
 from climber_uk.mechanics.contact import Contact
 from climber_uk.mechanics.fastest_law import Tabulated, write_table
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.mechanics.wall import PLANE, Wall
-from climber_uk.messages.topics import PLANNER, PLANT
+from climber_uk.messages.topics import PLANNER
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.path_check.demands import demands
 
@@ -64,7 +65,6 @@ def write_fastest(
     law = trajectory.law
     assert isinstance(law, Tabulated)
     write_table(directory / "fastest.csv", law.period, law.table)
-    x, y, heading = trajectory.at(0.0).pose.tolist()
     changes = {
         PLANNER: {
             **planner,
@@ -73,11 +73,7 @@ def write_fastest(
             # so that interpolation between points keeps what the law is smooth by
             "point_period": 2 * law.period,
         },
-        PLANT: {
-            **{"initial_x": x, "initial_y": y, "initial_heading": heading},
-            **{"initial_speed": 0.0, "initial_yaw_rate": 0.0},
-        },
-        "run_demo": {"duration": float(math.ceil(trajectory.duration + 1.0))},
+        **begun_at(trajectory),
     }
     path = directory / "fastest.yaml"
     write_changed(params, changes, path)

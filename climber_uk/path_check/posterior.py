@@ -6,10 +6,14 @@ asked for what it takes to be exactly on the path (`demands`).
 """
 
 import json
+import re
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from math import isfinite
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +26,7 @@ from climber_uk.mechanics.wall import PLANE, Wall
 from climber_uk.parameters.text_file import text_of
 from climber_uk.path_check.demands import Resistance, looked_at, reserves
 from climber_uk.report.proportion import wilson
+from climber_uk.system.processes import dies_with_me
 
 HALF_WIDTH = 1.959963984540054  # standard deviations, of a 95 % interval
 OF_CLIMBER = (
@@ -37,6 +42,9 @@ RESISTING = {  # parameters of identify by those of `Resistance`
 OF_ODOMETRY = ("effective_half_track",)
 POSITIVE = {field.name for field in fields(Climber) if field.metadata["above"] == 0}
 LEAST = 1e-3  # of the estimate, which is drawn
+BAG = re.compile(r"\.(mcap|db3)(\.\w+)?$")  # names of files that are one
+# a tool is no library of another
+IDENTIFY = "from climber_uk.executables import identification; identification.identify()"
 AT_ONCE = 2_000_000  # numbers: climbers by times
 
 
@@ -73,6 +81,25 @@ class Chance:
         """Probability, and the 95 % interval of it that the number of climbers leaves."""
         low, high = wilson(self.count, self.runs)
         return {"probability": self.count / self.runs, "95 %": [low, high]}
+
+
+def posterior_of(path: Path, params: Path, remarks: list[str]) -> Posterior:
+    """The same of a bag, of which `identify` tells it by a parameter file; or of what it wrote.
+
+    Raises as `read_posterior` does, with the words of `identify` where that tells nothing.
+    """
+    if not (path.is_dir() or BAG.search(path.name)):
+        return read_posterior(path)
+    with TemporaryDirectory() as directory:
+        told = Path(directory, "told.json")
+        words = [str(path), "--params", str(params), "--json", str(told)]
+        command = [sys.executable, "-c", IDENTIFY, *words]
+        done = subprocess.run(command, capture_output=True, text=True, preexec_fn=dies_with_me())
+        said = done.stderr.splitlines()
+        if not told.exists():
+            raise ValueError(said[-1] if said else f"identify ended with status {done.returncode}")
+        remarks += said
+        return read_posterior(told)
 
 
 def read_posterior(path: Path) -> Posterior:

@@ -34,6 +34,15 @@ class HandOptions:
     yaw_rate: float = parameter(0.5, "rad/s", "fastest turn; what is more is cut", above=0)
     ramp_time: float = parameter(1.0, "s", "in which a speed is the one asked for", at_least=0.1)
     timeout: float = parameter(0.5, "s", "without a message, after which it brakes", above=0)
+    lock: bool = parameter(
+        False,
+        "",
+        "a true on `by_hand_lock` has the stick ignored until a false; left false, nobody hears it",
+    )
+
+    def __post_init__(self) -> None:
+        if self.lock and self.input == "none":
+            raise ValueError("lock=true needs an input that it locks")
 
 
 def check_speeds(speed: float, yaw_rate: float) -> None:

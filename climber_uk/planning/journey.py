@@ -44,6 +44,7 @@ class Journey(Generic[Row]):
         self.next: str | None = None  # what is to begin
         self.waits_for_rest = False  # of what is under way, for the next to begin
         self.is_paused, self.speed = False, 1.0
+        self.is_locked = False  # whether a stick is ignored
         self.is_halted = False  # paused until something else begins
         self._stays_paused = False  # after that, too
         self._options, self._hand_options, self._make = options, hand, make
@@ -183,12 +184,20 @@ class Journey(Generic[Row]):
         else:
             self.begin(ON if self.course.direction > 0 else RETREAT, position, is_driven)
 
+    def lock(self, is_locked: bool) -> None:
+        """Ignore a stick, which drives no more, or heed it again."""
+        self.is_locked = is_locked
+        if is_locked and self.hand is not None:
+            self.hand.stop()
+
     def takes_over(self, speed: float, yaw_rate: float, now: int) -> bool:
         """Whether a stick's speeds [m/s], [rad/s] are to take over; if they have, drive by them.
 
         Raises as `check_speeds` does.
         """
         check_speeds(speed, yaw_rate)
+        if self.is_locked:
+            return False
         if self.hand is not None and not self.waits_for_rest:
             self.hand.command(speed, yaw_rate, now)
             self.is_held = self.is_held and not (speed or yaw_rate)

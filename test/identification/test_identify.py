@@ -17,6 +17,7 @@ from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
 from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import Values, read_file
+from climber_uk.path_check import check_path
 
 SIDES = "right", "left"
 CONFIG = Path(__file__).parents[2] / "config" / "climber.yaml"
@@ -277,3 +278,25 @@ def test_wrong_joint_names_are_said_with_the_right_ones(monkeypatch, capsys, tmp
         run(monkeypatch, bag)
     said = capsys.readouterr().err
     assert "no a_right and no a_left among the joints left, right" in said
+
+
+def check(monkeypatch, capsys, bag):
+    """Status of check_path with the posterior of a bag, what it says, and its lines on errors."""
+    words = ["check_path", "--params", CONFIG, "--posterior", bag, "--climbers", 10]
+    monkeypatch.setattr(sys, "argv", [*map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        check_path.main()
+    said = capsys.readouterr()
+    return ended.value.code, said.out, said.err.splitlines()
+
+
+@pytest.mark.soak
+def test_check_path_has_it_tell_of_a_bag(monkeypatch, capsys, tmp_path):
+    status, said, _ = check(monkeypatch, capsys, made_bag(tmp_path / "bag", {}))
+    assert status == 0
+    assert "10 climbers drawn: mass 6.5" in said
+    assert "falls: 0.00% " in said
+    (tmp_path / "empty").mkdir()
+    status, said, (line,) = check(monkeypatch, capsys, tmp_path / "empty")
+    assert (status, said) == (2, "")
+    assert line.startswith("check_path: identify: ")

@@ -1,5 +1,6 @@
 """Lanes cover what can be reached of an area, clear of its edge and its holes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,12 @@ from scipy.spatial import cKDTree
 
 from climber_uk.mechanics import lanes as lanes_module
 from climber_uk.mechanics.area import Area, read_area
+from climber_uk.mechanics.fastest_law import Tabulated
 from climber_uk.mechanics.lanes import Lanes, joined, lanes_of
 from climber_uk.mechanics.shapes import Circle
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.mechanics.trajectory_parameters import begun_near
 from climber_uk.mechanics.waypoints import Polyline
 
 FACADE = Path(__file__).parents[2] / "config" / "facade.csv"
@@ -181,6 +184,22 @@ def test_it_begins_at_the_corner_that_is_nearest(tmp_path):
     for x, y in ((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0)):
         lanes = made(tmp_path, AREAS["a facade with a window"], start_x=x, start_y=y)
         assert np.hypot(*(lanes.given()[0] - [x, y])) <= 0.3
+
+
+def test_it_begins_nearest_to_the_climber_unless_it_is_told_where(tmp_path):
+    lanes = made(tmp_path, AREAS["a strip"])
+    origin = np.array([1.0, 2.0])
+    path = Trajectory(lanes, RestToRest(rate=0.2), origin=tuple(origin))
+    for corner in ([3.0, 0.0], [3.0, 0.45], [0.0, 0.45], [0.0, 0.0]):
+        begin = begun_near(path, origin + corner).at(0.0).pose[:2]
+        assert np.hypot(*(begin - origin - corner)) <= 0.3
+    assert begun_near(path, origin) is path
+    told = replace(path, shape=replace(lanes, start_x=3.0))
+    assert begun_near(told, origin) is told
+    length = lanes.at_rate(0.0).length
+    table = np.concatenate([np.zeros(6), np.linspace(0.0, length), np.full(6, length)])
+    of_one_path = replace(path, law=Tabulated(1.0, table))
+    assert begun_near(of_one_path, origin + np.array([3.0, 0.0])) is of_one_path
 
 
 def test_where_the_way_down_counts_more_it_goes_up_from_lane_to_lane(tmp_path):

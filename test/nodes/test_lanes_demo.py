@@ -48,5 +48,5 @@ def test_every_lane_is_driven_and_the_window_kept_out_of(tmp_path):
     assert off(polyline, places).max() <= 5e-3
     assert off(places[::10], polyline).max() <= 5e-3
     area = read_area(lanes.area, lanes.clearance)
-    assert distance(places, area).min() >= lanes.clearance - 1e-3
+    assert distance(places, area).min() >= lanes.clearance
     assert covered(area, places, lanes.width) >= 0.99

@@ -1,6 +1,7 @@
 """An operator pauses a climber on its path, goes on, slower, and back: the three nodes."""
 
 import json
+import re
 import subprocess
 
 import numpy as np
@@ -8,13 +9,14 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from test_faults import LIMIT, LOCK_STEP, PLANNER, PLANT
 from test_waiting import Waiting
 from world import CONFIG, executable
 
 from climber_uk.messages import reading
+from climber_uk.operating.command import DO
 
 pytestmark = pytest.mark.nodes
 
@@ -172,6 +174,8 @@ def test_paused_slower_and_back_it_stays_on_its_path_and_tells_how_far_it_is(wor
     assert climb.command("speed", "1.0") == (0, "speed 1\n")
     assert climb.ask("start").message == "starts at the next odometry"
     climb.drives(0.28, 0.31)
+    # a stick, or ros2_control, may be there, of another type
+    assert not any(map(world.node.count_publishers, ("cmd_vel", "effort_controller/commands")))
     assert all(abs(torque) <= LIMIT for m in climb.torques for torque in m.effort)
     assert max(abs(m.pose.pose.position.y - 3.0) for m in climb.odometry) < 0.01
 
@@ -216,7 +220,7 @@ def test_tags_of_a_path_are_told_as_the_climber_reaches_them(world):
 @pytest.mark.soak
 def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
-    by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2"]
+    by_hand = ["by_hand.input:=twist_stamped", "by_hand.speed:=0.2", "by_hand.lock:=true"]
     heading = ["initial_heading:=0.0"]
     climb = Operated(world, {PLANNER: [*line, *by_hand], PLANT: heading})
     climb.drives(0.28, 0.31)
@@ -224,14 +228,21 @@ def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     asked = TwistStamped()
     asked.twist.linear.x, asked.twist.angular.z = 1.0, 0.3  # cut to 0.2
 
-    def drives_by_hand():
+    lock = world.speak(Bool, "by_hand_lock")
+
+    def drives(speed, yaw_rate):
         stick.publish(asked)
         last = [m.twist.twist for m in climb.odometry[-15:]]
         return all(
-            abs(twist.linear.x - 0.2) < 0.01 and abs(twist.angular.z - 0.3) < 0.02 for twist in last
+            abs(twist.linear.x - speed) < 0.01 and abs(twist.angular.z - yaw_rate) < 0.02
+            for twist in last
         )
 
-    world.wait(drives_by_hand, "a turn by hand")
+    world.wait(lambda: drives(0.2, 0.3), "a turn by hand")
+    lock.publish(Bool(data=True))
+    world.wait(lambda: drives(0.0, 0.0), "rest, though the stick is moved")
+    lock.publish(Bool(data=False))
+    world.wait(lambda: drives(0.2, 0.3), "a turn by hand again")
     climb.drives(-1e-3, 1e-3)  # the stick is silent
     climb.is_told_to_be("by hand")
     left = climb.odometry[-1].pose.pose.position
@@ -241,6 +252,30 @@ def test_a_stick_takes_over_and_gives_back_what_it_has_left(world):
     climb.is_told_to_be("done")
     end = climb.odometry[-1].pose.pose.position
     assert (end.x, end.y) == pytest.approx((4.0, 3.0), abs=0.01)
+
+
+@pytest.mark.soak
+def test_the_command_does_all_it_is_there_for(world):
+    line = ["shape:=line", "line.length:=4.0", "rest_to_rest.rate:=0.3"]
+    climb = Operated(world, {PLANNER: line, PLANT: ["initial_heading:=0.0"]})
+    climb.drives(0.28, 0.31)
+    does = {
+        "pause": r"comes to rest within [\d.]+ s",
+        "resume": "goes on",
+        "speed 0.5": "speed 0.5",
+        "status": r"following, .* m done, .* m left, .* s, lap 1, segment 1",
+        "push 20 0": r"pushed by \(20, 0\) N",
+        "disable": "inactive",
+        "enable": "active",
+        "stop": r"comes to rest within [\d.]+ s|rests where it is|comes to rest where it is",
+        "retreat": "goes back along the path",
+        "watch": r"(?s).*\n(following|done), 0\.0\d m done, .*",
+        "start": "starts at the next odometry",
+    }
+    assert {words.split()[0] for words in does} == {*DO}
+    for words, said in does.items():
+        status, told = climb.command(*words.split())
+        assert (status, bool(re.fullmatch(said, told.strip()))) == (0, True), (words, told)
 
 
 def test_the_command_tells_when_nobody_answers_and_what_it_takes(world):

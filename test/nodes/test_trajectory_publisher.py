@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry, Path
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
@@ -77,6 +78,21 @@ def test_without_autostart_it_waits_for_its_service_and_stop_brings_it_to_rest(w
     assert min(taken_back) > 0.3 * SECOND
 
 
+def test_a_stick_without_stamps_drives_too(world):
+    references = start(world, "autostart:=false", "by_hand.input:=twist", "by_hand.ramp_time:=0.2")
+    world.start_node("plant_simulator")
+    stick, asked = world.speak(Twist, "cmd_vel"), Twist()
+    asked.linear.x, asked.angular.z = 0.1, -0.2
+
+    def drives():
+        stick.publish(asked)
+        rates = (point.velocities[0] for message in references[-1:] for point in message.points)
+        told = [(np.hypot(of.linear.x, of.linear.y), of.angular.z) for of in rates]
+        return pytest.approx((0.1, -0.2)) in told
+
+    world.wait(drives, "a reference as fast as the stick asks for")
+
+
 @pytest.mark.parametrize("seconds", [pytest.param(0, marks=pytest.mark.soak), 5])
 def test_where_the_clock_goes_back_the_trajectory_starts_again_and_goes_on(world, seconds):
     references = start(world, "use_sim_time:=true")
@@ -123,3 +139,14 @@ def test_waypoints_are_relative_to_the_parameter_file_that_names_them(world, tmp
     world.wait(lambda: paths, "path")
     end = paths[0].poses[-1].pose.position
     np.testing.assert_allclose([end.x, end.y], [1.5, 0.3], atol=1e-9)
+
+
+def test_lanes_begin_where_the_climber_is_nearest_to_them(world):
+    (world.directory / "strip.csv").write_text("0 0\n3 0\n3 0.45\n0 0.45\n")
+    area = f"lanes.area:={world.directory / 'strip.csv'}"
+    world.start_node("trajectory_publisher", "shape:=lanes", area)
+    references = world.listen(MultiDOFJointTrajectory, "reference")
+    world.start_node("plant_simulator", "initial_x:=2.9", "initial_y:=0.3")
+    world.wait(lambda: references, "previews")
+    begin = references[0].points[0].transforms[0].translation
+    assert (begin.x, begin.y) == pytest.approx((2.8, 0.245), abs=0.02)

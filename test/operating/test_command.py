@@ -1,7 +1,11 @@
 """What the command line of `climber` takes."""
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from geometry_msgs.msg import Vector3, Vector3Stamped
@@ -108,3 +112,18 @@ def test_what_nobody_tells_is_a_dash_and_bars_go_without_a_limit(missing):
 @pytest.mark.parametrize("share", [-math.inf, -2.0, -1.0, -0.01, 0.0, 0.5, 1.0, 9.0, math.nan])
 def test_a_bar_is_as_wide_whatever_it_shows(share):
     assert len(watching.bar(share)) == 2 * watching.HALF + 1
+
+
+def test_a_shell_completes_it():
+    """As bash asks argcomplete: what is typed in the environment, answers on descriptor 8."""
+    typed = "climber re"
+    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": " ", "COMP_LINE": typed}
+    asked |= {"COMP_POINT": str(len(typed)), "COMP_TYPE": "9"}
+    climber = Path(sys.executable).parent / "climber"
+    done = subprocess.run(
+        ["bash", "-c", f"'{climber}' 8>&1 9>&2 >/dev/null"],
+        env={**os.environ, **asked},
+        capture_output=True,
+        text=True,
+    )
+    assert sorted(done.stdout.split()) == ["resume", "retreat"], done.stderr

@@ -120,6 +120,18 @@ def test_the_configuration_of_lanes_is_feasible_and_drawn(monkeypatch, capsys, t
     assert (tmp_path / "out" / "check_path.png").stat().st_size > 10_000
 
 
+def test_lanes_begin_where_the_simulated_climber_is_nearest_to_them(tmp_path):
+    file, area = tmp_path / "lanes.yaml", tmp_path / "facade.csv"
+    area.write_text("0 0\n3 0\n3 0.45\n0 0.45\n")
+    text = (CONFIG / "lanes.yaml").read_text()
+    file.write_text(text.replace("initial_x: 0.201", "initial_x: 2.799"))
+    remarks = []
+    trajectory, *_ = check_path.read(file, {}, remarks)
+    assert trajectory.at(0.0).pose[:2] == pytest.approx((2.8, 0.2), abs=0.01)
+    (said,) = remarks  # its heading
+    assert "starts 0.00 m and 3.14 rad off" in said
+
+
 def test_what_looks_like_a_mistake_is_said(monkeypatch, capsys):
     line = "-p", "shape:=line", "-p", "rest_to_rest.laps:=3"
     words = ["check_path", "--params", CONFIG / "climber.yaml", *line]

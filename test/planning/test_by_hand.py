@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from under_way import UnderWay
+from under_way import CONFIG, Travelling, UnderWay
 
+from climber_uk.closed_loop.node_parameters import read_parameters
 from climber_uk.control.safety import Mode
 from climber_uk.mechanics import SECOND
 from climber_uk.mechanics.quantities import State
 from climber_uk.mechanics.shapes import Line
 from climber_uk.mechanics.time_laws import RestToRest
 from climber_uk.mechanics.trajectory import Trajectory
+from climber_uk.messages.topics import STICK_LOCK
+from climber_uk.parameters.parameter_file import Values, read_file
 from climber_uk.planning.by_hand import ByHand, HandOptions
 from climber_uk.planning.course import CourseOptions
+from climber_uk.ros import plant_parts
 
 OPTIONS, HAND = CourseOptions(), HandOptions(input="twist", speed=0.25, yaw_rate=0.6)
 ASKED = st.lists(
@@ -80,12 +84,20 @@ def test_speeds_that_are_none_are_refused(speeds):
         begun().command(*speeds, 0)
 
 
+def slipping_plant(**parameters):
+    """The plant of climber.yaml, whose wheels may slip."""
+    given = {**read_file(CONFIG, "/plant_simulator"), "slip": True, **parameters}
+    return plant_parts.parts(Values(given)).plant
+
+
 @pytest.mark.parametrize(
     "heading", [-np.pi / 2, *(pytest.param(it, marks=pytest.mark.soak) for it in (np.pi / 2, 0.0))]
 )
-def test_a_stick_that_is_lost_at_full_speed_stops_the_climber_without_a_jump(heading):
+def test_a_stick_that_is_lost_at_full_speed_stops_the_climber_without_slip_or_a_jump(heading):
+    """It rests by the end of the first preview that is published once `timeout` is over."""
     line = Trajectory(Line(length=1.0, direction=heading), RestToRest(rate=0.1))
-    climb = UnderWay(line, state=State(line.at(0.0).pose, np.zeros(3)))
+    start = State(line.at(0.0).pose, np.zeros(3))
+    climb = UnderWay(line, state=start, plant_of=lambda _: slipping_plant())
     start = climb.now
     hand = ByHand(
         line.at(0.0).pose,
@@ -94,18 +106,65 @@ def test_a_stick_that_is_lost_at_full_speed_stops_the_climber_without_a_jump(hea
         HAND,
         lambda reference, time: (start + round(time * SECOND), reference),
     )
-    lost = 4.0
+    lost, ends = 4.0, []
 
     def preview(position):
-        if climb.now <= start + lost * SECOND:
+        since = (climb.now - start) / SECOND - lost
+        if since <= 0:
             hand.command(1.0, 0.0, climb.now)
-        return hand.preview(position, climb.now)
+        rows = hand.preview(position, climb.now)
+        if since > HAND.timeout:
+            ends.append(rows[-1][0])
+        return rows
 
     climb.course.preview = preview
     climb.run(lost)
     assert climb.states[-1].forward_speed == pytest.approx(HAND.speed, rel=0.02)
+    climb.run(5.0, until=lambda: ends and climb.now >= ends[0])
     within = HAND.timeout + OPTIONS.reaction + 3 * OPTIONS.publish_period + HAND.ramp_time
-    climb.run(within)
+    assert climb.now - start <= (lost + within) * SECOND + 1
     assert climb.states[-1].forward_speed == pytest.approx(0.0, abs=1e-3)
     assert set(climb.modes) == {Mode.FOLLOWING}
     assert climb.largest_jump <= 0.2
+    assert max(abs(state.side_slip) for state in climb.states) <= 1e-9
+    assert not any(state.slip.any() for state in climb.states[1:])
+
+
+def test_a_stick_that_is_locked_stops_the_climber_and_is_ignored_until_it_is_not():
+    line = Trajectory(Line(length=1.0, direction=-np.pi / 2), RestToRest(rate=0.1))
+    climb = Travelling(line, state=State(line.at(0.0).pose, np.zeros(3)))
+
+    def steer(seconds):
+        for _ in range(round(10 * seconds)):
+            climb.stick(1.0, 0.0)
+        return climb.state.forward_speed
+
+    assert steer(2.0) == pytest.approx(0.2, rel=0.02)
+    climb.journey.lock(True)
+    within = OPTIONS.reaction + 3 * OPTIONS.publish_period + HAND.ramp_time
+    assert steer(within) == pytest.approx(0.0, abs=1e-3)
+    assert steer(0.5) == pytest.approx(0.0, abs=1e-3)
+    climb.journey.lock(False)
+    assert steer(2.0) == pytest.approx(0.2, rel=0.02)
+    assert climb.largest_jump <= 0.2
+
+
+def test_a_lock_of_no_stick_is_refused():
+    with pytest.raises(ValueError, match="lock=true needs an input"):
+        HandOptions(lock=True)
+
+
+def test_what_a_gamepad_sends_by_its_file_is_what_the_planner_takes():
+    gamepad, planner = CONFIG.with_name("joystick.yaml"), "/trajectory_publisher"
+    hand = Values(read_parameters(gamepad, planner)).read(HandOptions, "by_hand.")
+    sends = read_file(gamepad, "/teleop_twist_joy_node")
+    assert hand.input == ("twist_stamped" if sends["publish_stamped_twist"] else "twist")
+    assert (hand.speed, hand.yaw_rate) == (sends["scale_linear.x"], sends["scale_angular.yaw"])
+    assert 1 / read_file(gamepad, "/joy_node")["autorepeat_rate"] <= hand.timeout / 2
+
+
+def test_the_lock_of_twist_mux_by_its_file_is_the_planners_and_above_all():
+    mux = read_file(CONFIG.with_name("twist_mux.yaml"), "/twist_mux")
+    assert mux["locks.by_hand_lock.topic"] == STICK_LOCK
+    priorities = {name: of for name, of in mux.items() if name.endswith("priority")}
+    assert max(priorities, key=priorities.get) == "locks.by_hand_lock.priority"
