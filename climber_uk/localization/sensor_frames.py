@@ -29,6 +29,9 @@ class SensorFrames:
     map_frame: str = parameter(
         "map", "", "frame in which the estimate is right at once; see docs/localization.md"
     )
+    publish_tf: bool = parameter(
+        True, "", "publish odom_frame in map_frame on /tf, where tf2_msgs is installed"
+    )
 
     def force(self, x: float, y: float) -> tuple[float, float]:
         """Specific force forwards and to the left, of one along the IMU's x and y."""
