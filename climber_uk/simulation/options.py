@@ -20,10 +20,13 @@ class SimulationOptions:
         True, "", "publish base_frame in odom_frame on /tf, where tf2_msgs is installed"
     )
     real_time_factor: float = parameter(
-        0.0, "", "fastest simulated time by wall-clock time; 0: no limit", at_least=0
+        0.0,
+        "",
+        "fastest simulated time by wall-clock time: 1 is real time; 0: no limit",
+        at_least=0,
     )
     control_period: float = parameter(
-        0.005, "s", "from one odometry to the next", at_least=1e-4, plausible=(5e-4, 0.5)
+        0.005, "s", "time from one odometry to the next", at_least=1e-4, plausible=(5e-4, 0.5)
     )
     integration_step: float = parameter(
         0.0025, "s", "step of the integrator", at_least=1e-6, plausible=(1e-5, 0.5)
@@ -42,7 +45,7 @@ class SimulationOptions:
         plausible=(0.1, 5),
     )
     lockstep_timeout: float = parameter(
-        5.0, "s", "wall-clock wait for a torque, then a warning", above=0
+        5.0, "s", "wall-clock time that a torque is waited for, then a warning", above=0
     )
     wait_for: str = parameter(
         "", "", "node, as a recorder, for whose subscriptions time waits; empty: none"
