@@ -6,6 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from climber_uk.closed_loop.node_parameters import PARAMETERS
+from climber_uk.messages.topics import CONTROLLER, PLANT
+from climber_uk.parameters.parameter_file import load
+
 pytestmark = pytest.mark.slow
 
 BENCH = Path(__file__).parents[1] / "bench"
@@ -21,6 +25,33 @@ def test_a_row_has_a_figure_for_every_controller():
     assert len(kinds) > 6
     figures = [float(figure) for figure in figures.removeprefix(row).split()[1:]]
     assert len(figures) == len(kinds)
+
+
+@pytest.mark.soak
+def test_a_row_of_wall_bench_that_is_run_twice_is_the_same_to_the_last_bit(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(BENCH)
+    import wall_bench
+
+    monkeypatch.setattr(wall_bench, "DURATION", 4.0)
+    monkeypatch.setattr(wall_bench, "UNTIL", 3.5)
+    rows = load((BENCH / "wall_bench.yaml").read_text())
+    runs = []
+    for number in range(2):
+        (folder := tmp_path / str(number)).mkdir()
+        runs.append(wall_bench.drive(rows["the same noise, no twist"], "", folder))
+    told = [wall_bench.numbers(run) for run in runs]
+    assert told[0] == told[1]
+    assert len(told[0]) == len(wall_bench.HEAD)
+    assert not runs[0].odometry.values[:, 3:].any()
+
+
+def test_rows_of_wall_bench_change_what_there_is(tmp_path):
+    known = {name.removeprefix(f"{PLANT}.") for name in PARAMETERS}
+    for row in load((BENCH / "wall_bench.yaml").read_text()).values():
+        config, told = row.pop("config", "climber.yaml"), row.pop("told", {})
+        assert (BENCH.parent / "config" / config).exists()
+        assert set(row) <= known
+        assert {f"{CONTROLLER}.{name}" for name in told} <= set(PARAMETERS)
 
 
 SCRIPTS = sorted(path for path in BENCH.glob("*.py") if "argparse" in path.read_text())

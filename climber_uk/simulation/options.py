@@ -16,6 +16,9 @@ class SimulationOptions:
     publish_odometry: bool = parameter(
         True, "", "publish odom; false: wall_odometry makes it, of joint_states, imu and pose"
     )
+    publish_twist: bool = parameter(
+        True, "", "tell speeds in odom; false: its twist is 0, as of drivers that tell a pose alone"
+    )
     publish_tf: bool = parameter(
         True, "", "publish base_frame in odom_frame on /tf, where tf2_msgs is installed"
     )
