@@ -84,6 +84,7 @@ ONLY_PARSED = {
     r"make (bench|physics|sbom)": "installs other packages first",
     r"make campaign|campaign (config/campaign.yaml|FILE).*|campaign examples/.*": "takes minutes "
     "to hours; test/campaign and test/nodes/test_own_law.py run smaller ones",
+    r"python requirements.py": "fetches 600 MB: test_requirements.py looks at what it has written",
     r"python examples/second_publisher.py": "needs a climber that drives: test_faults.py gives it",
     r"(\w+|python examples/\w+.py) --ros-args .*|markers &": "ends with Ctrl-C: test_readme.py "
     "starts those of the README together, test/nodes each with its parameters",
