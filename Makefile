@@ -19,8 +19,9 @@ SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools-set-up
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 # One line of the terminal tells what pip is about; its errors stay, and so does its status
-SHOWN := 2>&1; echo "ended $$?"; } | awk '/^ended / {status = $$2} /^ERROR|^error/ {print "\r" $$0} \
-	/^Collecting|^Processing/ {what = ++count " of 100: " $$2} /^Installing/ {what = "installing"} \
+SHOWN := 2>&1; echo "ended $$?"; } | awk '/^ended / {status = $$2; next} /^ERROR|^error/ {bad = 1} \
+	bad {print "\r" $$0} /^Installing/ {what = "installing"} \
+	/^Collecting|^Processing/ {what = ++count " of 100: " $$2} \
 	what {printf "\r\033[K  %.70s", what; fflush(); what = ""} END {printf "\r\033[K"; exit status}'
 # Exactly what requirements.txt has, to the last bit
 EXACTLY := --no-deps --no-build-isolation --require-hashes --requirement
