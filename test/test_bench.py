@@ -28,7 +28,8 @@ def test_a_row_has_a_figure_for_every_controller():
 
 
 @pytest.mark.soak
-def test_a_row_of_wall_bench_that_is_run_twice_is_the_same_to_the_last_bit(monkeypatch, tmp_path):
+@pytest.mark.parametrize("row", ["the same noise, no twist", "30 % of odometry lost"])
+def test_a_row_of_wall_bench_run_twice_is_the_same_to_the_last_bit(row, monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(BENCH)
     import wall_bench
 
@@ -38,11 +39,13 @@ def test_a_row_of_wall_bench_that_is_run_twice_is_the_same_to_the_last_bit(monke
     runs = []
     for number in range(2):
         (folder := tmp_path / str(number)).mkdir()
-        runs.append(wall_bench.drive(rows["the same noise, no twist"], "", folder))
+        runs.append(wall_bench.drive(rows[row], "", folder))
     told = [wall_bench.numbers(run) for run in runs]
     assert told[0] == told[1]
     assert len(told[0]) == len(wall_bench.HEAD)
-    assert not runs[0].odometry.values[:, 3:].any()
+    assert runs[0].odometry.values[:, 3:].any() == rows[row].get("publish_twist", True)
+    sent = len(runs[0].odometry.values) / (wall_bench.DURATION / 0.005)
+    assert sent == pytest.approx(1 - rows[row].get("odometry_loss", 0.0), abs=0.1)
 
 
 def test_rows_of_wall_bench_change_what_there_is(tmp_path):

@@ -19,6 +19,9 @@ class SimulationOptions:
     publish_twist: bool = parameter(
         True, "", "tell speeds in odom; false: its twist is 0, as of drivers that tell a pose alone"
     )
+    odometry_loss: float = parameter(
+        0.0, "", "share of odometry that is never published, as if lost", at_least=0, at_most=0.9
+    )
     publish_tf: bool = parameter(
         True, "", "publish base_frame in odom_frame on /tf, where tf2_msgs is installed"
     )
@@ -65,6 +68,8 @@ class SimulationOptions:
                 f"control_period={self.control_period} must be a multiple of "
                 f"integration_step={self.integration_step} [s]"
             )
+        if self.odometry_loss > 0 and not self.publish_odometry:
+            raise ValueError(f"odometry_loss={self.odometry_loss} needs publish_odometry=True")
         if self.real_time_factor > 0 and not self.simulated_time:
             raise ValueError(f"real_time_factor={self.real_time_factor} needs simulated_time=True")
 
