@@ -19,6 +19,13 @@ BIN := $(VENV)/bin
 SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools-set-up
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
+# One line of the terminal tells what pip is about; its errors stay, and so does its status
+SHOWN := 2>&1; echo "ended $$?"; } | awk '/^ended / {status = $$2; next} /^ERROR|^error/ {bad = 1} \
+	bad {print "\r" $$0} /^Installing/ {what = "installing"} \
+	/^Collecting|^Processing/ {what = ++count " of 100: " $$2} \
+	what {printf "\r\033[K  %.70s", what; fflush(); what = ""} END {printf "\r\033[K"; exit status}'
+# Exactly what requirements.txt has, to the last bit
+EXACTLY := --no-deps --no-build-isolation --require-hashes --requirement
 
 $(foreach name,config clock climbers corners output,$(if $(filter command,$(origin $(name))),\
 	$(error $(name)= is not heeded: its name is in capitals)))
@@ -60,7 +67,8 @@ $(VENV)/physics: $(SET_UP) bench/requirements.txt
 	touch $@
 
 $(VENV)/bench: $(TOOLS) bench/requirements.txt
-	$(PIP) --constraint requirements.txt --requirement bench/requirements.txt
+	sed 's/ --hash.*//' requirements.txt > $(VENV)/constraints.txt # else these would need hashes
+	$(PIP) --constraint $(VENV)/constraints.txt --requirement bench/requirements.txt
 	touch $@
 
 ## all that CI runs: unit, and beside it lint and then colcon
@@ -97,7 +105,7 @@ test-kilted: $(KILTED)/set-up
 
 $(KILTED)/set-up: requirements.txt setup.py
 	$(PYTHON) -m venv $(KILTED)
-	grep -v '^ros-' requirements.txt > $(KILTED)/requirements.txt
+	sed '/^ros-/d; /^evo/d; s/ --hash.*//' requirements.txt > $(KILTED)/requirements.txt
 	$(KILTED)/bin/pip install --quiet --requirement $(KILTED)/requirements.txt \
 		'ros-kilted-rclpy[fastrtps]==9.1.2' ros-kilted-common-interfaces==5.5.1
 	$(KILTED)/bin/pip install --quiet --no-deps --no-build-isolation evo==1.38.1 --editable .
@@ -133,17 +141,23 @@ colcon: $(TOOLS)
 	rm -rf build install log
 
 $(SET_UP): requirements.txt setup.py
-	@echo "Setting up $(VENV), once: ROS 2, numpy, scipy, matplotlib (about 150 MB to fetch, 500 on the disk)"
+	@echo "Setting up $(VENV), once: 100 packages of ROS 2, numpy, scipy, matplotlib; 150 MB to fetch, 500 on"
+	@echo "the disk; a minute or two."
 	@$(PYTHON) -m venv $(VENV)
-	@$(PIP) --constraint requirements.txt setuptools
-	@$(PIP) --constraint requirements.txt --no-build-isolation --editable .[ros,analysis]
+	@grep '^setuptools' requirements.txt > $(VENV)/first.txt
+	@sed '/^# For tests/,$$d' requirements.txt > $(VENV)/demo.txt
+	@$(PIP) $(EXACTLY) $(VENV)/first.txt
+	@{ $(subst --quiet,,$(PIP)) $(EXACTLY) $(VENV)/demo.txt $(SHOWN)
+	@$(PIP) --no-deps --no-build-isolation --editable .
 	@touch $@
 
 $(TOOLS): requirements.txt setup.py
 	$(PYTHON) -m venv $(VENV)
-	grep '^[^#]' requirements.txt | xargs -P 2 -n 90 $(PIP) --no-deps # all that it needs is in it
-	$(PIP) --no-deps --no-build-isolation \
-		evo==1.38.1 --editable . # evo without pandas and seaborn, 90 MB that the tests do not need
+	grep '^setuptools' requirements.txt > $(VENV)/first.txt
+	$(PIP) $(EXACTLY) $(VENV)/first.txt
+	split --number=r/2 requirements.txt $(VENV)/half- # all that is needed is in it; of evo not pandas and seaborn
+	ls $(VENV)/half-* | xargs -P 2 -n 1 $(PIP) $(EXACTLY)
+	$(PIP) --no-deps --no-build-isolation --editable .
 	touch $(SET_UP) $@
 
 ## remove what the others made

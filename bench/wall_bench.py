@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -20,16 +21,18 @@ from climber_uk.parameters.changed_parameters import write_changed
 from climber_uk.parameters.parameter_file import load
 
 HERE = Path(__file__).parent
-CONFIG = HERE.parent / "config" / "climber.yaml"
+CONFIGS = HERE.parent / "config"
 DURATION, UNTIL = 20.0, 19.5  # [s] of a run, and of it that counts: the end of a bag is anywhere
 HEAD = "RMS [mm]", "max [mm]", "at the end", "torque change", "way"
 
 
-def drive(changes: dict[str, object], controller: str, folder: Path) -> RecordedRun:
+def drive(changes: dict[str, Any], controller: str, folder: Path) -> RecordedRun:
     """Drive a row's wall; raises `CalledProcessError` if a process ends."""
     config = folder / "row.yaml"
-    period = {k: v for k, v in changes.items() if k == "control_period"}
-    write_changed(CONFIG, {PLANT: changes, CONTROLLER: period}, config)
+    wall = {name: value for name, value in changes.items() if name not in ("config", "told")}
+    told = {k: v for k, v in wall.items() if k == "control_period"} | changes.get("told", {})
+    base = CONFIGS / changes.get("config", "climber.yaml")
+    write_changed(base, {PLANT: wall, CONTROLLER: told}, config)
     words = ["--config", config, "--output", folder / "run", "--duration", str(DURATION)]
     words += ["--controller", controller] if controller else []
     subprocess.run(

@@ -39,16 +39,22 @@ ALL_ON = [  # what a node publishes and subscribes only if it is asked to
     "uk_torque_controller:effort_commands:=true",
     "uk_torque_controller:stops.emergency_stop:=true",
     "uk_torque_controller:stops.least_charge:=0.2",
+    "uk_torque_controller:guard.encoder_distance:=0.2",
     "uk_torque_controller:least_suction.enabled:=true",
     "plant_simulator:simulated_time:=true",
     "plant_simulator:setpoint_timeout:=0.5",
     "plant_simulator:imu.enabled:=true",
     "plant_simulator:fixes.period:=0.1",
 ]
-UNSEEN = {  # that the node does not list, or publishes only where a package is installed
-    "uk_torque_controller": [("~/transition_event", "lifecycle_msgs/TransitionEvent")],
-    "plant_simulator": [("/tf", "tf2_msgs/TFMessage")],
-    "wall_odometry": [("/tf", "tf2_msgs/TFMessage")],
+RELIABLE, SENT_RELIABLE = "reliable, last 10", "reliable, last 1000"
+UNSEEN = {  # by node: what it does not list, or has only at times, or where a package is installed
+    "trajectory_publisher": [("subscribes", topics.STICK, "geometry_msgs/Twist", RELIABLE)],
+    "uk_torque_controller": [
+        ("publishes", "~/transition_event", "lifecycle_msgs/TransitionEvent", RELIABLE)
+    ],
+    "plant_simulator": [("publishes", "/tf", "tf2_msgs/TFMessage", SENT_RELIABLE)],
+    "wall_odometry": [("publishes", "/tf", "tf2_msgs/TFMessage", SENT_RELIABLE)],
+    "check_driver": [("publishes", topics.TORQUES, "sensor_msgs/JointState", SENT_RELIABLE)],
 }
 ACTIONS = {  # that the node has only where a package is installed
     "trajectory_publisher": [(topics.FOLLOW_PATH, "nav2_msgs/FollowPath")],
@@ -99,7 +105,8 @@ CONTENTS = {
     topics.MARGINS[1]: "what the controller publishes",
     topics.CLOCK: "simulated time, if `simulated_time`; 100 Hz of it, or each control period if "
     "longer",
-    "/tf": "the true pose, where tf2_msgs is installed",
+    "/tf": "of the plant: the true pose, `base_link` in `odom`; of wall_odometry: `odom` in "
+    "`map_frame`; where tf2_msgs is installed, with `publish_tf`",
     topics.DIAGNOSTICS: "every second and when something changes: troubles and values",
     "~/tracking_error": "along-track [m], cross-track [m], heading [rad]",
     topics.private(
@@ -211,10 +218,8 @@ def interfaces(nodes: list[ClimberNode]) -> str:
             for end in ends:
                 kind = type_name(end.msg_type)
                 lines += entry(node, word, end.topic_name, kind, qos(end.qos_profile))
-        for name, kind in UNSEEN.get(node.get_name(), ()):
-            lines.append(
-                f"| publishes | `{name}` | {kind} | reliable, last 10 | {CONTENTS[name]} |"
-            )
+        for word, name, kind, quality in UNSEEN.get(node.get_name(), ()):
+            lines.append(f"| {word} | `{name}` | {kind} | {quality} | {CONTENTS[name]} |")
         for service in node.services:
             lines += entry(node, "serves", service.service_name, type_name(service.srv_type), "")
         for name, kind in ACTIONS.get(node.get_name(), ()):
@@ -231,6 +236,32 @@ def entry(node: ClimberNode, word: str, name: str, kind: str, quality: str) -> l
     return [f"| {word} | `{short}` | {kind} | {quality} | {CONTENTS[short]} |"]
 
 
+def topic_names(node: ClimberNode, word: str) -> list[str]:
+    """Full names of all topics that a node `publishes`, or `subscribes`."""
+    ends = node.publishers if word == "publishes" else node.subscriptions
+    unseen = [name for how, name, *_ in UNSEEN.get(node.get_name(), ()) if how == word]
+    return [*(end.topic_name for end in ends), *map(node.resolve_topic_name, unseen)]
+
+
+def check_graph(node: ClimberNode) -> None:
+    """Raise `LookupError` if the running graph has of a node what it would not be said to have."""
+    whose = node.get_name(), node.get_namespace()
+    known = {
+        "publishes": topic_names(node, "publishes"),
+        "subscribes": topic_names(node, "subscribes"),
+        "serves": [service.service_name for service in node.services],
+    }
+    running = {
+        "publishes": node.get_publisher_names_and_types_by_node(*whose),
+        "subscribes": node.get_subscriber_names_and_types_by_node(*whose),
+        "serves": node.get_service_names_and_types_by_node(*whose),
+    }
+    for word, found in running.items():
+        names = {name for name, _ in found if not any(part in name for part in EVERY_NODE)}
+        if not found or (lacking := names - {*known[word]}):
+            raise LookupError(f"{whose[0]} {word} {lacking}, of which nothing is said here")
+
+
 def security_policy(nodes: list[ClimberNode]) -> str:
     """What each of `nodes` has to be allowed, as `ros2 security` takes it: an enclave for each."""
     lines = [
@@ -241,14 +272,10 @@ def security_policy(nodes: list[ClimberNode]) -> str:
     ]
     for node in nodes:
         own = node.get_fully_qualified_name()
-        unseen = [name.replace("~", own) for name, _ in UNSEEN.get(node.get_name(), ())]
+        published, subscribed = topic_names(node, "publishes"), topic_names(node, "subscribes")
         named = {
-            ("topic", "publish"): [
-                "/rosout",
-                *(end.topic_name for end in node.publishers),
-                *unseen,
-            ],
-            ("topic", "subscribe"): ["/clock", *(end.topic_name for end in node.subscriptions)],
+            ("topic", "publish"): [topics.LOG, *published],
+            ("topic", "subscribe"): [topics.CLOCK, *subscribed],
             ("service", "reply"): [service.service_name for service in node.services],
         }
         if actions := ACTIONS.get(node.get_name()):
@@ -296,10 +323,12 @@ def documents() -> dict[str, str]:
     rclpy.init(args=["--ros-args", *(word for given in ALL_ON for word in ("-p", given))])
     nodes = [make() for make in NODES]
     try:
+        for node in nodes:
+            check_graph(node)
         return {
             "parameters.md": parameters(nodes),
             "interfaces.md": interfaces(nodes),
-            "security_policy.xml": security_policy(nodes[:-1]),
+            "security_policy.xml": security_policy(nodes),
             "metrics.md": metrics(),
         }
     finally:

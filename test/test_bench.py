@@ -6,6 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from climber_uk.closed_loop.node_parameters import PARAMETERS
+from climber_uk.messages.topics import CONTROLLER, PLANT
+from climber_uk.parameters.parameter_file import load
+
 pytestmark = pytest.mark.slow
 
 BENCH = Path(__file__).parents[1] / "bench"
@@ -21,6 +25,36 @@ def test_a_row_has_a_figure_for_every_controller():
     assert len(kinds) > 6
     figures = [float(figure) for figure in figures.removeprefix(row).split()[1:]]
     assert len(figures) == len(kinds)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("row", ["the same noise, no twist", "30 % of odometry lost"])
+def test_a_row_of_wall_bench_run_twice_is_the_same_to_the_last_bit(row, monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(BENCH)
+    import wall_bench
+
+    monkeypatch.setattr(wall_bench, "DURATION", 4.0)
+    monkeypatch.setattr(wall_bench, "UNTIL", 3.5)
+    rows = load((BENCH / "wall_bench.yaml").read_text())
+    runs = []
+    for number in range(2):
+        (folder := tmp_path / str(number)).mkdir()
+        runs.append(wall_bench.drive(rows[row], "", folder))
+    told = [wall_bench.numbers(run) for run in runs]
+    assert told[0] == told[1]
+    assert len(told[0]) == len(wall_bench.HEAD)
+    assert runs[0].odometry.values[:, 3:].any() == rows[row].get("publish_twist", True)
+    sent = len(runs[0].odometry.values) / (wall_bench.DURATION / 0.005)
+    assert sent == pytest.approx(1 - rows[row].get("odometry_loss", 0.0), abs=0.1)
+
+
+def test_rows_of_wall_bench_change_what_there_is(tmp_path):
+    known = {name.removeprefix(f"{PLANT}.") for name in PARAMETERS}
+    for row in load((BENCH / "wall_bench.yaml").read_text()).values():
+        config, told = row.pop("config", "climber.yaml"), row.pop("told", {})
+        assert (BENCH.parent / "config" / config).exists()
+        assert set(row) <= known
+        assert {f"{CONTROLLER}.{name}" for name in told} <= set(PARAMETERS)
 
 
 SCRIPTS = sorted(path for path in BENCH.glob("*.py") if "argparse" in path.read_text())

@@ -17,6 +17,7 @@ from climber_uk.messages.topics import CONTROLLER, LOCALIZATION, PLANNER, PLANT
 from climber_uk.system.command_line import Parser
 
 ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 OURS = {
     script.name: f"climber_uk.{script.attr}"
@@ -52,6 +53,49 @@ def commands(page):
 
 
 GIVEN = [(page, words) for page in PAGES for words in commands(page)]
+
+# Those that test/nodes/test_readme.py gives as they are written, in soak, one after the other: all
+# of ours with nothing left to fill in, that soon end
+DEMOS = re.findall(r"^\| `(C\w+=[\w/.]+)` \|", README, re.MULTILINE)  # a test for each, there
+OPEN = re.compile(r"[A-Z]+|…|.*:=value|my_.*")  # for the reader to fill in
+TOOLS = set(OURS) - NODES - {"campaign", "climber", "record_bag"}
+
+
+def is_whole(words):
+    """Whether a command of a page is one of ours that can be given just so, and soon ends."""
+    is_ours = words[0] in TOOLS or (words[:2] == ["make", "demo"] and words[2:])
+    is_in_the_table = words[2:] in [[variable] for variable in DEMOS]
+    return is_ours and not is_in_the_table and not any(OPEN.fullmatch(word) for word in words)
+
+
+WHOLE = {}
+for page, words in GIVEN:
+    if is_whole(words):
+        WHOLE.setdefault(page.name, []).append(words)
+
+# All others, by what they look like: why they are not given as they are written, and what is. By
+# the tests of this file they can be given: program, options, names and files are there.
+ONLY_PARSED = {
+    r"pytest .*": "is a test",
+    r"make (test|unit|lint|coverage|soak|test-kilted)": "runs the tests",
+    r"make help": "test_make_tells_what_there_is, below",
+    r"make demo( …| CONFIG=config/\w+.yaml)?": "test_readme.py, with other directories",
+    r"make (paper|docs)": "test/paper and test/nodes/test_docs.py run what it runs",
+    r"make (bench|physics|sbom)": "installs other packages first",
+    r"make campaign|campaign (config/campaign.yaml|FILE).*|campaign examples/.*": "takes minutes "
+    "to hours; test/campaign and test/nodes/test_own_law.py run smaller ones",
+    r"python requirements.py": "fetches 600 MB: test_requirements.py looks at what it has written",
+    r"python examples/second_publisher.py": "needs a climber that drives: test_faults.py gives it",
+    r"(\w+|python examples/\w+.py) --ros-args .*|markers &": "ends with Ctrl-C: test_readme.py "
+    "starts those of the README together, test/nodes each with its parameters",
+    r"record_bag .*|analyze_bag my_bag": "test_readme.py, with the nodes; the reader's topics",
+    r"climber \w+": "needs a climber that drives: test/nodes/test_operating.py",
+    r"climber.launch.py .*": "needs launch, of an installation: test/test_launch.py",
+    r"check_driver .*": "needs a driver: test/nodes/test_check_driver.py",
+    r"python bench/.*": "minutes to hours; that each starts: test_bench.py",
+    r"python test/nodes/odometry_trace.py": "test_architecture.py has the table of its calls",
+    r".*\b(BAG|A B|FILE|TOPIC)\b.*": "the reader's own; test_readme.py gives those of the README",
+}
 
 
 def of(*programs):
@@ -170,3 +214,20 @@ def test_the_launch_file_has_these_arguments(words):
 
 def test_there_are_commands():
     assert len(GIVEN) > 150
+
+
+def test_what_is_only_parsed_is_listed_with_the_reason():
+    run = [words for rows in WHOLE.values() for words in rows]
+    others = {" ".join(words) for _, words in GIVEN if words not in run}
+    fits = {line: [p for p in ONLY_PARSED if re.fullmatch(p, line)] for line in others}
+    assert not [line for line, found in fits.items() if not found]
+    assert {found[0] for found in fits.values()} == set(ONLY_PARSED)  # none of them is idle
+
+
+def test_make_tells_what_there_is():
+    told = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    makefile = (ROOT / "Makefile").read_text()
+    targets = [words[1] for _, words in GIVEN if words[0] == "make" and words[1] != "help"]
+    lines = [line.split()[1] for line in told.stdout.splitlines()]
+    assert set(targets) <= set(lines)
+    assert all(re.search(rf"^{name}:", makefile, re.MULTILINE) for name in lines)

@@ -22,8 +22,12 @@ def anchors(page):
     return written
 
 
+def links_of(text):
+    return re.findall(r"\]\(([^)\s]+)\)", CODE.sub("", text))
+
+
 def links(page):
-    return re.findall(r"\]\(([^)\s]+)\)", CODE.sub("", page.read_text()))
+    return links_of(page.read_text())
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -52,6 +56,17 @@ def test_the_index_has_each_page_once_with_what_it_tells():
     assert sorted(listed) == sorted(
         page.name for page in DOCS.glob("*.md") if page.stem != "README"
     )
+
+
+@pytest.mark.parametrize(
+    "section", ["Run the nodes one by one", "Your path", "Your robot", "From a bag to an answer"]
+)
+def test_what_a_reader_begins_with_has_a_command_and_a_light_picture(section):
+    text = (ROOT / "README.md").read_text().split(f"\n## {section}\n")[1].split("\n## ")[0]
+    assert re.search(r"^```\n\w+", text, re.MULTILINE)
+    pictures = [link for link in links_of(text) if "/figures/" in link]
+    assert pictures
+    assert all((ROOT / picture).stat().st_size < 150_000 for picture in pictures)
 
 
 def test_figures_are_all_shown():

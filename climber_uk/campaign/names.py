@@ -52,6 +52,8 @@ REQUIRED = {
     f"{PLANT}.slip": False,
     f"{PLANT}.creep": 0.0,
     f"{PLANT}.publish_odometry": True,
+    f"{PLANT}.publish_twist": True,
+    f"{PLANT}.odometry_loss": 0.0,
     f"{PLANT}.seal_radius": 0.0,
     f"{PLANT}.suction.pump_time": 0.0,
     f"{PLANT}.setpoint_timeout": 0.0,

@@ -34,7 +34,12 @@ class ParameterSource(Protocol):
 class ControllerChoice:
     """Which control law runs, with which constraints, and which adhesion."""
 
-    constraints: str = parameter("guidance", "", "constraint set", choices=CONSTRAINTS)
+    constraints: str = parameter(
+        "guidance",
+        "",
+        "set of constraints that the Udwadia-Kalaba equation keeps",
+        choices=CONSTRAINTS,
+    )
     controller: str = parameter(
         UDWADIA_KALABA,
         "",
@@ -43,7 +48,7 @@ class ControllerChoice:
     )
     adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
     wall: str = parameter(
-        "plane", "", "its shape, by which the weight along it is known", choices=WALLS
+        "plane", "", "shape of the wall, by which the weight along it is known", choices=WALLS
     )
 
 

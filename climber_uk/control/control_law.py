@@ -48,19 +48,27 @@ class ControlOptions:
     """How the torques are computed; see `ControlLaw`."""
 
     predict: bool = parameter(
-        True, "", "aim at the middle of the period in which the torque acts", runtime=True
+        True,
+        "",
+        "aim at the middle of the period in which the torque acts, by a prediction of the state",
+        runtime=True,
     )
     friction_speed: float = parameter(
-        0.001, "m/s", "wanted speed below which friction's share fades", above=0, runtime=True
+        0.001,
+        "m/s",
+        "wanted speed below which friction's share of the torques fades",
+        above=0,
+        runtime=True,
     )
     max_torque_rate: float = parameter(
-        0.0, "N m/s", "fastest change of a torque; 0: none too fast", at_least=0, runtime=True
+        0.0, "N m/s", "fastest change of a torque; 0: no limit", at_least=0, runtime=True
     )
 
     solver: str = parameter(
         "closed_form",
         "",
-        "of the Udwadia-Kalaba equation; generic: by matrices, the same to rounding, and slower",
+        "how the Udwadia-Kalaba equation is solved; generic: by matrices, the same to "
+        "rounding, and slower",
         choices=("closed_form", "generic"),
     )
 

@@ -20,12 +20,18 @@ class Exact:
     natural_frequency: float = parameter(
         6.0,
         "rad/s",
-        "ω_n: K_p = ω_n², K_d = 2 ω_n",
+        "natural frequency ω_n of the path's constraint: K_p = ω_n², K_d = 2 ω_n",
         above=0,
         plausible=(0.1, 150.0),  # as guidance.frequency
         runtime=True,
     )
-    hidden_rate: float = parameter(10.0, "1/s", "λ, decay of φ", above=0, runtime=True)
+    hidden_rate: float = parameter(
+        10.0,
+        "1/s",
+        "rate λ at which the error φ of the hidden constraint decays",
+        above=0,
+        runtime=True,
+    )
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """See `ConstraintSet`; offsets of up to `REACH` are expected to be corrected."""

@@ -178,38 +178,43 @@ class Observer:
     """
 
     bandwidth: float = parameter(
-        14.0, "1/s", "K of the disturbance observer; 0 switches it off", at_least=0, runtime=True
+        14.0,
+        "1/s",
+        "bandwidth K of the disturbance observer; 0 switches it off",
+        at_least=0,
+        runtime=True,
     )
     velocity_source: str = parameter(
         "odometry",
         "",
-        "where speeds are taken from; pose: for odometry without a twist",
+        "where the observer takes speeds from; pose: for odometry without a twist",
         choices=("odometry", "pose"),
     )
     twist: str = parameter(
         "auto",
         "",
-        "speeds of odometry: those of its stamp, or means of the period before, as of encoders",
+        "what the twist of odometry is: speeds at its stamp, or means of the period before, "
+        "as of encoders",
         choices=("auto", "instantaneous", "mean"),
     )
     side_slip_bandwidth: float = parameter(
         6.0,
         "1/s",
-        "how fast it is learnt by how much wheels give way sideways, from poses beside measured "
-        "speeds; 0: they hold",
+        "bandwidth with which it is learnt by how much wheels give way sideways, from poses "
+        "beside measured speeds; 0: they hold",
         at_least=0,
         runtime=True,
     )
     side_slip_source: str = parameter(
         "pose",
         "",
-        "what it is learnt from; odometry: from `twist.linear.y`, of wall_odometry whose wheels "
-        "scrub, as its poses have the noise of fixes; of a driver that tells 0, wheels are taken "
-        "to hold",
+        "what side slip is learnt from; odometry: from `twist.linear.y`, of wall_odometry "
+        "whose wheels scrub, as its poses have the noise of fixes; of a driver that tells 0, "
+        "wheels are taken to hold",
         choices=("odometry", "pose"),
     )
     pose_bandwidth: float = parameter(
-        60.0, "1/s", "of the filter that takes speeds from poses", above=0, runtime=True
+        60.0, "1/s", "bandwidth of the filter that takes speeds from poses", above=0, runtime=True
     )
 
     def corrected(

@@ -110,10 +110,12 @@ class Safety:
     safe_output: str = parameter(
         "zero",
         "",
-        "while not following: no torque, or weight held and motion braked",
+        "torques while the reference is not followed: none, or weight held and motion braked",
         choices=("zero", "hold"),
     )
-    braking_rate: float = parameter(5.0, "1/s", "of the safe output 'hold'", at_least=0)
+    braking_rate: float = parameter(
+        5.0, "1/s", "rate at which the safe output 'hold' brakes", at_least=0
+    )
     odometry_timeout: float = parameter(
         0.1,
         "s",
@@ -122,28 +124,35 @@ class Safety:
         plausible=(0.002, 5),
     )
     reference_timeout: float = parameter(
-        0.1, "s", "how long a reference is waited for", above=0, plausible=(0.002, 5)
+        0.1, "s", "longest time that a reference is waited for", above=0, plausible=(0.002, 5)
     )
     least_pressure: float = parameter(
         0.0,
         "Pa",
-        "suction below which the climber is stopped; 0: never",
+        "suction pressure below which the climber is stopped; 0: never",
         at_least=0,
         plausible=(100, 1e5),
     )
     max_jump: float = parameter(
         0.2,
         "m",
-        "by which a wheel may be elsewhere than the model expects",
+        "distance by which a wheel may be elsewhere than the model expects; beyond it, "
+        "odometry has jumped",
         above=0,
         plausible=(0.005, 5),
     )
     settling_messages: int = parameter(
-        5, "", "odometry messages without a jump until it is followed again", at_least=1
+        5,
+        "",
+        "number of odometry messages without a jump until the reference is followed again",
+        at_least=1,
     )
 
     max_twist_error: float = parameter(
-        0.05, "m", "of the way in half a second, between twist and pose, beside 30 %", above=0
+        0.05,
+        "m",
+        "most difference of the ways by twist and by pose in half a second, beside 30 % of the way",
+        above=0,
     )
 
     @property

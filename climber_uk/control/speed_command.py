@@ -23,14 +23,14 @@ class MotorBoard:
     motors: str = parameter(
         "torque",
         "",
-        "which of the command the driver obeys, its effort or its velocity",
+        "what the driver obeys of wheel_torques, its effort or its velocity",
         choices=("torque", "velocity"),
         runtime=True,
     )
     servo_time_constant: float = parameter(
         0.02,
         "s",
-        "T in which a speed servo has done 63 % of a step; too short: it lags",
+        "time T in which a board's speed servo has done 63 % of a step; too short: it lags",
         at_least=0,
         runtime=True,
         plausible=(0, 0.5),

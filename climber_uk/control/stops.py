@@ -20,31 +20,39 @@ class StopOptions:
     """Which of these stops there are; what is off is not subscribed."""
 
     emergency_stop: bool = parameter(
-        False, "", "a true on `emergency_stop` stops; left false, nobody hears that button"
+        False,
+        "",
+        "whether a true on `emergency_stop` stops the climber; left false, nobody hears that "
+        "button",
     )
     emergency_timeout: float = parameter(
         0.0,
         "s",
-        "silence of `emergency_stop`, by the node's clock, that stops; 0: a lost button stops "
-        "nothing; shorter than its period: always stopped",
+        "silence of `emergency_stop`, by the node's clock, that stops the climber; 0: a lost "
+        "button stops nothing; shorter than its period: always stopped",
         at_least=0,
         plausible=(0.05, 60),
     )
     least_charge: float = parameter(
         0.0,
         "",
-        "share of `battery_state`'s charge below which it stops; 0: not looked at; too low: motors "
-        "and pump may stop first",
+        "share of `battery_state`'s charge below which the climber stops; 0: not looked at; "
+        "too low: motors and pump may stop first",
         at_least=0,
         at_most=1,
     )
     least_voltage: float = parameter(
-        0.0, "V", "the same of its voltage, which sags under load: too high stops early", at_least=0
+        0.0,
+        "V",
+        "voltage of `battery_state` below which the climber stops; 0: not looked at; it sags "
+        "under load: too high stops early",
+        at_least=0,
     )
     tether_length: float = parameter(
         0.0,
         "m",
-        "way on the wall, to and fro, after which it stops; 0: never; too long: the tether pulls",
+        "way on the wall, to and fro, after which the climber stops; 0: never; too long: the "
+        "tether pulls",
         at_least=0,
     )
 

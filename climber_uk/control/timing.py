@@ -33,12 +33,13 @@ class Timing:
     """
 
     control_period: float = parameter(
-        0.005, "s", "from an odometry to the next, until it is measured", above=0, at_most=1
+        0.005, "s", "time from an odometry to the next, until it is measured", above=0, at_most=1
     )
     transport_delay: float = parameter(
         0.0,
         "s",
-        "what the clock does not show: before the odometry's stamp and on the way to the wheels",
+        "delay that the clock does not show: before the odometry's stamp and on the way to "
+        "the wheels",
         at_least=0,
         at_most=LONGEST_STEP,
         runtime=True,
@@ -46,7 +47,8 @@ class Timing:
     max_latency: float = parameter(
         0.05,
         "s",
-        "least age of odometry that is latency; what is always beyond is the clocks' offset",
+        "most that the least age of odometry is taken for latency; what is always beyond is "
+        "the clocks' offset",
         at_least=0,
         at_most=LONGEST_STEP,
     )
@@ -55,7 +57,7 @@ class Timing:
     )
 
     learn_delay: bool = parameter(
-        True, "", "learn what is missing in the transport delay while it runs", runtime=True
+        True, "", "learn what is missing in transport_delay while the node runs", runtime=True
     )
 
 

@@ -32,7 +32,7 @@ class Bounds:
     torque_share: float = parameter(
         0.5,
         "",
-        "of `max_wheel_torque` that a trial commands at most; too low: it does not move",
+        "share of `max_wheel_torque` that a trial commands at most; too low: it does not move",
         above=0,
         at_most=1,
     )
@@ -40,7 +40,7 @@ class Bounds:
         0.15, "m", "distance at which a trial is stopped; too short: it is not completed", above=0
     )
     max_turn: float = parameter(
-        0.6, "rad", "yaw angle at which a trial is stopped; too small: likewise", above=0
+        0.6, "rad", "yaw angle at which a trial is stopped; too small: it is not completed", above=0
     )
     watchdog_time: float = parameter(
         0.5, "s", "longest torque without a command; below the driver's: `watchdog` fails", above=0

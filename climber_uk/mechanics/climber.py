@@ -45,12 +45,17 @@ class Climber:
     rotor_inertia: float = parameter(
         0.0,
         "kg m²",
-        "of a side's rotors at its wheels (gear ratio squared), not in mass and yaw_inertia",
+        "inertia of a side's rotors at its wheels (gear ratio squared), not in mass and "
+        "yaw_inertia",
         at_least=0,
         plausible=(1e-8, 10),
     )
     wheel_radius: float = parameter(
-        0.027, "m", "wheel radius r; too large: so are the torques", above=0, plausible=(0.005, 0.5)
+        0.027,
+        "m",
+        "wheel radius r; too large: torques are too large",
+        above=0,
+        plausible=(0.005, 0.5),
     )
     half_track: float = parameter(
         0.3, "m", "distance d of a wheel from the centre", above=0, plausible=(0.02, 2)
@@ -74,7 +79,7 @@ class Climber:
     inclination: float = parameter(
         90.0,
         "deg",
-        "of the wall: 0 floor, 90 vertical, 180 ceiling",
+        "inclination of the wall: 0 floor, 90 vertical, 180 ceiling",
         at_least=0,
         at_most=180,
         plausible=(3.2, 180),

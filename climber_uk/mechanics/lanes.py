@@ -37,15 +37,20 @@ class Lanes(ThroughPoints):
     """
 
     area: str = parameter(
-        "", "", "text file: corners x and y [m], an empty line before each hole", is_path=True
+        "",
+        "",
+        "text file of the area: corners x and y [m], an empty line before each hole",
+        is_path=True,
     )
-    width: float = parameter(0.2, "m", "of a lane: what is done at once, across", above=0)
-    overlap: float = parameter(0.0, "m", "of two lanes side by side, at least", at_least=0)
+    width: float = parameter(0.2, "m", "width of a lane: what is done at once, across", above=0)
+    overlap: float = parameter(0.0, "m", "overlap of two lanes side by side, at least", at_least=0)
     clearance: float = parameter(
-        0.2, "m", "of the climber's centre from the area's edge and its holes", above=0
+        0.2, "m", "distance of the climber's centre from the area's edge and its holes", above=0
     )
-    direction: float = parameter(0.0, "rad", "of the lanes, anticlockwise from x")
-    edges: bool = parameter(True, "", "a lane along each edge, too, for what lanes' ends leave")
+    direction: float = parameter(0.0, "rad", "direction of the lanes, anticlockwise from x")
+    edges: bool = parameter(
+        True, "", "drive a lane along each edge, too, for what lanes' ends leave"
+    )
     descent: float = parameter(
         1.0,
         "",
@@ -54,14 +59,18 @@ class Lanes(ThroughPoints):
         at_least=1,
         at_most=100,
     )
-    dwell: float = parameter(0.0, "s", "rest where each lane but the first begins", at_least=0)
+    dwell: float = parameter(
+        0.0, "s", "time to rest where each lane but the first begins", at_least=0
+    )
     start_x: float = parameter(
         0.0,
         "m",
         "begin at the end of a lane that is nearest to (start_x, start_y); both 0: nearest to "
         "where the climber is as it starts first",
     )
-    start_y: float = parameter(0.0, "m", "see start_x")
+    start_y: float = parameter(
+        0.0, "m", "begin at the end of a lane that is nearest to (start_x, start_y)"
+    )
 
     def __post_init__(self) -> None:
         if self.overlap >= self.width:

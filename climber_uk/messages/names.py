@@ -59,8 +59,12 @@ class Names:
     left_wheel_joint: str = parameter(
         "left_wheel_joint", "", "joint of the left wheel; of several, front to rear: a, b"
     )
-    right_wheel_joint: str = parameter("right_wheel_joint", "", "the same of the right side")
-    prefix_frames: bool = parameter(True, "", "put the node's namespace before both frames")
+    right_wheel_joint: str = parameter(
+        "right_wheel_joint", "", "joint of the right wheel; of several, front to rear: a, b"
+    )
+    prefix_frames: bool = parameter(
+        True, "", "put the node's namespace before odom_frame and base_frame"
+    )
 
     def __post_init__(self) -> None:
         _ = self.wheels

@@ -98,7 +98,8 @@ class PlantSimulator(ClimberNode):
         self.pushes: CommandBuffer[Push] = CommandBuffer(round(self.options.push_timeout * SECOND))
         timeout = self.options.setpoint_timeout
         self.setpoints: CommandBuffer[float] = CommandBuffer(round(timeout * SECOND))
-        self.fallen = self.answered = False
+        self.fallen = self.answered = self.is_lost = False
+        self.losses = np.random.default_rng(self.parameters.read(Sensors).seed)
         self.sensors = plant_parts.field_sensors(self.parameters)
         self.sense(self.time.stamp)
 
@@ -221,6 +222,8 @@ class PlantSimulator(ClimberNode):
             )
             return
         self.robot.measure()
+        loss = self.options.odometry_loss
+        self.is_lost = loss > 0 and self.losses.random() < loss
         self.sense(self.time.stamp + self.time.period)
 
     def sense(self, stamp: int) -> None:
@@ -236,7 +239,8 @@ class PlantSimulator(ClimberNode):
 
     def publish_odometry(self) -> None:
         """Publish the odometry, or what is made one of, which a torque is to answer."""
-        self.topics.publish_odometry(self.robot, self.asked)
+        if not self.is_lost:
+            self.topics.publish_odometry(self.robot, self.asked)
         if not self.options.publish_odometry:
             self.publish_sensors()
 

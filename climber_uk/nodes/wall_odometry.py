@@ -63,7 +63,8 @@ class WallOdometry(ClimberNode):
         here = PoseStamped()
         here.header.frame_id = self.frames.map_frame
         self.map_to_odom = self.output("~/map_to_odom", here, PLANAR_POSE)
-        self.transform = self.publisher(TFMessage, "/tf") if TFMessage else None
+        has_tf = TFMessage and self.frames.publish_tf
+        self.transform = self.publisher(TFMessage, "/tf") if has_tf else None
         self.is_map_due = Throttle(PUBLISH_PERIOD)
         self.subscription(JointState, JOINTS, self.on_joints, BEST_EFFORT)
         self.subscription(Imu, IMU, self.on_imu, BEST_EFFORT)

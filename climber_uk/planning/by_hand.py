@@ -28,16 +28,21 @@ class HandOptions:
     """How a stick drives the climber."""
 
     input: str = parameter(
-        "none", "", "message of cmd_vel, if it is heard", choices=("none", "twist", "twist_stamped")
-    )
-    speed: float = parameter(0.2, "m/s", "fastest speed; what is more is cut", above=0)
-    yaw_rate: float = parameter(0.5, "rad/s", "fastest turn; what is more is cut", above=0)
-    ramp_time: float = parameter(1.0, "s", "in which a speed is the one asked for", at_least=0.1)
-    timeout: float = parameter(0.5, "s", "without a message, after which it brakes", above=0)
-    lock: bool = parameter(
-        False,
+        "none",
         "",
-        "a true on `by_hand_lock` has the stick ignored until a false; left false, nobody hears it",
+        "type of a stick's messages on cmd_vel; none: no stick is heard",
+        choices=("none", "twist", "twist_stamped"),
+    )
+    speed: float = parameter(0.2, "m/s", "fastest speed by hand; what is more is cut", above=0)
+    yaw_rate: float = parameter(0.5, "rad/s", "fastest turn by hand; what is more is cut", above=0)
+    ramp_time: float = parameter(
+        1.0, "s", "time in which the speed by hand becomes the one asked for", at_least=0.1
+    )
+    timeout: float = parameter(
+        0.5, "s", "time without a message of the stick, after which the climber brakes", above=0
+    )
+    lock: bool = parameter(
+        False, "", "whether the topic by_hand_lock is heard: while it is true, a stick is ignored"
     )
 
     def __post_init__(self) -> None:

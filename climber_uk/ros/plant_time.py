@@ -32,6 +32,7 @@ class Simulated(Protocol):
     origin: int  # stamp of its first odometry
     fallen: bool  # then it is not stepped any more
     answered: bool  # whether a torque has answered its last odometry
+    is_lost: bool  # whether that is not published, and so none will
 
     def is_heard_by(self, node: str) -> bool:
         """Whether a node of that name has subscribed the climber's topics."""
@@ -177,12 +178,13 @@ class PlantTime:
         self.granted = False
         self.advance(self.standing)
         self.publish(self.standing)
+        self.step_if_due()  # if all odometry was lost
 
     def advance(self, climbers: Sequence[Simulated]) -> None:
         """Advance some climbers, and the time, by a control period."""
         for climber in climbers:
             climber.advance()
-            climber.answered = False
+            climber.answered = climber.is_lost
         self.stamp += self.period
         self.stepped_at = WALL_CLOCK.now().nanoseconds
 

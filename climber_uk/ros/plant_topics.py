@@ -35,6 +35,7 @@ class PlantTopics:
         state = JointState(name=self.wheels.all, position=zeros, velocity=zeros, effort=zeros)
         odometry = writing.odometry(NO_STATE, 0, names.odom_frame, names.base_frame)
         self.odometry: Output | None = None
+        self.has_twist = options.publish_twist
         if options.publish_odometry:
             self.odometry = node.output(ODOMETRY, odometry, writing.ODOMETRY)
         self.truth = node.output(TRUTH, odometry, writing.ODOMETRY)
@@ -56,7 +57,9 @@ class PlantTopics:
         """Publish the odometry that is due, with the stamp `measured_at` [ns]."""
         _, measured = robot.odometer.latest()
         if self.odometry is not None:
-            self.odometry.publish(measured_at, *writing.odometry_numbers(measured))
+            *pose, speed, slip, yaw_rate = writing.odometry_numbers(measured)
+            twist = (speed, slip, yaw_rate) if self.has_twist else (0.0, 0.0, 0.0)
+            self.odometry.publish(measured_at, *pose, *twist)
 
     def publish_sensors(self, robot: SimulatedRobot, measured: Measured) -> None:
         """Publish what encoders, IMU and fixes have measured."""

@@ -24,10 +24,12 @@ class Motors:
     motors: str = parameter(
         "torque",
         "",
-        "which of the command they obey: its effort or its velocity",
+        "what the motors obey of wheel_torques, its effort or its velocity",
         choices=("torque", "velocity"),
     )
-    torque_lag: float = parameter(0.0, "s", "time constant T of the motors; 0: at once", at_least=0)
+    torque_lag: float = parameter(
+        0.0, "s", "time constant T of the motors' torque; 0: it is there at once", at_least=0
+    )
     torque_resolution: float = parameter(
         0.0, "N m", "step in which torques are set; 0: continuous", at_least=0
     )
@@ -38,7 +40,7 @@ class Motors:
         0.0, "m/s", "step in which rims' speeds are set; 0: continuous", at_least=0
     )
     velocity_dead_band: float = parameter(
-        0.0, "m/s", "rim's speed below which a servo lets the wheel stand", at_least=0
+        0.0, "m/s", "speed of a rim below which a servo lets the wheel stand", at_least=0
     )
 
     @property

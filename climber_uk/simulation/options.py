@@ -16,14 +16,23 @@ class SimulationOptions:
     publish_odometry: bool = parameter(
         True, "", "publish odom; false: wall_odometry makes it, of joint_states, imu and pose"
     )
+    publish_twist: bool = parameter(
+        True, "", "tell speeds in odom; false: its twist is 0, as of drivers that tell a pose alone"
+    )
+    odometry_loss: float = parameter(
+        0.0, "", "share of odometry that is never published, as if lost", at_least=0, at_most=0.9
+    )
     publish_tf: bool = parameter(
         True, "", "publish base_frame in odom_frame on /tf, where tf2_msgs is installed"
     )
     real_time_factor: float = parameter(
-        0.0, "", "fastest simulated time by wall-clock time; 0: no limit", at_least=0
+        0.0,
+        "",
+        "fastest simulated time by wall-clock time: 1 is real time; 0: no limit",
+        at_least=0,
     )
     control_period: float = parameter(
-        0.005, "s", "from one odometry to the next", at_least=1e-4, plausible=(5e-4, 0.5)
+        0.005, "s", "time from one odometry to the next", at_least=1e-4, plausible=(5e-4, 0.5)
     )
     integration_step: float = parameter(
         0.0025, "s", "step of the integrator", at_least=1e-6, plausible=(1e-5, 0.5)
@@ -42,7 +51,7 @@ class SimulationOptions:
         plausible=(0.1, 5),
     )
     lockstep_timeout: float = parameter(
-        5.0, "s", "wall-clock wait for a torque, then a warning", above=0
+        5.0, "s", "wall-clock time that a torque is waited for, then a warning", above=0
     )
     wait_for: str = parameter(
         "", "", "node, as a recorder, for whose subscriptions time waits; empty: none"
@@ -59,6 +68,8 @@ class SimulationOptions:
                 f"control_period={self.control_period} must be a multiple of "
                 f"integration_step={self.integration_step} [s]"
             )
+        if self.odometry_loss > 0 and not self.publish_odometry:
+            raise ValueError(f"odometry_loss={self.odometry_loss} needs publish_odometry=True")
         if self.real_time_factor > 0 and not self.simulated_time:
             raise ValueError(f"real_time_factor={self.real_time_factor} needs simulated_time=True")
 

@@ -31,18 +31,20 @@ VARIANTS: dict[str, Mapping[str, Any]] = {
 class Physics:
     """The physics that the plant has, by name, and when its pump fails."""
 
-    friction: str = parameter("coulomb", "", "law of the seal", choices=FRICTION)
+    friction: str = parameter("coulomb", "", "friction law of the seal", choices=FRICTION)
     adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
-    locomotion: str = parameter("wheeled", "", "what it runs on", choices=LOCOMOTION)
-    wall: str = parameter("plane", "", "what it runs along", choices=WALLS)
+    locomotion: str = parameter("wheeled", "", "what the climber runs on", choices=LOCOMOTION)
+    wall: str = parameter("plane", "", "shape of the wall", choices=WALLS)
     slip: bool = parameter(False, "", "whether wheels slip where their load does not suffice")
     creep: float = parameter(
-        0.0, "", "what the climber sags on a vertical wall, by the way that it rolls", at_least=0
+        0.0, "", "share of the way rolled by which the climber sags on a vertical wall", at_least=0
     )
     pressure_loss_time: float = parameter(
-        0.0, "s", "after the start, when the pump's pressure drops; 0: never", at_least=0
+        0.0, "s", "time after the start when the pump's pressure drops; 0: never", at_least=0
     )
-    pressure_loss_level: float = parameter(0.0, "Pa", "pressure to which it drops", at_least=0)
+    pressure_loss_level: float = parameter(
+        0.0, "Pa", "pressure to which the pump's drops at pressure_loss_time", at_least=0
+    )
 
 
 class Push(NamedTuple):

@@ -321,6 +321,21 @@ def test_a_second_publisher_gets_nothing_done_where_the_first_is_to_be_the_only_
     climb.recovers(CONTROLLER, refused)
 
 
+@pytest.mark.soak
+@pytest.mark.parametrize("exclusive", [False, True])
+def test_the_example_takes_the_wheels_unless_their_publisher_is_to_be_the_only_one(
+    world, exclusive
+):
+    plant = [*WALL_CLOCK[PLANT], f"exclusive:={str(exclusive).lower()}"]
+    climb = Climb(world, {**WALL_CLOCK, PLANT: plant})
+    world.wait(lambda: climb.is_moving() and climb.torques, "motion")
+    world.start("second_publisher")
+    world.wait(lambda: "stranger" in world.log("second_publisher"), "what came of it")
+    obeyed, periods = map(int, re.findall(r"\d+", world.log("second_publisher")))
+    assert periods > 50
+    assert obeyed <= 1 if exclusive else obeyed > periods / 4
+
+
 def test_simulated_time_without_a_clock_gets_the_safe_output_until_there_is_one(world):
     world.start_node(CONTROLLER, *LOCK_STEP[CONTROLLER], config="climber.yaml")
     torques = world.listen(JointState, "wheel_torques")

@@ -1,12 +1,11 @@
 """Paths as goals: against the definition of Nav2's FollowPath, by a client as Nav2 has it."""
 
 import signal
-import sys
 
-import generated_action
 import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
+from generated_interface import importable
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.action import ActionClient
@@ -26,17 +25,10 @@ PLANNER, CONTROLLER = "trajectory_publisher", "uk_torque_controller"
 @pytest.fixture(scope="module")
 def definition(tmp_path_factory):
     """Where nav2_msgs is found, and its FollowPath: made for these tests where there is none."""
-    with pytest.MonkeyPatch.context() as patch:
-        if lacking := generated_action.lacking():
-            pytest.skip(f"nav2_msgs cannot be made without {lacking}")
-        made = generated_action.generated(tmp_path_factory.mktemp("nav2_msgs"))
-        patch.setenv("PYTHONPATH", str(made))
-        patch.syspath_prepend(made)
+    with importable("nav2_msgs", tmp_path_factory.mktemp("nav2_msgs")):
         from nav2_msgs.action import FollowPath
 
         yield FollowPath
-    for name in [name for name in sys.modules if name.startswith("nav2_msgs")]:
-        del sys.modules[name]
 
 
 class Goals:

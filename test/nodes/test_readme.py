@@ -8,40 +8,20 @@ import signal
 import subprocess
 import sys
 import time
-from itertools import groupby
 from pathlib import Path
 
 import pytest
-from test_documented_commands import GIVEN, NODES, OURS
+from test_documented_commands import DEMOS, README, ROOT, WHOLE
 from world import new_domain
 
 pytestmark = [pytest.mark.nodes, pytest.mark.soak]
 
-ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text()
 PATH = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
 # of a table's rows, the first cell
 OF_A_BAG = re.findall(r"^\| `(\w+ (?:BAG|A B)[^`]*)` \|", README, re.MULTILINE)
-DEMOS = re.findall(r"^\| `(C\w+=[\w/.]+)` \|", README, re.MULTILINE)
 
 
 ONE_BY_ONE = re.search(r"^## Run the nodes.*?^```\n(.*?)^```", README, re.MULTILINE | re.DOTALL)[1]
-TOOLS = set(OURS) - NODES - {"campaign", "climber", "record_bag"}
-OPEN = re.compile(r"[A-Z]+|…|.*:=value|my_.*")  # for the reader to fill in
-
-
-def is_whole(words):
-    """Whether a command of a page is one of ours that can be given just so, and soon ends."""
-    is_ours = words[0] in TOOLS or (words[:2] == ["make", "demo"] and words[2:])
-    is_in_the_table = words[2:] in [[variable] for variable in DEMOS]
-    return is_ours and not is_in_the_table and not any(OPEN.fullmatch(word) for word in words)
-
-
-ON_A_PAGE = {
-    page.name: [words for _, words in rows if is_whole(words)]
-    for page, rows in groupby(GIVEN, key=lambda row: row[0])
-}
-ON_A_PAGE = {page: rows for page, rows in ON_A_PAGE.items() if rows and page != "README.md"}
 
 
 def given(words, **options):
@@ -59,9 +39,9 @@ def clone(tmp_path):
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("page", ON_A_PAGE)
+@pytest.mark.parametrize("page", WHOLE)
 def test_the_commands_of_a_page_can_be_given_one_after_the_other(page, clone):
-    for words in ON_A_PAGE[page]:
+    for words in WHOLE[page]:
         done = given(words, cwd=clone)
         assert done.returncode == 0, (words, done.stdout, done.stderr)
         assert "Traceback" not in done.stderr
@@ -116,9 +96,9 @@ def test_a_tool_of_the_table_does_what_it_is_there_for(run, command, tmp_path):
     assert done.stdout
 
 
-@pytest.mark.parametrize("variable", DEMOS)
+@pytest.mark.parametrize("variable", ["", *DEMOS])
 def test_a_demonstration_of_the_table_drives_its_path(variable, tmp_path):
-    words = ["make", "demo", variable, f"OUTPUT={tmp_path / 'run'}"]
+    words = ["make", "demo", *filter(None, [variable]), f"OUTPUT={tmp_path / 'run'}"]
     done = given([*words, f"BIN={Path(sys.executable).parent}"], cwd=ROOT, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "report.html" in done.stdout
@@ -128,4 +108,4 @@ def test_a_demonstration_of_the_table_drives_its_path(variable, tmp_path):
 def test_the_tables_are_read():
     assert len(OF_A_BAG) >= 7
     assert len(DEMOS) >= 7
-    assert sum(map(len, ON_A_PAGE.values())) >= 20
+    assert sum(map(len, WHOLE.values())) >= 20

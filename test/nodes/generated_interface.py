@@ -1,4 +1,4 @@
-"""Makes a Python package of an action's definition: `python generated_action.py DIRECTORY`.
+"""Makes a Python package of a definition: `python generated_interface.py PACKAGE DIRECTORY`.
 
 What colcon does for a package of interfaces, without colcon: code by rosidl's generators, which
 come with the wheels of rclpy, and libraries of it by gcc. The module that Python imports is the
@@ -11,11 +11,13 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from contextlib import contextmanager
 from pathlib import Path
 
-PACKAGE, NAME = "nav2_msgs", "FollowPath"
+import pytest
+
 # fields and codes of Jazzy's, which is all that a type is
-DEFINITION = """
+FOLLOW_PATH = """
 nav_msgs/Path path
 string controller_id
 string goal_checker_id
@@ -37,12 +39,16 @@ string error_msg
 float32 distance_to_goal
 float32 speed
 """
+DEFINITIONS = {
+    "nav2_msgs": ("action", "FollowPath", FOLLOW_PATH),
+    "tf2_msgs": ("msg", "TFMessage", "geometry_msgs/TransformStamped[] transforms"),
+}
 PREFIX = Path(sys.prefix)
 SUPPORTS = "rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"
 RUNTIME = *SUPPORTS, "rosidl_typesupport_fastrtps_cpp", "rosidl_typesupport_c", "rosidl_runtime_c"
 USED = (
     *("nav_msgs", "std_msgs", "action_msgs", "unique_identifier_msgs"),
-    *("builtin_interfaces", "service_msgs"),
+    *("builtin_interfaces", "service_msgs", "geometry_msgs"),
 )
 PARTS = *SUPPORTS, "rosidl_typesupport_c", "rosidl_generator_c", "rosidl_generator_py"
 
@@ -54,43 +60,44 @@ def lacking():
     return ", ".join(name for name, is_there in wanted.items() if not is_there)
 
 
-def generate(directory):
-    """Write the sources of the package into a directory."""
+def generate(package, directory):
+    """Write the sources of a package into a directory."""
     from rosidl_generator_c.cli import GenerateC
     from rosidl_generator_py.cli import GeneratePython
     from rosidl_typesupport_c.cli import GenerateCTypesupport
     from rosidl_typesupport_fastrtps_c.cli import GenerateFastRTPSCTypesupport
     from rosidl_typesupport_introspection_c.cli import GenerateIntrospectionCTypesupport
 
-    file = directory / "source" / "action" / f"{NAME}.action"
+    kind, name, definition = DEFINITIONS[package]
+    file = directory / "source" / kind / f"{name}.{kind}"
     file.parent.mkdir(parents=True)
-    file.write_text(DEFINITION)
+    file.write_text(definition)
     generators = {  # the last one's files have names of the others'
         "made": (GenerateC, GenerateFastRTPSCTypesupport, GenerateCTypesupport, GeneratePython),
         "looked_into": (GenerateIntrospectionCTypesupport,),
     }
     for place, kinds in generators.items():
-        (directory / place / PACKAGE).mkdir(parents=True)
-        for kind in kinds:
-            sources = [f"{directory / 'source'}:action/{NAME}.action"]
-            include, to = [str(PREFIX / "share")], directory / place / PACKAGE
-            kind(kind.__name__).generate(PACKAGE, sources, include, to)
+        (directory / place / package).mkdir(parents=True)
+        for maker in kinds:
+            sources = [f"{directory / 'source'}:{kind}/{name}.{kind}"]
+            include, to = [str(PREFIX / "share")], directory / place / package
+            maker(maker.__name__).generate(package, sources, include, to)
 
 
-def build(directory):
+def build(package, directory):
     """Make the libraries of all sources."""
     made, other = directory / "made", directory / "looked_into"
-    package = made / PACKAGE
-    fast_dds, introspection = (package / f"lib{PACKAGE}__{name}.so" for name in SUPPORTS)
-    compile_into(introspection, other.glob("**/action/**/*.c"), [made, other])
+    place, (kind, *_) = made / package, DEFINITIONS[package]
+    fast_dds, introspection = (place / f"lib{package}__{name}.so" for name in SUPPORTS)
+    compile_into(introspection, other.glob(f"**/{kind}/**/*.c"), [made, other])
     sources = [
-        package / f"_{PACKAGE}_s.ep.rosidl_typesupport_c.c",
-        *package.glob("**/action/**/*.c*"),
+        place / f"_{package}_s.ep.rosidl_typesupport_c.c",
+        *place.glob(f"**/{kind}/**/*.c*"),
     ]
     compile_into(fast_dds, [*sources, introspection], [made])
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
-    (package / f"{PACKAGE}_s__rosidl_typesupport_c{suffix}").symlink_to(fast_dds.name)
-    (package / "__init__.py").touch()
+    (place / f"{package}_s__rosidl_typesupport_c{suffix}").symlink_to(fast_dds.name)
+    (place / "__init__.py").touch()
 
 
 def compile_into(library, sources, headers):
@@ -113,11 +120,11 @@ def compile_into(library, sources, headers):
     )
 
 
-def generated(directory):
-    """Where the package is found, once it is made."""
+def generated(package, directory):
+    """Where a package is found, once it is made."""
     environment = {**os.environ, "AMENT_PREFIX_PATH": str(PREFIX)}
     subprocess.run(
-        [sys.executable, __file__, directory],
+        [sys.executable, __file__, package, directory],
         check=True,
         env=environment,
         stderr=subprocess.DEVNULL,
@@ -125,6 +132,20 @@ def generated(directory):
     return directory / "made"
 
 
+@contextmanager
+def importable(package, directory):
+    """Have a package found, here and in processes that are started: made where there is none."""
+    with pytest.MonkeyPatch.context() as patch:
+        if missing := lacking():
+            pytest.skip(f"{package} cannot be made without {missing}")
+        made = generated(package, directory)
+        patch.setenv("PYTHONPATH", str(made))
+        patch.syspath_prepend(made)
+        yield
+    for name in [name for name in sys.modules if name.startswith(package)]:
+        del sys.modules[name]
+
+
 if __name__ == "__main__":
-    generate(Path(sys.argv[1]))
-    build(Path(sys.argv[1]))
+    generate(sys.argv[1], Path(sys.argv[2]))
+    build(sys.argv[1], Path(sys.argv[2]))
