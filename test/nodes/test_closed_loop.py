@@ -48,7 +48,7 @@ def is_under_way(world):
 def hold_up_the_recorder(world):
     """Stop it for a while, once the run has begun, as a busy machine may."""
     is_under_way(world)
-    recorders = [number for number, said in inhabitants(world.domain) if "record_bag" in said]
+    recorders = [number for number, said in inhabitants(world) if "record_bag" in said]
     for recorder in recorders:  # none where all is over already
         with suppress(ProcessLookupError):
             os.kill(recorder, signal.SIGSTOP)
