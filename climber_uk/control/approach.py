@@ -30,13 +30,16 @@ class Approach:
     """How a climber gets to its reference, which waits for it meanwhile."""
 
     max_start_distance: float = parameter(
-        2.0, "m", "from further away the reference is refused", above=0
+        2.0, "m", "distance from the reference beyond which a start is refused", above=0
     )
     max_distance: float = parameter(
-        1.0, "m", "from the reference, beyond which it waits and is approached", above=0
+        1.0, "m", "distance from the reference beyond which it waits and is approached", above=0
     )
     max_heading: float = parameter(
-        2.0, "rad", "away from the reference's heading, beyond which it is the same", above=0
+        2.0,
+        "rad",
+        "angle from the reference's heading beyond which the reference waits and is approached",
+        above=0,
     )
     approach_speed: float = parameter(0.1, "m/s", "fastest speed of the approach", above=0)
     approach_yaw_rate: float = parameter(0.5, "rad/s", "fastest turn of the approach", above=0)

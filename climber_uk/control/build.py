@@ -43,7 +43,7 @@ class ControllerChoice:
     )
     adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
     wall: str = parameter(
-        "plane", "", "its shape, by which the weight along it is known", choices=WALLS
+        "plane", "", "shape of the wall, by which the weight along it is known", choices=WALLS
     )
 
 

@@ -60,7 +60,8 @@ class ControlOptions:
     solver: str = parameter(
         "closed_form",
         "",
-        "of the Udwadia-Kalaba equation; generic: by matrices, the same to rounding, and slower",
+        "how the Udwadia-Kalaba equation is solved; generic: by matrices, the same to rounding, "
+        "and slower",
         choices=("closed_form", "generic"),
     )
 

@@ -25,7 +25,13 @@ class Exact:
         plausible=(0.1, 150.0),  # as guidance.frequency
         runtime=True,
     )
-    hidden_rate: float = parameter(10.0, "1/s", "λ, decay of φ", above=0, runtime=True)
+    hidden_rate: float = parameter(
+        10.0,
+        "1/s",
+        "λ, rate at which the error φ of the hidden constraint decays",
+        above=0,
+        runtime=True,
+    )
 
     def fastest(self, speed: float, yaw_rate: float) -> tuple[float, float]:
         """See `ConstraintSet`; offsets of up to `REACH` are expected to be corrected."""

@@ -42,35 +42,47 @@ class GuardOptions:
     """What is beyond explanation, and when the climber is trusted again; 0 switches a check off."""
 
     speed_margin: float = parameter(
-        0.05, "m/s", "above the fastest that the constraints ask for on this reference", at_least=0
+        0.05,
+        "m/s",
+        "speed above the fastest that the constraints ask for on this reference, from which "
+        "on it is a fault",
+        at_least=0,
     )
     yaw_rate_margin: float = parameter(
-        1.0, "rad/s", "above the fastest turn that they ask for", at_least=0
+        1.0,
+        "rad/s",
+        "yaw rate above the fastest that the constraints ask for on this reference, from "
+        "which on it is a fault",
+        at_least=0,
     )
     stall_time: float = parameter(
-        0.12, "s", "for which a torque at its limit may move nothing", at_least=0
+        0.12, "s", "time for which a torque at its limit may move nothing", at_least=0
     )
     max_disturbance: float = parameter(
-        1.0, "", "of what adhesion and weight could cause, as force and as moment", at_least=0
+        1.0,
+        "",
+        "largest unexplained force, and moment, as a share of what adhesion and weight could cause",
+        at_least=0,
     )
     response_time: float = parameter(
-        0.15, "s", "in which a wheel has to answer its torque", at_least=0
+        0.15, "s", "time in which a wheel has to answer its torque", at_least=0
     )
     encoder_distance: float = parameter(
         0.0,
         "m",
-        "of a wheel's rim, by which `joint_states` may differ from odometry beside 30 %; 0: nobody "
-        "listens to them, and where odometry is stuck from the start the climber may run away",
+        "distance at a wheel's rim by which `joint_states` may differ from odometry beside 30 %; "
+        "0: nobody listens to them, and where odometry is stuck from the start the climber may "
+        "run away",
         at_least=0,
         plausible=(0.002, 0.1),
     )
     recovery_time: float = parameter(
-        0.5, "s", "of rest after which the reference is followed again", at_least=0
+        0.5, "s", "time at rest after which the reference is followed again", at_least=0
     )
     attempts: int = parameter(
-        3, "", "faults within `memory`, after which ~/enable is waited for", at_least=1
+        3, "", "faults within `guard.memory`, after which ~/enable is waited for", at_least=1
     )
-    memory: float = parameter(30.0, "s", "for which a fault counts", above=0)
+    memory: float = parameter(30.0, "s", "time for which a fault counts", above=0)
 
 
 UNGUARDED = GuardOptions(

@@ -67,26 +67,42 @@ class Guidance:
     frequency: float = parameter(
         18.0,
         "rad/s",
-        "ω, how fast errors vanish; of the heading 2/3 of it",
+        "ω, how fast errors along the path and across it vanish; those of the heading at 2/3 of it",
         above=0,
         plausible=(0.1, 150.0),  # at 300 torques go to and fro, at 200 Hz
         runtime=True,
     )
     damping: float = parameter(
-        0.7, "", "ζ; 1: no overshoot, lower: faster", above=0.5, at_most=2, runtime=True
+        0.7,
+        "",
+        "ζ, damping of errors; 1: no overshoot, lower: faster",
+        above=0.5,
+        at_most=2,
+        runtime=True,
     )
     cross_track_gain: float = parameter(
-        8.0, "1/m", "k_y, less where that is too fast for ω", at_least=0, runtime=True
+        8.0,
+        "1/m",
+        "k_y, angle of the way back to the path by the distance from it; less where that is "
+        "too fast for ω",
+        at_least=0,
+        runtime=True,
     )
-    fade_speed: float = parameter(1.0, "m/s", "v_s, below which k_y fades", above=0, runtime=True)
+    fade_speed: float = parameter(
+        1.0, "m/s", "v_s, speed below which k_y fades", above=0, runtime=True
+    )
     catch_up_share: float = parameter(
-        0.25, "", "c, share of its speed that is added behind the reference", above=0, runtime=True
+        0.25, "", "c, share of the reference's speed that is added behind it", above=0, runtime=True
     )
     catch_up_speed: float = parameter(
-        2.0, "m/s", "v_c, most that this share adds to the reference's speed", above=0, runtime=True
+        2.0,
+        "m/s",
+        "v_c, most that `guidance.catch_up_share` adds to the reference's speed",
+        above=0,
+        runtime=True,
     )
     turn_radius: float = parameter(
-        0.3, "m", "ρ, of the turn back to the heading wanted", above=0, runtime=True
+        0.3, "m", "ρ, radius of the turn back to the heading wanted", above=0, runtime=True
     )
     turn_rate: float = parameter(
         4.0, "rad/s", "fastest turn back to the heading wanted", above=0, runtime=True

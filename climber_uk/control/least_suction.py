@@ -41,17 +41,18 @@ class SuctionOptions:
     slip_margin: float = parameter(
         2.0,
         "",
-        "that is kept; lower: less pressure, and less for what comes unforeseen",
+        "slip margin that is kept; lower: less pressure, and less for what comes unforeseen",
         at_least=1,
     )
-    tip_margin: float = parameter(2.0, "", "that is kept", at_least=1)
+    tip_margin: float = parameter(2.0, "", "tip margin that is kept", at_least=1)
     fall_rate: float = parameter(
-        500.0, "Pa/s", "at which the setpoint falls", above=0, plausible=(1, 1e5)
+        500.0, "Pa/s", "rate at which the suction setpoint falls", above=0, plausible=(1, 1e5)
     )
     rise_rate: float = parameter(
         8000.0,
         "Pa/s",
-        "at which it rises to what is seen to be needed soon; to what is needed now, at once",
+        "rate at which the suction setpoint rises to what is seen to be needed soon; to what is "
+        "needed now, at once",
         above=0,
         plausible=(10, 1e6),
     )

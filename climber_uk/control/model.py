@@ -203,13 +203,13 @@ class Observer:
     side_slip_source: str = parameter(
         "pose",
         "",
-        "what it is learnt from; odometry: from `twist.linear.y`, of wall_odometry whose wheels "
-        "scrub, as its poses have the noise of fixes; of a driver that tells 0, wheels are taken "
-        "to hold",
+        "what sideways slip is learnt from; odometry: from `twist.linear.y`, of wall_odometry "
+        "whose wheels scrub, as its poses have the noise of fixes; of a driver that tells 0, "
+        "wheels are taken to hold",
         choices=("odometry", "pose"),
     )
     pose_bandwidth: float = parameter(
-        60.0, "1/s", "of the filter that takes speeds from poses", above=0, runtime=True
+        60.0, "1/s", "bandwidth of the filter that takes speeds from poses", above=0, runtime=True
     )
 
     def corrected(

@@ -110,10 +110,13 @@ class Safety:
     safe_output: str = parameter(
         "zero",
         "",
-        "while not following: no torque, or weight held and motion braked",
+        "torques while the reference is not followed: none (zero), or weight held and motion "
+        "braked (hold)",
         choices=("zero", "hold"),
     )
-    braking_rate: float = parameter(5.0, "1/s", "of the safe output 'hold'", at_least=0)
+    braking_rate: float = parameter(
+        5.0, "1/s", "rate at which the safe output 'hold' brakes", at_least=0
+    )
     odometry_timeout: float = parameter(
         0.1,
         "s",
@@ -134,16 +137,19 @@ class Safety:
     max_jump: float = parameter(
         0.2,
         "m",
-        "by which a wheel may be elsewhere than the model expects",
+        "distance by which a wheel may be elsewhere than the model expects",
         above=0,
         plausible=(0.005, 5),
     )
     settling_messages: int = parameter(
-        5, "", "odometry messages without a jump until it is followed again", at_least=1
+        5, "", "odometry messages without a jump until the reference is followed again", at_least=1
     )
 
     max_twist_error: float = parameter(
-        0.05, "m", "of the way in half a second, between twist and pose, beside 30 %", above=0
+        0.05,
+        "m",
+        "distance by which the way in half a second may differ between twist and pose, beside 30 %",
+        above=0,
     )
 
     @property

@@ -23,7 +23,7 @@ class MotorBoard:
     motors: str = parameter(
         "torque",
         "",
-        "which of the command the driver obeys, its effort or its velocity",
+        "what of `wheel_torques` the driver obeys, effort or velocity",
         choices=("torque", "velocity"),
         runtime=True,
     )

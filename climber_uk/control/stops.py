@@ -33,18 +33,23 @@ class StopOptions:
     least_charge: float = parameter(
         0.0,
         "",
-        "share of `battery_state`'s charge below which it stops; 0: not looked at; too low: motors "
-        "and pump may stop first",
+        "share of `battery_state`'s charge below which the climber stops; 0: not looked at; too "
+        "low: motors and pump may stop first",
         at_least=0,
         at_most=1,
     )
     least_voltage: float = parameter(
-        0.0, "V", "the same of its voltage, which sags under load: too high stops early", at_least=0
+        0.0,
+        "V",
+        "`battery_state`'s voltage below which the climber stops; 0: not looked at; it sags "
+        "under load: too high stops early",
+        at_least=0,
     )
     tether_length: float = parameter(
         0.0,
         "m",
-        "way on the wall, to and fro, after which it stops; 0: never; too long: the tether pulls",
+        "way on the wall, to and fro, after which the climber stops; 0: never; too long: the "
+        "tether pulls",
         at_least=0,
     )
 

@@ -30,10 +30,18 @@ class Pacing:
         runtime=True,
     )
     recovery_time: float = parameter(
-        1.0, "s", "in which lost time is made up for, at last", above=0, runtime=True
+        1.0,
+        "s",
+        "time in which a delay of the reference is made up for, at last",
+        above=0,
+        runtime=True,
     )
     settling_time: float = parameter(
-        0.2, "s", "in which σ goes back to where it should be", above=0, runtime=True
+        0.2,
+        "s",
+        "time in which the reference's rate σ goes back to where it should be",
+        above=0,
+        runtime=True,
     )
 
 

@@ -33,12 +33,13 @@ class Timing:
     """
 
     control_period: float = parameter(
-        0.005, "s", "from an odometry to the next, until it is measured", above=0, at_most=1
+        0.005, "s", "time from an odometry to the next, until it is measured", above=0, at_most=1
     )
     transport_delay: float = parameter(
         0.0,
         "s",
-        "what the clock does not show: before the odometry's stamp and on the way to the wheels",
+        "delay that the clock does not show: before the odometry's stamp and on the way to the "
+        "wheels",
         at_least=0,
         at_most=LONGEST_STEP,
         runtime=True,

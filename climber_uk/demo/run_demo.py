@@ -75,7 +75,9 @@ class Ended(RuntimeError):  # noqa: N818 - it is what happened
 class DemoOptions:
     """How long the demonstration lasts."""
 
-    duration: float = parameter(20.0, "s", "of the trajectory; too short: it is cut off", above=0)
+    duration: float = parameter(
+        20.0, "s", "time of the trajectory; too short: it is cut off", above=0
+    )
 
 
 class Demo(ClimberNode):

@@ -31,7 +31,11 @@ class ExpectedDriver:
     """Parameters of the controller that describe the driver."""
 
     control_period: float = parameter(
-        0.005, "s", "from an odometry to the next; wrong: a warning on `rate`", above=0, at_most=1
+        0.005,
+        "s",
+        "time from an odometry to the next; wrong: a warning on `rate`",
+        above=0,
+        at_most=1,
     )
     odometry_timeout: float = parameter(
         0.1, "s", "age above which odometry is refused; too short: `age` fails", above=0
@@ -39,14 +43,20 @@ class ExpectedDriver:
     motors: str = parameter(
         "torque",
         "",
-        "which of the command the driver obeys; wrong: `motors` fails",
+        "what of `wheel_torques` the driver obeys, effort or velocity; wrong: `motors` fails",
         choices=("torque", "velocity"),
     )
     servo_time_constant: float = parameter(
-        0.02, "s", "of a board that takes speeds; wrong by two: `servo` warns", at_least=0
+        0.02,
+        "s",
+        "time constant of a board that takes speeds; wrong by two: `servo` warns",
+        at_least=0,
     )
     transport_delay: float = parameter(
-        0.0, "s", "from a torque's publication to its action; wrong: `latency` warns", at_least=0
+        0.0,
+        "s",
+        "time from a torque's publication to its action; wrong: `latency` warns",
+        at_least=0,
     )
 
 

@@ -32,7 +32,7 @@ class Bounds:
     torque_share: float = parameter(
         0.5,
         "",
-        "of `max_wheel_torque` that a trial commands at most; too low: it does not move",
+        "share of `max_wheel_torque` that a trial commands at most; too low: it does not move",
         above=0,
         at_most=1,
     )

@@ -18,56 +18,80 @@ class LocalizationOptions:
     effective_half_track: float = parameter(
         0.0,
         "m",
-        "by which wheels reckon turns, wider where they scrub; 0: half_track",
+        "distance of a wheel from the centre by which turns are reckoned, wider where wheels "
+        "scrub; 0: half_track",
         at_least=0,
         plausible=(0.02, 3),
     )
     inclination: float = parameter(
-        90.0, "deg", "of the wall: 0 floor, 90 vertical, 180 ceiling", at_least=0, at_most=180
+        90.0,
+        "deg",
+        "inclination of the wall: 0 floor, 90 vertical, 180 ceiling",
+        at_least=0,
+        at_most=180,
     )
     gyro_noise: float = parameter(
-        0.002, "rad/√s", "of the yaw rate: deviation of its integral after a second", above=0
+        0.002, "rad/√s", "noise of the yaw rate: deviation of its integral after a second", above=0
     )
-    gyro_bias_deviation: float = parameter(0.02, "rad/s", "of the bias at the start", at_least=0)
-    gyro_bias_walk: float = parameter(1e-4, "rad/s/√s", "how much the bias wanders", at_least=0)
+    gyro_bias_deviation: float = parameter(
+        0.02, "rad/s", "deviation of the gyro's bias at the start", at_least=0
+    )
+    gyro_bias_walk: float = parameter(
+        1e-4, "rad/s/√s", "how much the gyro's bias wanders", at_least=0
+    )
     acceleration_noise: float = parameter(
-        0.005, "m/s/√s", "of specific force: deviation of its integral after a second", above=0
+        0.005,
+        "m/s/√s",
+        "noise of the specific force: deviation of its integral after a second",
+        above=0,
     )
-    imu_x: float = parameter(0.0, "m", "where it is in base_frame: forwards of the centre")
-    imu_y: float = parameter(0.0, "m", "where it is in base_frame: to the left of the centre")
+    imu_x: float = parameter(0.0, "m", "where the IMU is in base_frame: forwards of the centre")
+    imu_y: float = parameter(0.0, "m", "where the IMU is in base_frame: to the left of the centre")
     acceleration_bias_deviation: float = parameter(
-        0.1, "m/s²", "of either bias at the start; 0: there is none", at_least=0
+        0.1,
+        "m/s²",
+        "deviation of either bias of the specific force at the start; 0: there is none",
+        at_least=0,
     )
-    acceleration_bias_walk: float = parameter(0.0002, "m/s²/√s", "how much they wander", at_least=0)
+    acceleration_bias_walk: float = parameter(
+        0.0002, "m/s²/√s", "how much the biases of the specific force wander", at_least=0
+    )
     scale_deviation: float = parameter(
-        0.01, "", "of the encoders' distance: slip, and a wrong wheel radius", at_least=0
+        0.01, "", "deviation of the encoders' scale: slip, and a wrong wheel radius", at_least=0
     )
-    scale_time: float = parameter(10.0, "s", "in which that changes", above=0)
+    scale_time: float = parameter(10.0, "s", "time in which the encoders' scale changes", above=0)
     creep_deviation: float = parameter(
-        0.03, "", "of what the climber sags on a vertical wall, by the way rolled", at_least=0
+        0.03,
+        "",
+        "deviation of the way that the climber sags on a vertical wall, by the way rolled",
+        at_least=0,
     )
     scrub_deviation: float = parameter(
         0.0,
         "m",
-        "of how far wheels that scrub give way by an angle: λ, and a, by the same share of both if "
-        "they are told; 0: they do not scrub",
+        "deviation of how far wheels that scrub give way by an angle: λ, and a, by the same "
+        "share of both if they are told; 0: they do not scrub",
         at_least=0,
         plausible=(0.0, 1.0),
     )
     slip_deviation: float = parameter(
         0.5,
         "",
-        "of how far wheels that scrub slip along, by what their sides slip in turns (ζ, ξ)",
+        "deviation of how far wheels that scrub slip along, by what their sides slip in turns "
+        "(ζ, ξ)",
         at_least=0,
     )
-    slip_walk: float = parameter(0.05, "1/√rad", "how much that wanders in a turn", at_least=0)
+    slip_walk: float = parameter(
+        0.05, "1/√rad", "how much the slip along (ζ, ξ) wanders in a turn", at_least=0
+    )
     way_noise: float = parameter(
         0.001, "m/√m", "deviation of the position after a metre, else unexplained", at_least=0
     )
     turn_noise: float = parameter(
         0.01,
         "rad/√rad",
-        "of a turn by encoders, beside their scale, used without an IMU; 0.05 if wheels scrub",
+        "noise of a turn by encoders, beside their scale, used without an IMU; 0.05 if wheels "
+        "scrub",
         at_least=0,
     )
     initial_x: float = parameter(0.0, "m", "x at the start")
@@ -83,31 +107,40 @@ class LocalizationOptions:
         0.0, "m", "λ at the start: sag to a side by the angle turned, as `localize` has told"
     )
     initial_pivot: float = parameter(
-        0.0, "m", "a at the start: how far below the centre it turns, as `localize` has told"
+        0.0,
+        "m",
+        "a at the start: how far below the centre the climber turns, as `localize` has told",
     )
     initial_drag_slip: float = parameter(
-        0.0, "", "ζ at the start: slip along by what drags it, as `localize` has told"
+        0.0, "", "ζ at the start: slip along by what drags the climber, as `localize` has told"
     )
     initial_weight_slip: float = parameter(
         0.0, "", "ξ at the start: slip along by the weight, as `localize` has told"
     )
     initial_heading: float = parameter(0.0, "rad", "heading at the start")
     initial_position_deviation: float = parameter(
-        0.01, "m", "of both; above initial_position_limit: a fix is waited for", above=0
+        0.01,
+        "m",
+        "deviation of initial_x and initial_y; above initial_position_limit: a fix is waited for",
+        above=0,
     )
     initial_heading_deviation: float = parameter(
-        math.pi, "rad", "of that; above initial_heading_limit: gravity or a fix tells", above=0
+        math.pi,
+        "rad",
+        "deviation of initial_heading; above initial_heading_limit: gravity or a fix tells",
+        above=0,
     )
     initial_position_limit: float = parameter(
         0.2,
         "m",
-        "deviation above which nothing is published at the start, and which is told",
+        "deviation of the position above which nothing is published at the start, and which is "
+        "told",
         above=0,
     )
     initial_heading_limit: float = parameter(
         0.1,
         "rad",
-        "deviation above which nothing is published at the start, and which is told",
+        "deviation of the heading above which nothing is published at the start, and which is told",
         above=0,
     )
     gate_probability: float = parameter(
@@ -119,12 +152,16 @@ class LocalizationOptions:
     longest_delay: float = parameter(
         1.0, "s", "age of a fix above which it is refused", above=0, plausible=(0.05, 10)
     )
-    pull_time: float = parameter(0.3, "s", "in which the output follows a correction", above=0)
-    pull_speed: float = parameter(0.05, "m/s", "fastest that it follows", above=0)
-    pull_yaw_rate: float = parameter(0.1, "rad/s", "fastest that it follows", above=0)
+    pull_time: float = parameter(0.3, "s", "time in which the output follows a correction", above=0)
+    pull_speed: float = parameter(
+        0.05, "m/s", "fastest speed at which the output follows a correction", above=0
+    )
+    pull_yaw_rate: float = parameter(
+        0.1, "rad/s", "fastest turn at which the output follows a correction", above=0
+    )
 
     output_frequency: float = parameter(
-        100.0, "rad/s", "W of the output's speeds: lower is smoother, and later", above=0
+        100.0, "rad/s", "W, bandwidth of the output's speeds: lower is smoother, and later", above=0
     )
 
     @cached_property

@@ -12,19 +12,27 @@ class SensorFrames:
 
     imu_frame: str = parameter("", "", "frame of imu; empty: base_frame")
     imu_yaw: float = parameter(
-        0.0, "rad", "from the climber's x to the IMU's, anticlockwise; both have z off the wall"
+        0.0,
+        "rad",
+        "angle from the climber's x to the IMU's, anticlockwise; both have z off the wall",
     )
     pose_frame: str = parameter("", "", "frame of pose; empty: odom_frame")
-    pose_frame_x: float = parameter(0.0, "m", "where its origin is in odom_frame: x")
-    pose_frame_y: float = parameter(0.0, "m", "where its origin is in odom_frame: y")
+    pose_frame_x: float = parameter(0.0, "m", "where pose_frame's origin is in odom_frame: x")
+    pose_frame_y: float = parameter(0.0, "m", "where pose_frame's origin is in odom_frame: y")
     pose_frame_yaw: float = parameter(
-        0.0, "rad", "from the x of odom_frame to its own, anticlockwise; both have z off the wall"
+        0.0,
+        "rad",
+        "angle from the x of odom_frame to that of pose_frame, anticlockwise; both have z "
+        "off the wall",
     )
     pose_x: float = parameter(
-        0.0, "m", "where what it measures (a tag, a prism) is in base_frame: forwards of the centre"
+        0.0,
+        "m",
+        "where the point that `pose` tells of (a tag, a prism) is in base_frame: forwards of "
+        "the centre",
     )
     pose_y: float = parameter(
-        0.0, "m", "where what it measures is in base_frame: to the left of the centre"
+        0.0, "m", "where the point that `pose` tells of is in base_frame: to the left of the centre"
     )
     map_frame: str = parameter(
         "map", "", "frame in which the estimate is right at once; see docs/localization.md"

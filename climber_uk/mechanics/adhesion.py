@@ -81,7 +81,12 @@ class Magnetic(Adhesion):
         300.0, "N", "force F₀ of all magnets on bare steel", at_least=0, plausible=(1, 1e5)
     )
     gap: float = parameter(
-        0.0, "m", "of air or paint at the magnets", at_least=0, runtime=True, plausible=(1e-6, 0.1)
+        0.0,
+        "m",
+        "gap of air or paint at the magnets",
+        at_least=0,
+        runtime=True,
+        plausible=(1e-6, 0.1),
     )
     gap_of_a_quarter: float = parameter(
         2e-3, "m", "gap g₀ at which a quarter of F₀ is left", above=0, plausible=(1e-6, 0.1)
@@ -121,25 +126,33 @@ class Grip:
     """Wheels, seal and centre of mass on the wall, by which slipping and tipping are warned of."""
 
     wheel_friction_coefficient: float = parameter(
-        0.8, "", "μ_w on the wall; too high: slip comes unwarned", at_least=0, plausible=(0.01, 3)
+        0.8,
+        "",
+        "friction coefficient μ_w of the wheels on the wall; too high: slip comes unwarned",
+        at_least=0,
+        plausible=(0.01, 3),
     )
     wheel_inertia: float = parameter(
         2e-5,
         "kg m²",
-        "of the wheels of a side about their axles; mass and yaw inertia contain it",
+        "inertia of the wheels of a side about their axles; mass and yaw inertia contain it",
         above=0,
         plausible=(1e-8, 1),
     )
     centre_height: float = parameter(
-        0.05, "m", "h of the centre of mass above the wall", at_least=0, plausible=(0.001, 1)
+        0.05, "m", "height h of the centre of mass above the wall", at_least=0, plausible=(0.001, 1)
     )
     wheelbase: float = parameter(
-        0.25, "m", "l between the edges it would tip about", above=0, plausible=(0.02, 3)
+        0.25,
+        "m",
+        "distance l between the edges that the climber would tip about",
+        above=0,
+        plausible=(0.02, 3),
     )
     seal_radius: float = parameter(
         0.0,
         "m",
-        "of the ring whose friction resists yawing; 0: none",
+        "radius of the seal's ring, whose friction resists yawing; 0: none",
         at_least=0,
         plausible=(0.01, 1),
     )
@@ -211,9 +224,15 @@ class Attachment:
 class Alarm:
     """Margins of slipping and tipping below which diagnostics warn; see `Attachment`."""
 
-    warn_margin: float = parameter(1.5, "", "margin below which it warns", at_least=0, runtime=True)
+    warn_margin: float = parameter(
+        1.5, "", "slip or tip margin below which diagnostics warn", at_least=0, runtime=True
+    )
     error_margin: float = parameter(
-        1.0, "", "margin below which it is an error", at_least=0, runtime=True
+        1.0,
+        "",
+        "slip or tip margin below which diagnostics tell an error",
+        at_least=0,
+        runtime=True,
     )
 
     def level(self, margin: float) -> int:

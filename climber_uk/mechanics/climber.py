@@ -45,7 +45,8 @@ class Climber:
     rotor_inertia: float = parameter(
         0.0,
         "kg m²",
-        "of a side's rotors at its wheels (gear ratio squared), not in mass and yaw_inertia",
+        "inertia of a side's rotors at its wheels (gear ratio squared), not in mass and "
+        "yaw_inertia",
         at_least=0,
         plausible=(1e-8, 10),
     )
@@ -74,7 +75,7 @@ class Climber:
     inclination: float = parameter(
         90.0,
         "deg",
-        "of the wall: 0 floor, 90 vertical, 180 ceiling",
+        "inclination of the wall: 0 floor, 90 vertical, 180 ceiling",
         at_least=0,
         at_most=180,
         plausible=(3.2, 180),

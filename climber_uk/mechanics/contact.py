@@ -46,9 +46,11 @@ class FourWheeled(Locomotion):
     """Four driven wheels, a belt from front to rear, which resist yawing by μ_t N l / 2."""
 
     scrub_friction_coefficient: float = parameter(
-        0.8, "", "μ_t of the wheels, sideways", at_least=0
+        0.8, "", "friction coefficient μ_t of the wheels sideways", at_least=0
     )
-    wheelbase: float = parameter(0.25, "m", "l from the front axle to the rear one", above=0)
+    wheelbase: float = parameter(
+        0.25, "m", "distance l from the front axle to the rear one", above=0
+    )
 
     @property
     def footholds(self) -> Sequence[float]:
@@ -61,7 +63,7 @@ class Tracked(Locomotion):
     """Tracks, which resist yawing by μ_t N L / 4, the load spread evenly."""
 
     scrub_friction_coefficient: float = parameter(
-        0.5, "", "μ_t of the tracks, sideways", at_least=0
+        0.5, "", "friction coefficient μ_t of the tracks sideways", at_least=0
     )
     length: float = parameter(0.3, "m", "length L of the tracks that is on the wall", above=0)
 

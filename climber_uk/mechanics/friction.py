@@ -91,7 +91,9 @@ class Coulomb(Friction):
 class Viscous(Friction):
     """Viscous friction, in proportion to the speed, as of a lubricated seal: no stiction."""
 
-    speed: float = parameter(0.1, "m/s", "at which it equals Coulomb's friction", above=0)
+    speed: float = parameter(
+        0.1, "m/s", "speed at which viscous friction equals Coulomb's", above=0
+    )
 
     def stiction(self, f: Any) -> Any:
         """See `Friction`."""
@@ -110,8 +112,8 @@ class Viscous(Friction):
 class Stribeck(Friction):
     """Stribeck friction: highest at rest, lower in motion, and growing again with speed."""
 
-    ratio: float = parameter(1.5, "", "of stiction to Coulomb's friction", at_least=1)
-    speed: float = parameter(0.02, "m/s", "v_s, at which most of the surplus is gone", above=0)
+    ratio: float = parameter(1.5, "", "ratio of stiction to Coulomb's friction", at_least=1)
+    speed: float = parameter(0.02, "m/s", "speed v_s at which most of the surplus is gone", above=0)
     viscous: float = parameter(0.0, "s/m", "κ, viscous part of f per speed", at_least=0)
 
     def stiction(self, f: Any) -> Any:
@@ -141,9 +143,14 @@ class LuGre(Bristles, Stribeck):
     """Bristles that bend before they slide: hysteresis, pre-sliding, and no edge at rest."""
 
     deflection: float = parameter(
-        1e-3, "m", "of the bristles under Coulomb's friction, f / σ₀; smaller is stiffer", above=0
+        1e-3,
+        "m",
+        "deflection of the bristles under Coulomb's friction, f / σ₀; smaller is stiffer",
+        above=0,
     )
-    damping_time: float = parameter(5e-3, "s", "of the bristles, σ₁ / σ₀", at_least=0)
+    damping_time: float = parameter(
+        5e-3, "s", "damping of the bristles by their stiffness, σ₁ / σ₀", at_least=0
+    )
 
     def relaxation(self, speed: Any) -> Any:
         """σ₀ |v| / g(v): see `Bristles`."""

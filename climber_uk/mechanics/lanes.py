@@ -38,17 +38,17 @@ class Lanes(ThroughPoints):
     area: str = parameter(
         "", "", "text file: corners x and y [m], an empty line before each hole", is_path=True
     )
-    width: float = parameter(0.2, "m", "of a lane: what is done at once, across", above=0)
-    overlap: float = parameter(0.0, "m", "of two lanes side by side, at least", at_least=0)
+    width: float = parameter(0.2, "m", "width of a lane: what is done at once, across", above=0)
+    overlap: float = parameter(0.0, "m", "overlap of two lanes side by side, at least", at_least=0)
     clearance: float = parameter(
-        0.2, "m", "of the climber's centre from the area's edge and its holes", above=0
+        0.2, "m", "distance of the climber's centre from the area's edge and its holes", above=0
     )
-    direction: float = parameter(0.0, "rad", "of the lanes, anticlockwise from x")
+    direction: float = parameter(0.0, "rad", "direction of the lanes, anticlockwise from x")
     edges: bool = parameter(True, "", "a lane along each edge, too, for what lanes' ends leave")
     descent: float = parameter(
         1.0,
         "",
-        "times as far as it is counts what the way between two lanes goes down, against y: more "
+        "factor by which the way between two lanes counts where it goes down, against y: more "
         "for climbers whose turns scrub, which sag where they turn from down to level",
         at_least=1,
         at_most=100,

@@ -14,7 +14,7 @@ class TrajectoryParameters:
     """The trajectory: a shape, a time law, and where they begin."""
 
     shape: str = parameter("ellipse", "", "shape of the path", choices=SHAPES)
-    time_law: str = parameter("rest_to_rest", "", "how it is travelled", choices=TIME_LAWS)
+    time_law: str = parameter("rest_to_rest", "", "how the path is travelled", choices=TIME_LAWS)
     reverse_gear: bool = parameter(False, "", "whether the climber's tail goes first")
     origin_x: float = parameter(0.0, "m", "x of the shape's origin")
     origin_y: float = parameter(0.0, "m", "y of the shape's origin")

@@ -104,7 +104,10 @@ class Cone(Wall):
     """
 
     distance: float = parameter(
-        5.0, "m", "from the origin to the apex: > 0 it is uphill, < 0 downhill", nonzero=True
+        5.0,
+        "m",
+        "distance from the origin to the apex: > 0 it is uphill, < 0 downhill",
+        nonzero=True,
     )
 
     flat: ClassVar[bool] = False

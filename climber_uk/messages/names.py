@@ -59,7 +59,9 @@ class Names:
     left_wheel_joint: str = parameter(
         "left_wheel_joint", "", "joint of the left wheel; of several, front to rear: a, b"
     )
-    right_wheel_joint: str = parameter("right_wheel_joint", "", "the same of the right side")
+    right_wheel_joint: str = parameter(
+        "right_wheel_joint", "", "joint of the right wheel; of several, front to rear: a, b"
+    )
     prefix_frames: bool = parameter(True, "", "put the node's namespace before both frames")
 
     def __post_init__(self) -> None:

@@ -73,7 +73,9 @@ class PublisherOptions:
     """When a trajectory starts, and how fast it is driven."""
 
     autostart: bool = parameter(True, "", "start at the first odometry; false: only at ~/start")
-    start_delay: float = parameter(0.0, "s", "from that odometry's stamp to the start", at_least=0)
+    start_delay: float = parameter(
+        0.0, "s", "time from the first odometry's stamp to the start", at_least=0
+    )
     speed: float = parameter(
         1.0,
         "",
@@ -85,7 +87,7 @@ class PublisherOptions:
     goal_patience: float = parameter(
         10.0,
         "s",
-        "for which a goal of follow_path may not begin or be followed, until it fails",
+        "time for which a goal of follow_path may not begin or be followed, until it fails",
         above=0,
         plausible=(0.5, 600),
     )

@@ -69,7 +69,7 @@ class NodeOptions:
     effort_order: str = parameter(
         "left_right",
         "",
-        "order of these; wrong: the climber yaws away",
+        "order of the torques in effort_controller/commands; wrong: the climber yaws away",
         choices=("left_right", "right_left"),
     )
     publish_cmd_vel: bool = parameter(

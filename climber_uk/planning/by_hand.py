@@ -32,8 +32,12 @@ class HandOptions:
     )
     speed: float = parameter(0.2, "m/s", "fastest speed; what is more is cut", above=0)
     yaw_rate: float = parameter(0.5, "rad/s", "fastest turn; what is more is cut", above=0)
-    ramp_time: float = parameter(1.0, "s", "in which a speed is the one asked for", at_least=0.1)
-    timeout: float = parameter(0.5, "s", "without a message, after which it brakes", above=0)
+    ramp_time: float = parameter(
+        1.0, "s", "time in which a speed is the one asked for", at_least=0.1
+    )
+    timeout: float = parameter(
+        0.5, "s", "time without a message after which the climber brakes", above=0
+    )
 
 
 def check_speeds(speed: float, yaw_rate: float) -> None:

@@ -39,7 +39,7 @@ class CourseOptions:
     reaction: float = parameter(
         0.3,
         "s",
-        "ahead of the climber, from where on what is published may change: it pauses no sooner",
+        "time ahead of the climber from where on what is published may change: it pauses no sooner",
         at_least=0.1,
     )
     stop_time: float = parameter(

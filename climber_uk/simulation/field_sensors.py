@@ -20,20 +20,24 @@ from climber_uk.simulation.plant import Plant
 class ImuErrors:
     """An IMU with the axes of the climber's body, but for a yaw, and a sample at each odometry."""
 
-    enabled: bool = parameter(False, "", "whether there is one")
-    x: float = parameter(0.0, "m", "where it is: forwards of the centre")
-    y: float = parameter(0.0, "m", "where it is: to the left of the centre")
-    yaw: float = parameter(0.0, "rad", "from the climber's x to its own, anticlockwise")
+    enabled: bool = parameter(False, "", "whether there is an IMU")
+    x: float = parameter(0.0, "m", "where the IMU is: forwards of the centre")
+    y: float = parameter(0.0, "m", "where the IMU is: to the left of the centre")
+    yaw: float = parameter(0.0, "rad", "angle from the climber's x to the IMU's, anticlockwise")
     gyro_noise: float = parameter(
         0.0, "rad/√s", "deviation of the yaw rate's integral after a second", at_least=0
     )
-    gyro_bias: float = parameter(0.0, "rad/s", "added to the yaw rate")
+    gyro_bias: float = parameter(0.0, "rad/s", "bias that is added to the yaw rate")
     acceleration_noise: float = parameter(
         0.0, "m/s/√s", "deviation of the specific force's integral after a second", at_least=0
     )
-    forward_bias: float = parameter(0.0, "m/s²", "added to the specific force forwards")
-    left_bias: float = parameter(0.0, "m/s²", "added to the specific force to the left")
-    seed: int = parameter(0, "", "of the noise", at_least=0)
+    forward_bias: float = parameter(
+        0.0, "m/s²", "bias that is added to the specific force forwards"
+    )
+    left_bias: float = parameter(
+        0.0, "m/s²", "bias that is added to the specific force to the left"
+    )
+    seed: int = parameter(0, "", "seed of the noise", at_least=0)
 
 
 @parameters
@@ -46,27 +50,35 @@ class EncoderErrors:
     slip: float = parameter(
         0.0, "", "standard deviation of the share by which wheels turn too far", at_least=0
     )
-    slip_time: float = parameter(10.0, "s", "in which that changes", above=0)
-    seed: int = parameter(0, "", "of that", at_least=0)
+    slip_time: float = parameter(10.0, "s", "time in which the encoders' slip changes", above=0)
+    seed: int = parameter(0, "", "seed of the encoders' slip", at_least=0)
 
 
 @parameters
 class FixErrors:
     """Poses measured from outside, on the topic `pose`."""
 
-    period: float = parameter(0.0, "s", "from one to the next; 0: none", at_least=0)
+    period: float = parameter(
+        0.0, "s", "time from one fix to the next; 0: there are none", at_least=0
+    )
     delay: float = parameter(
-        0.0, "s", "from measuring, which the stamp tells, to publishing", at_least=0
+        0.0, "s", "time from measuring, which the fix's stamp tells, to publishing", at_least=0
     )
     position_noise: float = parameter(0.025, "m", "standard deviation of x and y", above=0)
     heading_noise: float = parameter(
         0.0, "rad", "standard deviation of the heading; 0: it is not measured", at_least=0
     )
-    outlier_share: float = parameter(0.0, "", "share that is off", at_least=0, at_most=1)
-    outlier_size: float = parameter(3.0, "m", "standard deviation of those", at_least=0)
-    x: float = parameter(0.0, "m", "where what they measure is: forwards of the centre")
-    y: float = parameter(0.0, "m", "where what they measure is: to the left of the centre")
-    seed: int = parameter(0, "", "of the noise", at_least=0)
+    outlier_share: float = parameter(
+        0.0, "", "share of the fixes that are off", at_least=0, at_most=1
+    )
+    outlier_size: float = parameter(
+        3.0, "m", "standard deviation of the fixes that are off", at_least=0
+    )
+    x: float = parameter(0.0, "m", "where the point that fixes tell of is: forwards of the centre")
+    y: float = parameter(
+        0.0, "m", "where the point that fixes tell of is: to the left of the centre"
+    )
+    seed: int = parameter(0, "", "seed of the noise", at_least=0)
 
 
 # classes of parameters by what is before their names

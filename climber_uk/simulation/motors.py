@@ -24,7 +24,7 @@ class Motors:
     motors: str = parameter(
         "torque",
         "",
-        "which of the command they obey: its effort or its velocity",
+        "what of `wheel_torques` the motors obey: effort or velocity",
         choices=("torque", "velocity"),
     )
     torque_lag: float = parameter(0.0, "s", "time constant T of the motors; 0: at once", at_least=0)

@@ -23,7 +23,7 @@ class SimulationOptions:
         0.0, "", "fastest simulated time by wall-clock time; 0: no limit", at_least=0
     )
     control_period: float = parameter(
-        0.005, "s", "from one odometry to the next", at_least=1e-4, plausible=(5e-4, 0.5)
+        0.005, "s", "time from one odometry to the next", at_least=1e-4, plausible=(5e-4, 0.5)
     )
     integration_step: float = parameter(
         0.0025, "s", "step of the integrator", at_least=1e-6, plausible=(1e-5, 0.5)

@@ -68,7 +68,7 @@ class Sensors:
     odometry_delay: float = parameter(
         0.0,
         "s",
-        "from measuring, which its stamp tells, to publishing",
+        "time from measuring, which the odometry's stamp tells, to publishing",
         at_least=0,
         plausible=(0.0, 1),
     )
@@ -79,27 +79,32 @@ class Sensors:
         0.0, "rad", "standard deviation of the heading", at_least=0, plausible=(0.0, 1)
     )
     speed_noise: float = parameter(0.0, "m/s", "standard deviation of the speed", at_least=0)
-    yaw_rate_noise: float = parameter(0.0, "rad/s", "standard deviation", at_least=0)
-    x_bias: float = parameter(0.0, "m", "added to x")
-    y_bias: float = parameter(0.0, "m", "added to y")
-    heading_bias: float = parameter(0.0, "rad", "added to the heading")
-    speed_bias: float = parameter(0.0, "m/s", "added to the forward speed")
-    yaw_rate_bias: float = parameter(0.0, "rad/s", "added to the yaw rate")
+    yaw_rate_noise: float = parameter(
+        0.0, "rad/s", "standard deviation of the yaw rate", at_least=0
+    )
+    x_bias: float = parameter(0.0, "m", "bias that is added to x")
+    y_bias: float = parameter(0.0, "m", "bias that is added to y")
+    heading_bias: float = parameter(0.0, "rad", "bias that is added to the heading")
+    speed_bias: float = parameter(0.0, "m/s", "bias that is added to the forward speed")
+    yaw_rate_bias: float = parameter(0.0, "rad/s", "bias that is added to the yaw rate")
     encoder_resolution: float = parameter(
         0.0,
         "rad",
-        "of the wheels' encoders, for odometry_source wheels; 0: exact",
+        "resolution of the wheels' encoders, for odometry_source wheels; 0: exact",
         at_least=0,
         plausible=(0.0, 1),
     )
     effective_half_track: float = parameter(
         0.0,
         "m",
-        "by which wheels reckon turns, wider where they scrub; 0: half_track",
+        "distance of a wheel from the centre by which turns are reckoned, wider where wheels "
+        "scrub; 0: half_track",
         at_least=0,
         plausible=(0.02, 3),
     )
-    seed: int = parameter(0, "", "of the noise: the same seed gives the same noise", at_least=0)
+    seed: int = parameter(
+        0, "", "seed of the noise: the same seed gives the same noise", at_least=0
+    )
 
     def delay_in(self, period: float) -> int:
         """Odometry's delay in periods of `period` [s]; `ValueError` if it is no multiple."""

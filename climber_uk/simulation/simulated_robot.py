@@ -33,16 +33,18 @@ class Physics:
 
     friction: str = parameter("coulomb", "", "law of the seal", choices=FRICTION)
     adhesion: str = parameter("suction", "", "what holds the climber", choices=ADHESION)
-    locomotion: str = parameter("wheeled", "", "what it runs on", choices=LOCOMOTION)
-    wall: str = parameter("plane", "", "what it runs along", choices=WALLS)
+    locomotion: str = parameter("wheeled", "", "what the climber runs on", choices=LOCOMOTION)
+    wall: str = parameter("plane", "", "shape of the wall", choices=WALLS)
     slip: bool = parameter(False, "", "whether wheels slip where their load does not suffice")
     creep: float = parameter(
         0.0, "", "what the climber sags on a vertical wall, by the way that it rolls", at_least=0
     )
     pressure_loss_time: float = parameter(
-        0.0, "s", "after the start, when the pump's pressure drops; 0: never", at_least=0
+        0.0, "s", "time after the start at which the pump's pressure drops; 0: never", at_least=0
     )
-    pressure_loss_level: float = parameter(0.0, "Pa", "pressure to which it drops", at_least=0)
+    pressure_loss_level: float = parameter(
+        0.0, "Pa", "pressure to which the pump's drops", at_least=0
+    )
 
 
 class Push(NamedTuple):

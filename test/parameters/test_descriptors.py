@@ -1,6 +1,8 @@
 """What `ros2 param describe` tells of a parameter."""
 
 import dataclasses
+import re
+from pathlib import Path
 
 import pytest
 
@@ -43,3 +45,17 @@ def test_bounds_are_told_in_words_and_as_a_range_only_where_both_ends_are_taken(
         check_value(field, end)
     assert told.read_only == (name != "closed")
     assert told.description.startswith(field.metadata["description"])
+
+
+ROWS = re.compile(r"^\| `([\w.]+)` \|.*\| (.*) \|$", re.MULTILINE)
+# A clause about a neighbour, or about the part that it belongs to: on its own it says nothing
+LEANING = re.compile(
+    r"(of|in|for|at|from|by|above|below|after|away|ahead|without|beyond|that|which|added|times"
+    r"|the same|its|it|where (it|its|what)|which of|how (it|they|that)|fastest that) "
+)
+
+
+def test_a_description_stands_alone_as_ros2_param_describe_shows_it():
+    said = set(ROWS.findall((Path(__file__).parents[2] / "docs" / "parameters.md").read_text()))
+    assert len(said) > 200
+    assert [each for each in sorted(said) if LEANING.match(each[1])] == []
