@@ -92,9 +92,9 @@ def verdict(column: Column) -> str:
     else:
         said = f"It did not settle on its path, {far}"
     if values["lowest_tip_margin"] < 1:
-        return f"{said}; on a real wall it would tip over: more suction, or less weight."
+        return f"{said}; on a real wall it would tip over: more adhesion, or less weight."
     if values["lowest_slip_margin"] < 1:
-        return f"{said}; on a real wall its wheels would slip: more suction, or slower."
+        return f"{said}; on a real wall its wheels would slip: more adhesion, or slower."
     return f"{said}."
 
 
