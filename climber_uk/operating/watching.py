@@ -144,7 +144,7 @@ def _torques(message: JointState, limit: float) -> list[str]:
     """A bar for each wheel, of the limit [N m] if that is known, else of the largest torque."""
     whole = limit or max(map(abs, message.effort), default=0.0) or 1.0
     return [
-        f"torque   {bar(effort / whole)} {effort:7.3f} N m  {name}"
+        f"torque  {bar(effort / whole)} {effort:7.3f} N m {name}"
         for name, effort in zip(message.name, message.effort, strict=False)
     ]
 

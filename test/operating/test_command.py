@@ -91,8 +91,8 @@ def test_what_is_watched_is_told_in_numbers_and_bars():
         "speed      0.250 m/s, turning  -0.100 rad/s",
         "error        1.00 mm along the path,    -2.00 mm across, 0.0100 rad",
         "margins  slip   2.50, tip  24.00 (below 1 it slips, or tips over); load 384 N",
-        f"torque   {' ' * 20}|{'█' * 10}{' ' * 10}   2.000 N m  left",
-        f"torque   {'█' * 20}|{' ' * 20}  -4.000 N m  right",
+        f"torque  {' ' * 20}|{'█' * 10}{' ' * 10}   2.000 N m left",
+        f"torque  {'█' * 20}|{' ' * 20}  -4.000 N m right",
         "",
     ]
 
