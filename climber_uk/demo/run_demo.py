@@ -32,6 +32,7 @@ from climber_uk.messages import reading
 from climber_uk.messages.topics import (
     CONTROLLER,
     DIAGNOSTICS,
+    FELL,
     JOINTS,
     LOCALIZATION,
     NODES,
@@ -55,7 +56,6 @@ from climber_uk.system.signals import Interrupted, on_end
 # comes after their message is not lost.
 RECORDED = REFERENCE_PATH, PARAMETERS, JOINTS
 COUNT = re.compile(r"^ +name: (\S+)$.*?^ +message_count: (\d+)$", re.MULTILINE | re.DOTALL)
-FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
 MOST_CLIMBERS = 100
 START_TIMEOUT = 60.0  # [s]
