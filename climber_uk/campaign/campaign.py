@@ -31,8 +31,10 @@ class Size:
     """Number of runs, their seed, and their duration."""
 
     runs: int = parameter(10_000, "", "number of runs; too few: wide intervals", at_least=1)
-    seed: int = parameter(0, "", "of all draws: the same seed, the same runs", at_least=0)
-    duration: float = parameter(20.0, "s", "of each run; too short: late falls unseen", above=0)
+    seed: int = parameter(0, "", "seed of all draws: the same seed, the same runs", at_least=0)
+    duration: float = parameter(
+        20.0, "s", "time of each run; too short: late falls unseen", above=0
+    )
     backend: str = parameter(
         "numpy", "", "what computes them, an extra but numpy", choices=BACKENDS
     )

@@ -34,6 +34,7 @@ from climber_uk.messages import reading
 from climber_uk.messages.topics import (
     CONTROLLER,
     DIAGNOSTICS,
+    FELL,
     JOINTS,
     LOCALIZATION,
     NODES,
@@ -58,10 +59,10 @@ from climber_uk.system.signals import Interrupted, on_end
 # comes after their message is not lost.
 RECORDED = REFERENCE_PATH, PARAMETERS, JOINTS
 COUNT = re.compile(r"^ +name: (\S+)$.*?^ +message_count: (\d+)$", re.MULTILINE | re.DOTALL)
-FELL = "fell off"
 Processes = dict[str, "subprocess.Popen[bytes]"]
 MOST_CLIMBERS = 100
 START_TIMEOUT = 60.0  # [s]
+ENDLESS = 20.0  # [s] of a path without end
 STOP_TIMEOUT = 20.0  # [s] for the recorder, and then for the nodes
 HURRIED_TIMEOUTS = 3.8, 1.0  # [s] of recorder and nodes, after more than one signal
 
@@ -78,7 +79,13 @@ class Ended(RuntimeError):  # noqa: N818 - it is what happened
 class DemoOptions:
     """How long the demonstration lasts."""
 
-    duration: float = parameter(20.0, "s", "of the trajectory; too short: it is cut off", above=0)
+    duration: float = parameter(
+        0.0,
+        "s",
+        "time of the trajectory; 0: as long as its path takes, or 20 s of one without end; too "
+        "short: it is cut off",
+        at_least=0,
+    )
 
 
 class Demo(ClimberNode):
@@ -127,6 +134,11 @@ class Demo(ClimberNode):
         values = {pair.key: pair.value for pair in message.status[0].values}
         self.left[climber] = float(values["time_left"])
 
+    def planned(self) -> float:
+        """How long it takes from now until all paths are done [s]; NaN until planners tell."""
+        told = [self.left.get(climber, math.nan) for climber in self.climbers]
+        return math.nan if any(map(math.isnan, told)) else max(told)
+
     def records_all(self, bag: Path) -> bool:
         """Whether messages of every node are recorded, and the services to start are there."""
         wanted = {f"{climber}/{topic}" for climber in self.climbers for topic in self.topics}
@@ -167,6 +179,17 @@ class Demo(ClimberNode):
         # one that fell before this was heard of tells no time any more
         self.wait(lambda: self.time is not None or bool(self.fall), "the plant")
         first = self.time or 0.0
+        if not self.duration:
+            self.wait(
+                lambda: (
+                    not math.isnan(self.planned())
+                    or (self.time or 0.0) > first + 1.0
+                    or bool(self.fall)
+                ),
+                "the plant",
+            )
+            lasts = (self.time or 0.0) - first + self.planned() + 1.5
+            self.duration = math.ceil(lasts) if math.isfinite(lasts) else ENDLESS
         begin = shown = time.monotonic()
         in_place, due = sys.stdout.isatty(), 0.0  # where it is no terminal, ten lines in all
         while (passed := (self.time or 0.0) - first) < self.duration and not self.fall:
@@ -324,7 +347,9 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument("--output", "-o", type=Path, required=True, help="new directory")
     parser.add_argument(
-        "--duration", type=between(1e-3, 1e9), help="[s] (default: that of the config)"
+        "--duration",
+        type=between(1e-3, 1e9),
+        help="[s] (default: that of the config, or as long as its path takes)",
     )
     parser.add_argument(
         "--climbers",

@@ -118,10 +118,12 @@ class LocalizationOptions:
         0.0, "m", "λ at the start: sag to a side by the angle turned, as `localize` has told"
     )
     initial_pivot: float = parameter(
-        0.0, "m", "a at the start: how far below the centre it turns, as `localize` has told"
+        0.0,
+        "m",
+        "a at the start: how far below the centre the climber turns, as `localize` has told",
     )
     initial_drag_slip: float = parameter(
-        0.0, "", "ζ at the start: slip along by what drags it, as `localize` has told"
+        0.0, "", "ζ at the start: slip along by what drags the climber, as `localize` has told"
     )
     initial_weight_slip: float = parameter(
         0.0, "", "ξ at the start: slip along by the weight, as `localize` has told"

@@ -54,7 +54,7 @@ class Lanes(ThroughPoints):
     descent: float = parameter(
         1.0,
         "",
-        "times as far as it is counts what the way between two lanes goes down, against y: more "
+        "factor by which the way between two lanes counts where it goes down, against y: more "
         "for climbers whose turns scrub, which sag where they turn from down to level",
         at_least=1,
         at_most=100,

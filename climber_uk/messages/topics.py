@@ -23,6 +23,7 @@ LOCALIZATION = "wall_odometry"  # the node that makes one of them
 PARAMETERS, FORCE = f"{CONTROLLER}/parameters", f"{CONTROLLER}/constraint_force"
 MARGINS = f"{PLANT}/margins", f"{CONTROLLER}/margins"  # the plant knows better
 CLOCK, DIAGNOSTICS, LOG = "/clock", "/diagnostics", "/rosout"
+FELL = "fell off"  # what the plant reports of a climber that has, and then why
 
 
 def private(topic: str) -> str:

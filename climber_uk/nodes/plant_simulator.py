@@ -14,6 +14,7 @@ from climber_uk.mechanics.quantities import NO_TORQUES
 from climber_uk.messages import reading
 from climber_uk.messages.in_place import NumberReader
 from climber_uk.messages.topics import (
+    FELL,
     JOINTS,
     ODOMETRY,
     PLANT,
@@ -217,9 +218,7 @@ class PlantSimulator(ClimberNode):
                 self.robot.advance(self.command_at(time), push or UNPUSHED)
         except (FellOff, NotFinite) as error:
             self.fallen = True
-            self.report(
-                "climber", f"fell off: {error}" if isinstance(error, FellOff) else str(error)
-            )
+            self.report("climber", f"{FELL}: {error}" if isinstance(error, FellOff) else str(error))
             return
         self.robot.measure()
         loss = self.options.odometry_loss

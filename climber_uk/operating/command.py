@@ -60,8 +60,12 @@ class Operator:
         while not condition():
             rclpy.spin_once(self.node, timeout_sec=PERIOD)
             if time.monotonic() > until:
-                where = f"in ROS domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
-                raise NoAnswerError(f"nobody answers: {what} ({where}, within {self.timeout:g} s)")
+                raise self.no_answer(what)
+
+    def no_answer(self, what: str) -> NoAnswerError:
+        """The error that nobody has answered in time."""
+        where = f"in ROS domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
+        return NoAnswerError(f"nobody answers: {what} ({where}, within {self.timeout:g} s)")
 
     def call(self, kind: Any, name: str, request: Any) -> Any:
         """Response of a service."""
@@ -104,18 +108,23 @@ class Operator:
         heard: list[DiagnosticArray] = []
         subscription = self.node.create_subscription(DiagnosticArray, PROGRESS, heard.append, 10)
         self.wait(lambda: heard, f"topic {subscription.topic_name}")
-        return True, watching.progress(heard[-1])[1]
+        return True, f"{watching.progress(heard[-1])[1]}\n{watching.hint(heard[-1])}".rstrip()
 
     def watch(self) -> tuple[bool, str]:
         """Show what it does until its path is done."""
         watched, screen = watching.Watched(self.node), watching.Screen()
         topic = self.node.resolve_topic_name(PROGRESS)
+        self.wait(lambda: PROGRESS in watched.now(), f"topic {topic}")
+        last = time.monotonic()
         while True:
-            self.wait(lambda: PROGRESS in watched.now(), f"topic {topic}")
             heard = watched.now()
             screen.show(watching.lines(heard))
-            if PROGRESS in heard and watching.progress(heard[PROGRESS])[0] == "done":
-                return True, ""
+            if PROGRESS in heard:
+                last = time.monotonic()
+                if watching.progress(heard[PROGRESS])[0] == "done":
+                    return True, ""
+            elif time.monotonic() > last + self.timeout:
+                raise self.no_answer(f"topic {topic}")
             time.sleep(REDRAWN)  # the last message of each topic is kept meanwhile
             for _ in watching.HEARD:
                 rclpy.spin_once(self.node, timeout_sec=0.0)

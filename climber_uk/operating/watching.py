@@ -31,7 +31,9 @@ HEARD = {
 STALE = 2.0  # [s] after which a message tells nothing any more
 HALF = 20  # characters of a bar to one side
 ALONE = 1.0  # [s] between lines where no terminal shows them
-CLEAR = "\x1b[K"  # the rest of a line
+CLEAR, BELOW = "\x1b[K", "\x1b[J"  # the rest of a line, and what is below
+WHY = "Its log says why; 'climber enable' goes on after a fault, or when disabled."
+NOBODY = f"Nobody has told how far it is for {STALE:g} s: have the nodes ended?"
 
 
 class Watched:
@@ -76,7 +78,8 @@ class Screen:
         width = shutil.get_terminal_size().columns - 1
         up = f"\x1b[{self.height}A" if self.height else ""
         self.height = len(lines)
-        print(up + "".join(f"{line[:width]}{CLEAR}\n" for line in lines), end="", flush=True)
+        shown = "".join(f"{line[:width]}{CLEAR}\n" for line in lines)
+        print(f"{up}{shown}{BELOW}", end="", flush=True)
 
 
 def progress(message: DiagnosticArray) -> tuple[str, str]:
@@ -87,13 +90,18 @@ def progress(message: DiagnosticArray) -> tuple[str, str]:
     value = {key: float(number) for key, number in text.items()}
     state = status.message
     if state == "waiting" and mode:
-        state += f" (the controller: {mode}; its log says why, 'climber enable' forgives it)"
+        state += f" (the controller: {mode})"
     said = [state, f"{value['done']:.2f} m done"]
     if math.isfinite(value["left"]):
         said += [f"{value['left']:.2f} m left", f"{value['time_left']:.0f} s"]
     if value["lap"]:
         said += [f"lap {value['lap']:.0f}", f"segment {value['segment']:.0f}"]
     return status.message, ", ".join(said)
+
+
+def hint(message: DiagnosticArray) -> str:
+    """What to do where the controller is what the planner waits for; else nothing."""
+    return WHY if "(the controller: " in progress(message)[1] else ""
 
 
 def lines(heard: Mapping[str, Any]) -> list[str]:
@@ -104,11 +112,12 @@ def lines(heard: Mapping[str, Any]) -> list[str]:
     }
     limit = limits.get("max_wheel_torque", 0.0)
     return [
-        _said(heard, PROGRESS, lambda message: progress(message)[1]),
+        progress(heard[PROGRESS])[1] if PROGRESS in heard else "planner  –",
         "speed    " + _said(heard, ODOMETRY, _speed),
         "error    " + _said(heard, ERROR, _error),
         "margins  " + _said(heard, MARGINS[1], _margins),
         *(_torques(heard[TORQUES], limit) if TORQUES in heard else ["torques  –"]),
+        hint(heard[PROGRESS]) if PROGRESS in heard else NOBODY,
     ]
 
 
@@ -135,7 +144,7 @@ def _torques(message: JointState, limit: float) -> list[str]:
     """A bar for each wheel, of the limit [N m] if that is known, else of the largest torque."""
     whole = limit or max(map(abs, message.effort), default=0.0) or 1.0
     return [
-        f"torque   {bar(effort / whole)} {effort:7.3f} N m  {name}"
+        f"torque  {bar(effort / whole)} {effort:7.3f} N m {name}"
         for name, effort in zip(message.name, message.effort, strict=False)
     ]
 

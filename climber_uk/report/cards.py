@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from climber_uk.bags.events import ERROR, OK, WARNING, Event
 from climber_uk.mechanics.adhesion import Alarm
+from climber_uk.messages.topics import FELL
 from climber_uk.report.metrics.safety import is_start_of
 from climber_uk.report.tables import Column
 
@@ -81,6 +82,10 @@ def verdict(column: Column) -> str:
     of = "truth_" if math.isfinite(values["truth_max_distance"]) else ""
     far = f"at most {shown(f'{of}max_distance')} off"
     stops = values["safety_stops"]
+    for time, event in column.case.run.events:
+        _, fell, why = event.text.partition(f"{FELL}: ")
+        if fell:
+            return f"It fell off the wall at {time:.1f} s: {why}."
     if math.isnan(values["max_distance"]) and not stops > 0:
         said = f"There is no reference in it, only that it drove {shown('travelled')}"
     elif values["following"] == 0:
@@ -92,9 +97,9 @@ def verdict(column: Column) -> str:
     else:
         said = f"It did not settle on its path, {far}"
     if values["lowest_tip_margin"] < 1:
-        return f"{said}; on a real wall it would tip over: more suction, or less weight."
+        return f"{said}; on a real wall it would tip over: more adhesion, or less weight."
     if values["lowest_slip_margin"] < 1:
-        return f"{said}; on a real wall its wheels would slip: more suction, or slower."
+        return f"{said}; on a real wall its wheels would slip: more adhesion, or slower."
     return f"{said}."
 
 

@@ -67,7 +67,7 @@ def _figure(name: str, png: bytes) -> str:
 def _events(column: Column) -> str:
     reported = column.case.run.events
     rows = "".join(
-        f'<tr class="{LEVELS[event.level]}"><td class="number">{time:.3f} s</td>'
+        f'<tr class="event {LEVELS[event.level]}"><td class="number">{time:.3f} s</td>'
         f"<td>{_safe(event.node)}</td><td>{event.kind}</td><td>{_safe(event.text)}</td></tr>"
         for time, event in reported[:MOST_EVENTS]
     )

@@ -50,6 +50,9 @@ tr.ok td:first-child { border-left: 4px solid #2a9d4a; }
   body { margin: 1em auto; padding: 0 0.6em; font-size: 14px; }
   td, th { padding: 3px 4px; }
   td { overflow-wrap: break-word; }
+  .event { display: grid; grid-template-columns: auto 1fr auto; }
+  .event td { border-bottom: 0; }
+  .event td:last-child { grid-column: 1 / -1; border-bottom: 1px solid var(--line); }
 }
 </style>
 </head>

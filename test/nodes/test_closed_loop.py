@@ -14,6 +14,7 @@ from world import CONFIG, TIMEOUT, World, executable, inhabitants
 
 from climber_uk.bags.recorded_run import read_run
 from climber_uk.control.safety import Mode
+from climber_uk.demo.run_demo import ENDLESS
 from climber_uk.mechanics import SECOND
 from climber_uk.messages import reading
 from climber_uk.messages.topics import PRESSURE
@@ -48,7 +49,7 @@ def is_under_way(world):
 def hold_up_the_recorder(world):
     """Stop it for a while, once the run has begun, as a busy machine may."""
     is_under_way(world)
-    recorders = [number for number, said in inhabitants(world.domain) if "record_bag" in said]
+    recorders = [number for number, said in inhabitants(world) if "record_bag" in said]
     for recorder in recorders:  # none where all is over already
         with suppress(ProcessLookupError):
             os.kill(recorder, signal.SIGSTOP)
@@ -284,6 +285,28 @@ def test_a_climber_that_loses_its_suction_is_stopped_in_time_and_falls_in_the_en
     falls = 1.0 + 0.6 * np.log(8000 * 0.06 * 0.125 / (5 * 9.81 * 0.05))
     assert max(states) == pytest.approx(falls, abs=0.01)
     assert states[max(time for time in states if time < falls - 1.0)] == 0.0  # it stood by then
+
+
+@pytest.mark.soak  # 10 s
+@pytest.mark.parametrize(
+    ("path", "lasts"),
+    [
+        ("shape: line\n    line: {length: 0.1}\n    rest_to_rest: {rate: 0.1, ramp_time: 1.0}", 4),
+        ("shape: circle\n    time_law: constant_rate\n    constant_rate: {rate: 0.1}", ENDLESS),
+    ],
+)
+def test_a_demo_lasts_as_long_as_its_path(world, tmp_path, path, lasts):
+    """By hand: 0.1 m at 0.1 m/s with two ramps of 1 s takes 2 s, and 1.5 s of rest follow."""
+    config = tmp_path / "own.yaml"
+    config.write_text(
+        f"/**/trajectory_publisher:\n  ros__parameters:\n    {path}\n"
+        "/**/uk_torque_controller:\n  ros__parameters: {control_period: 0.02}\n"
+        "/**/plant_simulator:\n  ros__parameters: {control_period: 0.02}\n"
+    )
+    demo(world, tmp_path / "run", config)
+    said = finished(world)
+    assert f"{lasts:.1f} of {lasts:.1f} s" in said
+    assert "not finished" not in said
 
 
 @pytest.mark.soak  # of two: test_extending.py

@@ -13,10 +13,12 @@ from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from test_faults import LIMIT, LOCK_STEP, PLANNER, PLANT
 from test_waiting import Waiting
-from world import CONFIG, executable
+from world import CONFIG, TIMEOUT, executable
 
-from climber_uk.messages import reading
+from climber_uk.messages import reading, writing
+from climber_uk.messages.topics import PROGRESS
 from climber_uk.operating.command import DO
+from climber_uk.planning.progress import Progress
 
 pytestmark = pytest.mark.nodes
 
@@ -290,3 +292,20 @@ def test_the_command_tells_when_nobody_answers_and_what_it_takes(world):
         assert done.returncode == status
         assert said in done.stderr
         assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_climber_that_falls_silent_is_not_shown_as_it_was(world):
+    """As if its nodes had been killed: nobody is waited for in front of what they told last."""
+    told = writing.progress("planner", vars(Progress("following", left=2.0, time_left=3.0)), 0)
+    planner = world.node.create_publisher(DiagnosticArray, f"/{PROGRESS}", 10)
+    watch = world.run("climber", executable("climber"), "watch", "--timeout", "3")
+
+    def is_shown():
+        planner.publish(told)
+        return "following" in world.log("climber")
+
+    world.wait(is_shown, "what is watched")
+    assert watch.wait(TIMEOUT) == 3
+    *_, shown, said = world.log("climber").splitlines()
+    assert shown == "planner  –"
+    assert "nobody answers: topic /trajectory_publisher/progress" in said

@@ -4,11 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from world import CONFIG, TIMEOUT, executable
+from world import CONFIG, TIMEOUT, World, executable
 
 from climber_uk.bags.recorded_run import read_run
 
@@ -174,6 +175,25 @@ def test_a_demo_doubts_before_it_starts_what_its_nodes_would_doubt_in_their_logs
     doubt, _ = process.communicate(timeout=TIMEOUT)[0].splitlines()  # once for all nodes
     assert doubt.startswith(f"run_demo: {file}: mass=5000 [kg] is hardly meant")
     assert doubt.endswith("if it is in g, write 5")
+
+
+def test_a_test_ends_what_was_started_in_it_and_nothing_else_in_its_domain(tmp_path):
+    """Who runs the tests may have robots, a shell or an editor in that domain."""
+    ended = World(tmp_path)
+    sleep = ["sleep", "600"]
+    elsewhere = subprocess.Popen(sleep, env={**os.environ, "ROS_DOMAIN_ID": str(ended.domain)})
+    ended.run("shell", *PARENT, *sleep)
+    ended.wait(lambda: descendants(ended.processes["shell"].pid), "what the shell starts")
+    (deep,) = descendants(ended.processes["shell"].pid)
+    try:
+        ended.close()
+        deadline = time.monotonic() + TIMEOUT
+        while parent_of(deep) is not None:
+            assert time.monotonic() < deadline
+        assert parent_of(elsewhere.pid) == os.getpid()
+    finally:
+        elsewhere.kill()
+        elsewhere.wait()
 
 
 @pytest.mark.parametrize("place", ["/dev/null/run", "/proc/run"])

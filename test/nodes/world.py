@@ -34,6 +34,7 @@ CONFIG = Path(__file__).parents[2] / "config"
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 DOMAINS = itertools.count(os.getppid() * WORKERS + WORKER, WORKERS)
+WORLDS = itertools.count()
 
 
 def new_domain():
@@ -62,9 +63,12 @@ def sweep(domain):
             file.unlink(missing_ok=True)
 
 
-def inhabitants(domain):
-    """Ids and command lines of all processes that were started in a domain."""
-    mark = f"ROS_DOMAIN_ID={domain}\0".encode()
+def inhabitants(world):
+    """Ids and command lines of all processes that were started in a world, by whichever of them.
+
+    Its domain does not tell: whoever runs the tests may have nodes in it, or work in it.
+    """
+    mark = f"WORLD={world.environment['WORLD']}\0".encode()
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):  # it has ended meanwhile, or is somebody else's
             if mark in (process / "environ").read_bytes():
@@ -103,7 +107,8 @@ class World:
 
     def __init__(self, directory):
         self.domain, self.mark = reserved_domain()
-        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain)}
+        own = {"ROS_DOMAIN_ID": str(self.domain), "WORLD": f"{os.getpid()}-{next(WORLDS)}"}
+        self.environment = {**os.environ, **own}
         self.directory = directory
         self.processes = {}
         self.context = Context()
@@ -210,7 +215,7 @@ class World:
             process.kill()
 
     def close(self):
-        """End all that was started in the domain, by the test or by what it started."""
+        """End all that was started in it, by the test or by what it started."""
         for process in self.processes.values():
             process.send_signal(signal.SIGCONT)  # one that is stopped hears of nothing else
             process.terminate()
@@ -218,7 +223,7 @@ class World:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(TIMEOUT)
             process.kill()
-        for number, _ in inhabitants(self.domain):
+        for number, _ in inhabitants(self):
             with suppress(ProcessLookupError):
                 os.kill(number, signal.SIGKILL)
         self.executor.shutdown()

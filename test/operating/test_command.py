@@ -61,7 +61,7 @@ def test_namespaces_are_taken_with_and_without_slashes(monkeypatch, name):
 def test_a_climber_that_waits_tells_for_what():
     how_far = Progress("waiting", done=1.0, left=2.0, time_left=3.0, lap=1, segment=1)
     for mode, said in (
-        ("too_fast", "waiting (the controller: too fast; "),
+        ("too_fast", "waiting (the controller: too fast), 1.00 m"),
         ("", "waiting, 1.00 m"),
     ):
         message = writing.progress("planner", vars(replace(how_far, mode=mode)), 0)
@@ -69,6 +69,7 @@ def test_a_climber_that_waits_tells_for_what():
         assert state == "waiting"
         assert line.startswith(said)
         assert line.endswith("1.00 m done, 2.00 m left, 3 s, lap 1, segment 1")
+        assert ("climber enable" in watching.hint(message)) == bool(mode)
 
 
 def heard():
@@ -94,8 +95,9 @@ def test_what_is_watched_is_told_in_numbers_and_bars():
         "speed      0.250 m/s, turning  -0.100 rad/s",
         "error        1.00 mm along the path,    -2.00 mm across, 0.0100 rad",
         "margins  slip   2.50, tip  24.00 (below 1 it slips, or tips over); load 384 N",
-        f"torque   {' ' * 20}|{'█' * 10}{' ' * 10}   2.000 N m  left",
-        f"torque   {'█' * 20}|{' ' * 20}  -4.000 N m  right",
+        f"torque  {' ' * 20}|{'█' * 10}{' ' * 10}   2.000 N m left",
+        f"torque  {'█' * 20}|{' ' * 20}  -4.000 N m right",
+        "",
     ]
 
 
@@ -106,7 +108,7 @@ def test_what_nobody_tells_is_a_dash_and_bars_go_without_a_limit(missing):
     told = watching.lines(some)
     assert sum(line.endswith("–") for line in told) == (missing != watching.PARAMETERS)
     if missing == watching.PARAMETERS:
-        assert told[-2].count("█") == 10
+        assert told[-3].count("█") == 10
 
 
 @pytest.mark.parametrize("share", [-math.inf, -2.0, -1.0, -0.01, 0.0, 0.5, 1.0, 9.0, math.nan])

@@ -212,6 +212,16 @@ def test_what_begins_like_a_formula_is_marked_as_text(name):
     assert plain("a" + name) == "a" + name
 
 
+def test_the_verdict_on_a_climber_that_fell_is_that_it_fell(tmp_path):
+    """Whatever else became of it before."""
+    made = a_run(200)
+    made.add_mode(0.5, Mode.LOW_PRESSURE.value, level=2)
+    made.add_log(0.8, 30, "climber: fell off: tip margin 0.9997 is below 1")
+    (fallen,), _ = read_runs(made.write(tmp_path / "bag"), Topics())
+    said = verdict(Column("a", "bag", Case(fallen)))
+    assert re.fullmatch(r"It fell off the wall at 0\.\d s: tip margin 0\.9997 is below 1\.", said)
+
+
 @few
 def test_the_true_distance_comes_first_on_the_page_and_in_the_table(run, tmp_path):
     made = a_run(200)
