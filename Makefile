@@ -20,9 +20,10 @@ SET_UP := $(VENV)/set-up
 TOOLS := $(VENV)/tools-set-up
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 # One line of the terminal tells what pip is about; its errors stay, and so does its status
-SHOWN := 2>&1; echo "ended $$?"; } | awk '/^ended / {status = $$2; next} /^ERROR|^error/ {bad = 1} \
+SHOWN := 2>&1; echo "ended $$?"; } | awk -v all=$$(grep -c == $(VENV)/demo.txt) \
+	'/^ended / {status = $$2; next} /^ERROR|^error/ {bad = 1} \
 	bad {print "\r" $$0} /^Installing/ {what = "installing"} \
-	/^Collecting|^Processing/ {what = ++count " of 100: " $$2} \
+	/^Collecting|^Processing/ {what = ++count " of " all ": " $$2} \
 	what {printf "\r\033[K  %.70s", what; fflush(); what = ""} END {printf "\r\033[K"; exit status}'
 # Exactly what requirements.txt has, to the last bit
 EXACTLY := --no-deps --no-build-isolation --require-hashes --requirement
@@ -141,8 +142,7 @@ colcon: $(TOOLS)
 	rm -rf build install log
 
 $(SET_UP): requirements.txt setup.py
-	@echo "Setting up $(VENV), once: 100 packages of ROS 2, numpy, scipy, matplotlib; 150 MB to fetch, 500 on"
-	@echo "the disk; a minute or two."
+	@echo "Setting up $(VENV), once: ROS 2, numpy, scipy, matplotlib; 150 MB to fetch, 500 on the disk, 1 to 2 minutes"
 	@$(PYTHON) -m venv $(VENV)
 	@grep '^setuptools' requirements.txt > $(VENV)/first.txt
 	@sed '/^# For tests/,$$d' requirements.txt > $(VENV)/demo.txt

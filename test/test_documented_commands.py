@@ -79,7 +79,7 @@ ONLY_PARSED = {
     r"pytest .*": "is a test",
     r"make (test|unit|lint|coverage|soak|test-kilted)": "runs the tests",
     r"make help": "test_make_tells_what_there_is, below",
-    r"make demo( …| CONFIG=config/\w+.yaml)?": "test_readme.py, with other directories",
+    r"make demo( …| (CONFIG|CORNERS)=config/\w+.\w+)?": "test_readme.py, with other directories",
     r"make (paper|docs)": "test/paper and test/nodes/test_docs.py run what it runs",
     r"make (bench|physics|sbom)": "installs other packages first",
     r"make campaign|campaign (config/campaign.yaml|FILE).*|campaign examples/.*": "takes minutes "

@@ -26,7 +26,10 @@ OTHERS = {
         *(("nav2_bt_navigator", "bt_navigator"), ("nav2_lifecycle_manager", "lifecycle_manager")),
         ("robot_localization", "ekf_node"),
     },
-    "launch": {("foxglove_bridge", "foxglove_bridge_launch.xml")},
+    "launch": {
+        ("foxglove_bridge", "foxglove_bridge_launch.xml"),
+        ("nav2_bringup", "navigation_launch.py"),
+    },
 }
 # of ROS itself and pip: verbs with the options that are used here
 VERBS = {

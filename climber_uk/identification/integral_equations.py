@@ -63,9 +63,7 @@ class Cut:
     least_speed: float = parameter(
         0.02, "m/s", "speed that counts as motion: too low, and rest spoils the friction", above=0
     )
-    least_yaw_rate: float = parameter(
-        0.05, "rad/s", "yaw rate that counts as turning: likewise", above=0
-    )
+    least_yaw_rate: float = parameter(0.05, "rad/s", "yaw rate that counts as turning", above=0)
 
     def windows(self, motion: RecordedMotion) -> list[Indices]:
         """Indices of the times in each window in which it drives one way."""
