@@ -261,14 +261,17 @@ class ForceBudget:
             asked - lost for asked, lost in zip(command.demanded, command.lost, strict=True)
         )
         mass, inertia, push = climber.driven_mass, climber.driven_inertia, force - weight
-        most, change = mass * GENTLE * speed, mass * GROWS_BY * time
-        given, pushed = _gentle(push, self._holds(climber), self.lasts.force, most, change)
-        most, change = inertia * GENTLE * yaw_rate, inertia * TURN_GROWS_BY * time
-        known = BREAKS_LOOSE * self._scrubs
-        turn, turned = _gentle(moment, known, self.lasts.moment, most, change)
-        if law.falls or self._is_on_trust:  # `within` has bounded it
-            given, pushed = push, self.lasts.force
-        self.lasts = Wrench(pushed, turned)
+        given, pushed = push, self.lasts.force
+        if not law.falls and self._allowed == math.inf:  # else `within` bounds what drives it
+            holds = self._holds(climber)
+            known = clipped(push, -holds, holds)
+            most, change = mass * GENTLE * speed, mass * GROWS_BY * time
+            beyond, pushed = _gentle(push - known, pushed, most, change)
+            given = known + beyond
+        most = inertia * GENTLE * yaw_rate + BREAKS_LOOSE * self._scrubs
+        turn, turned = _gentle(moment, self.lasts.moment, most, inertia * TURN_GROWS_BY * time)
+        if self.paused is None:
+            self.lasts = Wrench(pushed, turned)
         if (given, turn) == (push, moment):
             return command
         lost = Wrench(command.lost.force + push - given, command.lost.moment + moment - turn)
@@ -286,27 +289,23 @@ class ForceBudget:
         return math.copysign(max(least, abs(push)), push)
 
     def _turning(self, climber: Climber, moment: float, period: float) -> float:
-        """A moment [N m], or what of it is given while no turn is told: none in a pause."""
+        """A moment [N m], or what of it is given while no turn is told.
+
+        In a pause that is none, but for what has lasted on the way to the reference.
+        """
+        if self.paused is not None:
+            return self.lasts.moment if self._turns else 0.0
         if self._turns:  # as it is told
             return moment
-        if self.paused is not None:
-            return 0.0
         holds, to_moment = BREAKS_LOOSE * self._scrubs, 1 / (_rims(climber) * period)
         lowest = -holds - to_moment * max(FIRST + self.turn, 0.0)
         return min(max(moment, lowest), holds + to_moment * max(FIRST - self.turn, 0.0))
 
 
-def _gentle(
-    asked: float, known: float, lasts: float, most: float, change: float
-) -> tuple[float, float]:
-    """What is given of what is asked for; and what lasts of it from now on.
-
-    It is what is `known` to be met, and beyond that `most` beside what lasts, but no more than is
-    asked for. What lasts goes after that by a `change`.
-    """
-    beyond = asked - clipped(asked, -known, known)
-    given = clipped(clipped(beyond, lasts - most, lasts + most), min(beyond, 0.0), max(beyond, 0.0))
-    return asked - beyond + given, lasts + clipped(beyond - lasts, -change, change)
+def _gentle(asked: float, lasts: float, most: float, change: float) -> tuple[float, float]:
+    """What is given of what is asked for, `most` beside what lasts; and what lasts from now on."""
+    given = clipped(asked, lasts - most, lasts + most)
+    return given, lasts + clipped(asked - lasts, -change, change)
 
 
 def _gone(observed: Observed) -> float:
