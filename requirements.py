@@ -21,16 +21,8 @@ ONLY_SOURCE = "empy"  # of which there is no wheel
 def fetch(python: str, pinned: str, directory: Path) -> None:
     """Fetch what a Python would be given of the requirements, from no mirror."""
     (directory / "pinned.txt").write_text(pinned)
-    words = [
-        "--no-deps",
-        "--only-binary",
-        ":all:",
-        "--no-binary",
-        ONLY_SOURCE,
-        "--index-url",
-        INDEX,
-    ]
-    words += ["--python-version", python, "--dest", directory]
+    words = ["--no-deps", "--only-binary", ":all:", "--no-binary", ONLY_SOURCE]
+    words += ["--index-url", INDEX, "--python-version", python, "--dest", directory]
     words += ["--requirement", directory / "pinned.txt"]
     environment = {name: v for name, v in os.environ.items() if name != "PIP_FIND_LINKS"}
     environment["PIP_CONFIG_FILE"] = os.devnull

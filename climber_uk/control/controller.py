@@ -102,7 +102,8 @@ class Controller:
         self._retuned: tuple[int, ConstraintSet] | None = None  # [ns] and what was before
         self._enabled = True
         self._clockless_looks = 0  # in a row, of `look`: see `CLOCK_PATIENCE`
-        self._heard: int | None = None  # [ns] when the last odometry told of, or came if bad
+        # [ns] stamp of the last good odometry, no later than the clock; or when a bad one came
+        self._heard: int | None = None
         self._trouble: Trouble | None = None  # with that odometry
         self._stamp = 0  # [ns] of the last good one
         self._now = 0  # [ns] of the last look at the clock
@@ -246,7 +247,7 @@ class Controller:
                 self.guard.forgive()
 
     def _forget_when(self) -> None:
-        """Forget when what was: times of before mean nothing."""
+        """Forget since when it brakes and is calm: times of before mean nothing."""
         self._safe_output.forget()
         self._calm = Calm()
 

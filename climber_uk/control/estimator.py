@@ -39,7 +39,7 @@ from climber_uk.mechanics.quantities import Motion, Torques, Wrench
 from climber_uk.mechanics.wall import Wall, weight_beyond
 
 LONG_AGO = round(2 * LONGEST_STEP * SECOND)  # [ns]
-KEPT_LONGER = round(LONGEST_DELAY * SECOND)  # [ns]
+KEPT_LONGER = round(LONGEST_DELAY * SECOND)  # [ns] torques are kept, as a delay may yet show
 PERIOD_SMOOTHING = 0.1  # share of a new period in the mean
 
 

@@ -193,9 +193,9 @@ class ForceBudget:
         return self.paused is None and (lives or self._creeps)
 
     @property
-    def _is_on_trust(self) -> bool:
-        """Whether torques are given while no motion is told."""
-        return self._rests and not self._is_told
+    def _is_to_drive(self) -> bool:
+        """Whether it is watched: its reference does not rest, nor turn on the spot."""
+        return self._allowed < math.inf
 
     @property
     def unanswered(self) -> Trouble | None:
@@ -218,7 +218,7 @@ class ForceBudget:
         What may change of it within a period is found anew: a moment that is not given would leave
         nothing of that for the drive.
         """
-        if law.falls or not self._is_on_trust:
+        if law.falls or not self._rests or self._is_told:
             return command
         climber, weight, period = law.climber, law.weight(command.motion), ahead.period
         force, moment = (
@@ -262,7 +262,7 @@ class ForceBudget:
         )
         mass, inertia, push = climber.driven_mass, climber.driven_inertia, force - weight
         given, pushed = push, self.lasts.force
-        if not law.falls and self._allowed == math.inf:  # else `within` bounds what drives it
+        if not law.falls and not self._is_to_drive:  # else `within` bounds its push
             holds = self._holds(climber)
             known = clipped(push, -holds, holds)
             most, change = mass * GENTLE * speed, mass * GROWS_BY * time

@@ -129,6 +129,7 @@ class Guard:
     def __init__(self, options: GuardOptions, adhesion: Adhesion) -> None:
         self.options, self.adhesion = options, adhesion
         self.fault: Trouble | None = None  # that was found, until the climber has rested
+        self._is_stuck = False  # whether odometry stood exactly, at that fault
         self._rested = 0.0  # [s] since it is at rest
         self._rests_at: Motion | None = None
         self._followed = math.inf  # [s] since the last fault
@@ -288,6 +289,8 @@ class Guard:
     def count(self, stamp: int, fault: Trouble) -> None:
         """Remember a fault, at `stamp` [ns]."""
         self.fault, self._rested, self._followed = fault, 0.0, 0.0
+        # what a silence or a jump of odometry has `restart` forget
+        self._is_stuck = self._is(Mode.STALLED) and self.budget.unanswered is not None
         self._rests_at = None
         self.faults.append(stamp)
         while stamp - self.faults[0] > self.options.memory * SECOND:
@@ -311,9 +314,8 @@ class Guard:
     def is_for_good(self) -> bool:
         """Whether it ends only by ~/enable, once the climber has been looked after."""
         many = len(self.faults) >= self.options.attempts
-        is_stuck = self._is(Mode.STALLED) and self.budget.unanswered is not None
-        needs_somebody = self.fault is not None and self.fault[0] in FOR_GOOD
-        return many or is_stuck or needs_somebody
+        needs_somebody = self.fault is not None and (self._is_stuck or self.fault[0] in FOR_GOOD)
+        return many or needs_somebody
 
     @property
     def trouble(self) -> Trouble | None:

@@ -1,6 +1,7 @@
 """Torque is given and no motion is told: a seal sticks, or odometry is stuck, or late."""
 
 import math
+from copy import deepcopy
 from dataclasses import replace
 from itertools import pairwise
 
@@ -26,12 +27,32 @@ CIRCLE = {
 pytestmark = pytest.mark.slow
 
 
-def test_odometry_that_is_stuck_from_the_start_stalls_and_lets_nothing_run_away():
-    climb = Climb().run(3.5, odometry=frozen(pose=True, twist=True)())
+@pytest.fixture(scope="module")
+def stuck():
+    """A climber whose odometry stands, from its start on."""
+    return Climb().run(3.5, odometry=frozen(pose=True, twist=True)())
+
+
+def test_odometry_that_is_stuck_from_the_start_stalls_and_lets_nothing_run_away(stuck):
+    climb = stuck
     assert climb.controller.mode is Mode.STALLED
     assert "pushes moved nothing" in climb.controller.detail
     assert climb.fastest() < 1.5 * climb.reference_speed + 0.1
     assert climb.fastest(climb.time - 0.5) < 0.01
+
+
+@pytest.mark.parametrize("what", ["silence", "jump", "clock"])
+def test_odometry_that_was_stuck_ends_nothing_by_falling_silent_or_elsewhere(stuck, what):
+    """It drove again after a rest: what had told that it was stuck was forgotten by that."""
+    climb = deepcopy(stuck)
+    rests = State(climb.state.pose + np.array([0.5 * (what == "jump"), 0.0, 0.0]), np.zeros(3))
+    if what == "silence":
+        climb.run(0.3, odometry=lambda *_: None)
+    climb.time -= 1.0 * (what == "clock")
+    climb.run(0.1, odometry=lambda *_: rests)
+    assert climb.controller.guard.is_for_good
+    climb.controller.enable(True)
+    assert not climb.controller.guard.is_for_good
 
 
 @pytest.mark.parametrize(
